@@ -1,0 +1,35 @@
+/* base/env.h: memory, messages and progress through the caller's fct_env. */
+#ifndef FCT_BASE_ENV_H
+#define FCT_BASE_ENV_H
+
+#include "facetree/base.h"
+
+/* count * size bytes aligned to 64, or NULL on overflow or exhaustion. A zero request yields a valid pointer.
+ */
+void *fct_allocate(const fct_env *env, size_t count, size_t size);
+void *fct_allocate_zero(const fct_env *env, size_t count, size_t size);
+/* NULL is allowed. */
+void fct_release(const fct_env *env, void *memory);
+
+/* Grows *array (capacity *capacity elements) to hold at least `needed`, by half at least; contents are kept.
+ */
+fct_result fct_grow(const fct_env *env, void **array, size_t *capacity, size_t needed, size_t size);
+
+/* Sends the message and returns `result`, so that a caller writes: return fct_fail(env, FCT_ERROR_DATA, ...).
+ */
+fct_result fct_fail(const fct_env *env, fct_result result, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+fct_result fct_fail_memory(const fct_env *env, const char *what);
+void fct_note(const fct_env *env, fct_severity severity, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* FCT_OK, or FCT_ERROR_CANCELLED when the hook says stop. From the calling thread only. */
+fct_result fct_progress(const fct_env *env, const char *phase, double done);
+
+/* At least 1. */
+uint32_t fct_env_threads(const fct_env *env);
+
+/* Seconds of a monotonic clock, for statistics only. */
+double fct_seconds(void);
+
+#endif

@@ -1,0 +1,135 @@
+/* facetree/cluster.h: the tree of face clusters and its file.
+ *
+ * Source: Garland, "Quadric-Based Polygonal Surface Simplification", CMU 1999, chapter 8.
+ *
+ * Node ids. A tree over F faces with R roots has F - R inner nodes, numbered in the order in which a reader
+ * opens them: node 0 is the merge that was made last. Ids below `node_count` are inner nodes; id node_count +
+ * p is the leaf of the face at place p of the tree's face order. Because ids run backwards through the
+ * merges, the partition into K clusters is: the nodes with id >= K - R that are a root or a child of a node
+ * with id < K - R.
+ */
+#ifndef FACETREE_CLUSTER_H
+#define FACETREE_CLUSTER_H
+
+#include "facetree/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fct_tree fct_tree;
+
+/* One cluster; 136 bytes, as in the file. All in the mesh's own coordinates. */
+typedef struct fct_cluster {
+    float area;           /* sum A_k */
+    float area_vector[3]; /* S = sum A_k n_k */
+    float moment[6];      /* M = sum A_k n_k n_k^T: xx xy xz yy yz zz */
+    float centroid[3];    /* of the surface */
+    float cone_angle;     /* every face normal is within this angle (radians) of S; pi where S cancels */
+    float plane[4];       /* least-squares plane n.x + d = 0 (8.1), n along S */
+    float box_center[3];
+    float box_rotation[4]; /* unit quaternion x y z w: fct_cluster_box expands it */
+    float box_half[3];
+    float cost;        /* of the merge, not decreasing with merge order */
+    uint32_t child[2]; /* node ids; FCT_NONE in a leaf */
+    uint32_t first;    /* the cluster's faces are places [first, first + count) */
+    uint32_t count;
+} fct_cluster;
+
+/* The oriented box, whose extents hold every vertex for exactly these axes. */
+FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
+
+typedef enum fct_cluster_method { FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS } fct_cluster_method;
+/* MEAN: E = a1 E_fit + a2 E_dir + a3 E_shape of the union (8.18). INCREMENT: the growth of the total error.
+ */
+typedef enum fct_cluster_cost { FCT_COST_INCREMENT, FCT_COST_MEAN } fct_cluster_cost;
+/* POINTS: each face adds its three corners (8.3). AREA: the surface integral over the triangles. */
+typedef enum fct_fit_measure { FCT_FIT_AREA, FCT_FIT_POINTS } fct_fit_measure;
+
+typedef struct fct_tree_def {
+    uint32_t size;
+    fct_cluster_method method;
+    fct_cluster_cost cost;
+    fct_fit_measure fit_measure;
+    double fit_weight, direction_weight, shape_weight; /* negative: the default of the chosen cost */
+    uint32_t root_count;                               /* stop at this many clusters; at least 1; default 1 */
+    double max_cost;      /* no merge above this cost; default infinity. What is left over are roots */
+    const char *source;   /* name recorded in the file, or NULL */
+    uint64_t source_hash; /* xxh3 of the source file, recorded in the file; 0: unknown */
+} fct_tree_def;
+FCT_API fct_tree_def fct_tree_def_default(void);
+
+typedef struct fct_tree_stats {
+    double seconds_dual, seconds_contract, seconds_boxes;
+} fct_tree_stats;
+
+/* Builds the tree. Any valid mesh with at least one face; disconnected parts are joined by proximity under
+ * one root. Where mesh->materials is present, clusters of different materials are merged only after all
+ * merges within a material are done. Depth at most 3 log2 F for one root. The mesh is copied. stats may be
+ * NULL. Errors: DATA (no faces, invalid mesh), MEMORY, CANCELLED. */
+FCT_API fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                                  fct_tree_stats *stats, fct_tree **out);
+FCT_API void fct_tree_destroy(fct_tree *tree);
+
+/* Pointers into the tree, valid as long as it lives. */
+typedef struct fct_tree_view {
+    uint32_t face_count, vertex_count, node_count, root_count;
+    uint32_t depth;              /* of the deepest leaf; a single root leaf has depth 0 */
+    double mean_depth;           /* over the leaves */
+    const fct_cluster *clusters; /* node_count inner nodes */
+    const uint32_t *roots;       /* root_count node ids, ascending */
+    const uint32_t *face_ids;    /* place -> input face */
+    const uint32_t *vertex_ids;  /* vertex of the tree's order -> input vertex */
+    const float *positions;      /* vertex_count x 3, in the tree's vertex order */
+    const uint32_t *triangles;   /* face_count x 3, by place, indices in the tree's vertex order */
+    const float *colors;         /* vertex_count x 3 or NULL, in the tree's vertex order */
+    const uint32_t *materials;   /* face_count or NULL, by place */
+    uint32_t material_count;
+    const char *const *material_names; /* material_count strings or NULL */
+    const char *source;                /* never NULL */
+    uint64_t source_hash;
+    fct_tree_def def; /* the options of the build; def.source is NULL */
+} fct_tree_view;
+FCT_API fct_tree_view fct_tree_get(const fct_tree *tree);
+
+/* The cluster of any node id, leaves included (computed from the triangle). */
+FCT_API void fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out);
+
+/* The mesh in the input's own order (positions, triangles, colours, materials). Errors: MEMORY. */
+FCT_API fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out);
+
+/* Node ids of the partition into `count` clusters, in order of their first place. `nodes` holds at least
+ * `count`. Returns how many were written: count clamped to [root_count, face_count]. */
+FCT_API uint32_t fct_tree_partition(const fct_tree *tree, uint32_t count, uint32_t *nodes);
+/* How many clusters remain when all merges of cost <= max_cost are done. */
+FCT_API uint32_t fct_tree_count_at_cost(const fct_tree *tree, double max_cost);
+/* Cluster number (0..count-1, in the order of `nodes`) of each input face; labels holds face_count. */
+FCT_API void fct_tree_labels(const fct_tree *tree, const uint32_t *nodes, uint32_t count, uint32_t *labels);
+
+/* Area-weighted means over a partition (fit over the squared diagonal of the mesh's bounds). Errors: MEMORY.
+ */
+typedef struct fct_partition_quality {
+    double mean_fit;          /* E_fit of each cluster to its best plane, by the surface integral */
+    double mean_direction;    /* E_dir (8.12) about the plane's normal */
+    double mean_irregularity; /* g (8.16) */
+    double
+        mean_normal_deviation; /* squared deviation of unit normals from the cluster's mean normal (L2,1) */
+    double box_area;           /* sum of the boxes' surface areas over the squared diagonal */
+    bool connected;            /* every cluster's faces are connected through shared edges */
+} fct_partition_quality;
+FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
+                                    uint32_t count, fct_partition_quality *out);
+
+/* Writes the hierarchy file: temporary file, fsync, rename. Errors: OUTPUT, MEMORY. */
+FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);
+/* Maps a hierarchy file read-only and validates header, sizes and section bounds in O(1). Errors: INPUT,
+ * DATA, MEMORY. */
+FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out);
+/* Reads everything: checksums, ranges, children, containment of vertices in boxes, areas. Errors: DATA with
+ * what is wrong. */
+FCT_API fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
