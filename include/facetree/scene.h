@@ -37,14 +37,16 @@ typedef struct fct_instance {
     char name[128]; /* the object's name; parts of one object cut by material share it */
     uint32_t model;
     uint32_t material;
-    uint32_t object;        /* parts of one object share the number */
-    float to_world[12];     /* rows of R|t: world = to_world * (x, y, z, 1) */
-    float to_model[12];     /* its inverse */
-    float normal_matrix[9]; /* rows; takes area vectors to the world: cofactors of R, |normal_matrix S| is the
-                               area */
-    float uniform_scale;    /* the factor when R is a rotation times a factor (reflections too), else 0 */
-    bool mirrored;          /* det R < 0 */
-    fct_bounds bounds;      /* world */
+    uint32_t object;    /* parts of one object share the number */
+    float to_world[12]; /* rows of R|t: world = to_world * (x, y, z, 1) */
+    float to_model[12]; /* its inverse */
+    float
+        normal_matrix[9]; /* rows; takes area vectors to the world: |det R| R^-T, so |normal_matrix S| is the
+                             world's area and what points out of a closed model still does, mirrored or not
+                           */
+    float uniform_scale;  /* the factor when R is a rotation times a factor (reflections too), else 0 */
+    bool mirrored;        /* det R < 0: the winding of transformed corners runs the other way round */
+    fct_bounds bounds;    /* world */
 } fct_instance;
 
 /* Nodes of a binary hierarchy over the instances: node 0 is the root when there is one; leaf nodes name an
@@ -82,8 +84,10 @@ FCT_API void fct_scene_destroy(fct_scene *scene);
 FCT_API fct_result fct_scene_add_material(fct_scene *scene, const fct_material *material, uint32_t *id);
 /* Adds an object: a mesh under a transform (3 x 4, rows of R|t; NULL: identity), with one material, or, when
  * face_materials (mesh->face_count material ids) is not NULL, one per face. The mesh is clustered here unless
- * `tree` (which the scene then owns, and which must be of this very mesh, of one material) is given. The mesh
- * is not kept. Errors: DATA (singular transform, invalid mesh), MEMORY, CANCELLED. */
+ * `tree` is given (of this very mesh, under one material: face_materials is NULL; `mesh` may be NULL too);
+ * the scene owns it from here on, and destroys it when the call fails. The mesh is not kept. Objects are
+ * numbered in the order in which they are added, instances of them included. Errors: DATA (singular
+ * transform, invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_mesh *mesh,
                                         fct_tree *tree, const float transform[12], uint32_t material,
                                         const uint32_t *face_materials);
@@ -91,9 +95,13 @@ FCT_API fct_result fct_scene_add_object(fct_scene *scene, const char *name, cons
  * FCT_NONE) or another. */
 FCT_API fct_result fct_scene_add_instance(fct_scene *scene, const char *name, uint32_t object,
                                           const float transform[12], uint32_t material);
+/* Names a light group; groups are numbered in the order in which they are added. A scene that names none has
+ * one, "all". Errors: MEMORY. */
+FCT_API fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_t *id);
 FCT_API void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera);
-/* Builds ray structures and the volume hierarchy; to be called once, after which the scene is immutable.
- * Errors: DATA (nothing in the scene), MEMORY, CANCELLED. */
+/* Builds ray structures and the volume hierarchy; to be called once, after which the scene is immutable;
+ * bounds, face_count and the default camera are known from here on. After a failure only destroy remains.
+ * Errors: DATA (nothing in the scene, a light group that is not there), MEMORY, CANCELLED, INTERNAL. */
 FCT_API fct_result fct_scene_commit(fct_scene *scene);
 
 /* Reads scene.json (documented in docs/scene.md), OBJ with its MTL (Kd, Ke; one object per group or `o`),
@@ -119,7 +127,9 @@ typedef struct fct_scene_hit {
 FCT_API bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit,
                                    fct_visits *visits);
 FCT_API bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits);
-/* The nearest surface point over all instances within max_distance. u, v, face as in fct_closest. */
+/* The nearest surface point over all instances within max_distance, in world distance whatever the
+ * transforms; equal distances: the lower instance. u, v, face as in fct_closest. Works with either backend;
+ * exact under transforms that are not uniform too, but slower there. */
 FCT_API bool fct_scene_closest_point(const fct_scene *scene, const float point[3], float max_distance,
                                      uint32_t *instance, fct_closest *out);
 

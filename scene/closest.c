@@ -1,0 +1,177 @@
+/* scene/closest.c: the surface point of the whole scene that is nearest to a point, in world distance.
+ *
+ * Instances are visited by the distance to their boxes. Under a rotation, reflection and uniform scale the
+ * model's own query answers. Under any other transform nearest in the model is not nearest in the world: the
+ * cluster tree is searched with triangles taken to the world, pruned by shrink * (distance to the oriented
+ * box in the model), which never exceeds the distance in the world; exact, and slower the more the scales
+ * differ.
+ */
+#include <math.h>
+
+#include "scene/scene.h"
+#include "scene/transform.h"
+
+enum { STACK = FCT_SCENE_DEPTH * (FCT_SCENE_WIDTH - 1) + 1, TREE_STACK = FCT_SCENE_TREE_DEPTH + 2 };
+
+typedef struct pending {
+    double bound;
+    uint32_t child;
+} pending;
+
+typedef struct search {
+    v3 point;        /* world */
+    double distance; /* of the best so far */
+    uint32_t instance;
+    fct_closest best;
+} search;
+
+/* Barycentrics (u, v) of the triangle's point nearest to p, by the regions of its corners and sides. */
+static v3 nearest_on_triangle(v3 p, v3 a, v3 b, v3 c, double *u, double *v) {
+    v3 ab = v3_sub(b, a), ac = v3_sub(c, a), ap = v3_sub(p, a), bp = v3_sub(p, b), cp = v3_sub(p, c);
+    double d1 = v3_dot(ab, ap), d2 = v3_dot(ac, ap), d3 = v3_dot(ab, bp), d4 = v3_dot(ac, bp),
+           d5 = v3_dot(ab, cp), d6 = v3_dot(ac, cp);
+    double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+    if (d1 <= 0 && d2 <= 0)
+        *u = 0, *v = 0;
+    else if (d3 >= 0 && d4 <= d3)
+        *u = 1, *v = 0;
+    else if (d6 >= 0 && d5 <= d6)
+        *u = 0, *v = 1;
+    else if (vc <= 0 && d1 >= 0 && d3 <= 0)
+        *u = d1 / (d1 - d3), *v = 0;
+    else if (vb <= 0 && d2 >= 0 && d6 <= 0)
+        *u = 0, *v = d2 / (d2 - d6);
+    else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+        *v = (d4 - d3) / ((d4 - d3) + (d5 - d6)), *u = 1 - *v;
+    else
+        *u = vb / (va + vb + vc), *v = vc / (va + vb + vc);
+    return v3_mad(v3_mad(a, *u, ab), *v, ac);
+}
+
+static double box_distance(const fct_cluster *cluster, v3 p) {
+    fct_box box;
+    fct_cluster_box(cluster, &box);
+    v3 d = v3_sub(p, v3_load(box.center));
+    double square = 0;
+    for (int k = 0; k < 3; ++k) {
+        double out = fabs(v3_dot(d, v3_load(box.axes[k]))) * (1 - 1e-6) - box.half[k] * (1 + 1e-6);
+        if (out > 0) square += out * out;
+    }
+    return sqrt(square);
+}
+
+static void try_triangle(search *s, const fct_tree_view *view, const float *to_world, uint32_t instance,
+                         uint32_t place) {
+    v3 corner[3];
+    double u, v;
+    for (int k = 0; k < 3; ++k)
+        corner[k] = fct_transform_point(
+            to_world, v3_load(view->positions + 3 * (size_t)view->triangles[3 * (size_t)place + k]));
+    v3 nearest = nearest_on_triangle(s->point, corner[0], corner[1], corner[2], &u, &v);
+    double distance = v3_norm(v3_sub(nearest, s->point));
+    uint32_t face = view->face_ids[place];
+    if (!(distance <= s->distance)) return;
+    if (distance == s->distance && s->instance != FCT_NONE &&
+        (instance > s->instance || (instance == s->instance && face >= s->best.face)))
+        return;
+    s->distance = distance;
+    s->instance = instance;
+    s->best = (fct_closest){.distance = (float)distance, .face = face, .u = (float)u, .v = (float)v};
+    v3_store(s->best.point, nearest);
+}
+
+static void search_tree(search *s, const fct_scene *scene, uint32_t instance) {
+    const fct_instance *placed = scene->instances + instance;
+    const fct_tree *tree = scene->own[placed->model].tree;
+    const fct_scene_frame *frame = scene->frames + instance;
+    fct_tree_view view = fct_tree_get(tree);
+    v3 local = fct_transform_point(placed->to_model, s->point);
+    pending stack[TREE_STACK];
+    for (uint32_t r = 0; r < view.root_count; ++r) {
+        int top = 0;
+        stack[top++] = (pending){0, view.roots[r]};
+        while (top > 0) {
+            pending next = stack[--top];
+            if (next.bound > s->distance) continue;
+            if (next.child >= view.node_count) {
+                try_triangle(s, &view, placed->to_world, instance, next.child - view.node_count);
+                continue;
+            }
+            pending child[2];
+            for (int k = 0; k < 2; ++k) {
+                fct_cluster cluster;
+                child[k].child = view.clusters[next.child].child[k];
+                fct_tree_cluster(tree, child[k].child, &cluster);
+                child[k].bound = frame->shrink * box_distance(&cluster, local);
+            }
+            int near = child[1].bound < child[0].bound;
+            if (child[!near].bound <= s->distance) stack[top++] = child[!near];
+            if (child[near].bound <= s->distance) stack[top++] = child[near];
+        }
+    }
+}
+
+static void search_model(search *s, const fct_scene *scene, uint32_t instance) {
+    const fct_instance *placed = scene->instances + instance;
+    const fct_scene_model *own = scene->own + placed->model;
+    fct_closest found;
+    float local[3];
+    v3_store(local, fct_transform_point(placed->to_model, s->point));
+    float limit = (float)(s->distance / placed->uniform_scale * (1 + 1e-5));
+    if (!fct_bvh_closest_point(own->points ? own->points : own->bvh, local, limit, &found, NULL)) return;
+    v3 nearest = fct_transform_point(placed->to_world, v3_load(found.point));
+    double distance = v3_norm(v3_sub(nearest, s->point));
+    if (!(distance <= s->distance)) return;
+    if (distance == s->distance && s->instance != FCT_NONE && instance > s->instance) return;
+    s->distance = distance;
+    s->instance = instance;
+    s->best = found;
+    s->best.distance = (float)distance;
+    v3_store(s->best.point, nearest);
+}
+
+static double child_distance(const fct_scene_node *node, int k, v3 p) {
+    double point[3] = {p.x, p.y, p.z}, square = 0;
+    for (int c = 0; c < 3; ++c) {
+        double below = node->bounds[2 * c][k] - point[c], above = point[c] - node->bounds[2 * c + 1][k];
+        double out = below > above ? below : above;
+        if (out > 0) square += out * out;
+    }
+    return sqrt(square);
+}
+
+bool fct_scene_closest_point(const fct_scene *scene, const float point[3], float max_distance,
+                             uint32_t *instance, fct_closest *out) {
+    search s = {.point = v3_load(point),
+                .distance = max_distance,
+                .instance = FCT_NONE,
+                .best = {.face = FCT_NONE, .distance = max_distance}};
+    pending stack[STACK];
+    int top = 0;
+    bool finite = isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
+    if (finite && max_distance >= 0) stack[top++] = (pending){0, 0};
+    while (top > 0) {
+        pending next = stack[--top];
+        if (next.bound > s.distance) continue;
+        if (next.child & FCT_SCENE_LEAF) {
+            uint32_t i = next.child & ~FCT_SCENE_LEAF;
+            if (scene->instances[i].uniform_scale > 0)
+                search_model(&s, scene, i);
+            else
+                search_tree(&s, scene, i);
+            continue;
+        }
+        const fct_scene_node *node = scene->nodes + next.child;
+        int base = top;
+        for (int k = 0; k < FCT_SCENE_WIDTH && node->child[k] != FCT_NONE; ++k) {
+            double bound = child_distance(node, k, s.point);
+            if (bound > s.distance) continue;
+            int place = top++;
+            while (place > base && stack[place - 1].bound < bound) stack[place] = stack[place - 1], --place;
+            stack[place] = (pending){bound, node->child[k]};
+        }
+    }
+    *instance = s.instance;
+    *out = s.best;
+    return s.instance != FCT_NONE;
+}

@@ -1,0 +1,153 @@
+/* scene/rays.c: closest hit and any hit through the instances.
+ *
+ * Wide nodes are tested eight children at a time, in plain loops that compilers turn into vector code; the
+ * near ones are visited first. At an instance the ray is taken to the model, its direction not normalised, so
+ * that t means the same in both spaces; an instance that stands untransformed gets the ray as it is. Box
+ * tests widen the far side by the rounding of the products, and instance boxes hold the slack of the
+ * transform (transform.c), so no hit is lost to a box. Equal t: the lower instance.
+ */
+#include <float.h>
+#include <math.h>
+
+#include "scene/scene.h"
+#include "scene/transform.h"
+
+enum { STACK = FCT_SCENE_DEPTH * (FCT_SCENE_WIDTH - 1) + 1 };
+
+typedef struct slabs {
+    float origin[3], inverse[3];
+    int near[3]; /* row of fct_scene_node.bounds on the ray's near side; the far side is near ^ 1 */
+} slabs;
+
+static inline bool set_slabs(const fct_ray *ray, slabs *s) {
+    bool moving = false;
+    for (int c = 0; c < 3; ++c) {
+        float o = ray->origin[c], d = ray->direction[c];
+        if (isnan(o) || isnan(d)) return false;
+        moving |= d != 0;
+        s->origin[c] = o;
+        s->inverse[c] = fabsf(d) > FLT_MIN ? 1 / d : copysignf(1 / FLT_MIN, d);
+        s->near[c] = 2 * c + (signbit(d) ? 1 : 0);
+    }
+    return moving && ray->t_min <= ray->t_max;
+}
+
+/* Entry distances of the eight children, INFINITY where the ray passes by. */
+static inline void enter(const fct_scene_node *node, const slabs *s, float t_min, float t_max,
+                         float entry[FCT_SCENE_WIDTH]) {
+    const float *x0 = node->bounds[s->near[0]], *x1 = node->bounds[s->near[0] ^ 1];
+    const float *y0 = node->bounds[s->near[1]], *y1 = node->bounds[s->near[1] ^ 1];
+    const float *z0 = node->bounds[s->near[2]], *z1 = node->bounds[s->near[2] ^ 1];
+    float ox = s->origin[0], oy = s->origin[1], oz = s->origin[2];
+    float ix = s->inverse[0], iy = s->inverse[1], iz = s->inverse[2];
+    for (int k = 0; k < FCT_SCENE_WIDTH; ++k) {
+        float nx = (x0[k] - ox) * ix, ny = (y0[k] - oy) * iy, nz = (z0[k] - oz) * iz;
+        float fx = (x1[k] - ox) * ix, fy = (y1[k] - oy) * iy, fz = (z1[k] - oz) * iz;
+        float near = nx > ny ? nx : ny, far = fx < fy ? fx : fy;
+        near = nz > near ? nz : near, far = fz < far ? fz : far;
+        /* three roundings on either side */
+        near = near - fabsf(near) * 4e-7f, far = far + fabsf(far) * 4e-7f;
+        near = near > t_min ? near : t_min, far = far < t_max ? far : t_max;
+        entry[k] = near <= far ? near : INFINITY;
+    }
+}
+
+static inline void to_model(const fct_scene_frame *frame, const fct_ray *ray, float t_max, fct_ray *out) {
+    const double *m = frame->to_model;
+    const float *l = frame->linear, *d = ray->direction;
+    double x = ray->origin[0], y = ray->origin[1], z = ray->origin[2];
+    for (int i = 0; i < 3; ++i) {
+        out->origin[i] = (float)(m[4 * i] * x + m[4 * i + 1] * y + m[4 * i + 2] * z + m[4 * i + 3]);
+        out->direction[i] = l[3 * i] * d[0] + l[3 * i + 1] * d[1] + l[3 * i + 2] * d[2];
+    }
+    out->t_min = ray->t_min;
+    out->t_max = t_max;
+}
+
+typedef struct pending {
+    float entry;
+    uint32_t child;
+} pending;
+
+/* Pushes the children that are entered, the nearest on top. */
+static inline int push_sorted(const fct_scene_node *node, const float entry[FCT_SCENE_WIDTH], pending *stack,
+                              int top) {
+    int base = top;
+    for (int k = 0; k < FCT_SCENE_WIDTH; ++k) {
+        if (!(entry[k] < INFINITY)) continue;
+        int place = top++;
+        while (place > base && stack[place - 1].entry < entry[k]) stack[place] = stack[place - 1], --place;
+        stack[place] = (pending){entry[k], node->child[k]};
+    }
+    return top;
+}
+
+bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit,
+                           fct_visits *visits) {
+    slabs s;
+    fct_hit best = {.face = FCT_NONE};
+    float limit = ray->t_max;
+    pending stack[STACK];
+    int top = 0;
+    hit->instance = hit->face = FCT_NONE;
+    if (!set_slabs(ray, &s)) return false;
+    stack[top++] = (pending){ray->t_min, 0};
+    while (top > 0) {
+        pending next = stack[--top];
+        if (next.entry > limit) continue;
+        if (!(next.child & FCT_SCENE_LEAF)) {
+            float entry[FCT_SCENE_WIDTH];
+            enter(scene->nodes + next.child, &s, ray->t_min, limit, entry);
+            top = push_sorted(scene->nodes + next.child, entry, stack, top);
+            if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
+            continue;
+        }
+        uint32_t i = next.child & ~FCT_SCENE_LEAF;
+        const fct_scene_frame *frame = scene->frames + i;
+        fct_ray local = *ray;
+        fct_hit found;
+        local.t_max = limit;
+        if (!frame->identity) to_model(frame, ray, limit, &local);
+        if (!fct_bvh_closest_hit(frame->bvh, &local, &found, visits)) continue;
+        if (hit->instance != FCT_NONE && (found.t > limit || (found.t == limit && i > hit->instance)))
+            continue;
+        best = found;
+        limit = found.t;
+        hit->instance = i;
+    }
+    if (hit->instance == FCT_NONE) return false;
+    hit->t = best.t, hit->u = best.u, hit->v = best.v;
+    hit->face = best.face, hit->place = best.place;
+    v3 normal = v3_load(best.normal);
+    if (!scene->frames[hit->instance].identity) {
+        /* unit first: the square of a small triangle's area may not fit the matrix's products */
+        normal = fct_transform_normal(scene->instances[hit->instance].normal_matrix, v3_unit(normal));
+    }
+    v3_store(hit->normal, v3_unit(normal));
+    return true;
+}
+
+bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits) {
+    slabs s;
+    uint32_t stack[STACK];
+    int top = 0;
+    if (!set_slabs(ray, &s)) return false;
+    stack[top++] = 0;
+    while (top > 0) {
+        uint32_t child = stack[--top];
+        if (!(child & FCT_SCENE_LEAF)) {
+            const fct_scene_node *node = scene->nodes + child;
+            float entry[FCT_SCENE_WIDTH];
+            enter(node, &s, ray->t_min, ray->t_max, entry);
+            for (int k = 0; k < FCT_SCENE_WIDTH; ++k)
+                if (entry[k] < INFINITY) stack[top++] = node->child[k];
+            if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
+            continue;
+        }
+        const fct_scene_frame *frame = scene->frames + (child & ~FCT_SCENE_LEAF);
+        fct_ray local;
+        if (!frame->identity) to_model(frame, ray, ray->t_max, &local);
+        if (fct_bvh_any_hit(frame->bvh, frame->identity ? ray : &local, visits)) return true;
+    }
+    return false;
+}

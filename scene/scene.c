@@ -1,0 +1,415 @@
+/* scene/scene.c: building a scene: materials, models cut by material, objects, and the step that freezes it
+ * all. Rays are in rays.c, closest points in closest.c, the hierarchy above the instances in volume.c.
+ */
+#include "scene/scene.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+#include "scene/transform.h"
+
+fct_result fct_scene_create(const fct_env *env, fct_backend backend, fct_scene **out) {
+    *out = NULL;
+    fct_scene *scene = fct_allocate_zero(env, 1, sizeof *scene);
+    if (!scene) return fct_fail_memory(env, "a scene");
+    scene->env = env;
+    scene->backend = backend;
+    *out = scene;
+    return FCT_OK;
+}
+
+static void release_model(const fct_env *env, fct_scene_model *model) {
+    if (model->bvh) fct_bvh_destroy(model->bvh);
+    if (model->points) fct_bvh_destroy(model->points);
+    if (model->tree) fct_tree_destroy(model->tree);
+    fct_release(env, model->source_faces);
+    fct_release(env, model->source_vertices);
+}
+
+void fct_scene_destroy(fct_scene *scene) {
+    if (!scene) return;
+    const fct_env *env = scene->env;
+    for (uint32_t m = 0; m < scene->model_count; ++m) release_model(env, scene->own + m);
+    for (uint32_t g = 0; g < scene->light_group_count; ++g) fct_release(env, scene->light_groups[g]);
+    void *arrays[] = {scene->materials, scene->models,       scene->own,     scene->instances, scene->frames,
+                      scene->objects,   scene->light_groups, scene->volumes, scene->nodes};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(env, arrays[i]);
+    fct_release(env, scene);
+}
+
+static fct_result copy_name(const fct_env *env, const char *what, const char *name, char *to, size_t size) {
+    size_t length = strlen(name);
+    if (length >= size)
+        return fct_fail(env, FCT_ERROR_DATA, "%s name \"%.40s...\" has %zu bytes, at most %zu are allowed",
+                        what, name, length, size - 1);
+    memcpy(to, name, length + 1);
+    return FCT_OK;
+}
+
+/* ---- Materials ---- */
+
+fct_result fct_scene_add_material(fct_scene *scene, const fct_material *material, uint32_t *id) {
+    assert(!scene->committed);
+    const fct_env *env = scene->env;
+    *id = FCT_NONE;
+    if (!memchr(material->name, 0, sizeof material->name))
+        return fct_fail(env, FCT_ERROR_DATA, "a material's name is not terminated");
+    for (int c = 0; c < 3; ++c) {
+        float r = material->reflectance[c], e = material->emission[c];
+        if (!(r >= 0 && r < 1))
+            return fct_fail(env, FCT_ERROR_DATA, "material \"%s\": reflectance[%d] is %g, expected [0, 1)",
+                            material->name, c, (double)r);
+        if (!(e >= 0 && isfinite(e)))
+            return fct_fail(env, FCT_ERROR_DATA,
+                            "material \"%s\": emission[%d] is %g, expected a finite number >= 0",
+                            material->name, c, (double)e);
+    }
+    fct_result result = fct_grow(env, (void **)&scene->materials, &scene->material_capacity,
+                                 (size_t)scene->material_count + 1, sizeof *scene->materials);
+    if (result != FCT_OK) return result;
+    *id = scene->material_count++;
+    scene->materials[*id] = *material;
+    return FCT_OK;
+}
+
+fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_t *id) {
+    assert(!scene->committed);
+    *id = FCT_NONE;
+    fct_result result = fct_grow(scene->env, (void **)&scene->light_groups, &scene->light_group_capacity,
+                                 (size_t)scene->light_group_count + 1, sizeof *scene->light_groups);
+    if (result != FCT_OK) return result;
+    size_t length = strlen(name) + 1;
+    char *copy = fct_allocate(scene->env, length, 1);
+    if (!copy) return fct_fail_memory(scene->env, "a light group");
+    memcpy(copy, name, length);
+    *id = scene->light_group_count++;
+    scene->light_groups[*id] = copy;
+    return FCT_OK;
+}
+
+/* ---- Models ---- */
+
+static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model *own) {
+    const fct_env *env = scene->env;
+    fct_model model = {
+        .tree = own->tree, .source_faces = own->source_faces, .source_vertices = own->source_vertices};
+    fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
+    uint32_t depth = fct_tree_get(own->tree).depth;
+    if (result == FCT_OK && depth > FCT_SCENE_TREE_DEPTH)
+        result = fct_fail(env, FCT_ERROR_DATA, "model \"%s\": its tree has depth %u, at most %d is allowed",
+                          name, depth, FCT_SCENE_TREE_DEPTH);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&scene->models, &scene->model_capacity,
+                          (size_t)scene->model_count + 1, sizeof *scene->models);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&scene->own, &scene->own_capacity, (size_t)scene->model_count + 1,
+                          sizeof *scene->own);
+    if (result != FCT_OK) {
+        release_model(env, own);
+        return result;
+    }
+    scene->models[scene->model_count] = model;
+    scene->own[scene->model_count++] = *own;
+    return FCT_OK;
+}
+
+/* One tree over the faces listed, or over the whole mesh when `faces` is NULL. */
+static fct_result add_part(fct_scene *scene, const char *name, const fct_mesh *mesh, uint32_t *faces,
+                           uint32_t count) {
+    const fct_env *env = scene->env;
+    fct_scene_model own = {0};
+    fct_mesh part = {0};
+    fct_result result = FCT_OK;
+    if (faces) {
+        own.source_faces = fct_allocate(env, count, sizeof *faces);
+        if (!own.source_faces) return fct_fail_memory(env, "a part of a model");
+        memcpy(own.source_faces, faces, count * sizeof *faces);
+        result = fct_mesh_extract(env, mesh, faces, count, &part, &own.source_vertices);
+    }
+    fct_mesh plain = faces ? part : *mesh;
+    plain.materials = NULL, plain.material_names = NULL, plain.material_count = 0;
+    fct_tree_def def = fct_tree_def_default();
+    if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
+    if (faces) fct_mesh_release(env, &part);
+    if (result != FCT_OK) {
+        release_model(env, &own);
+        return result;
+    }
+    return add_model(scene, name, &own);
+}
+
+/* Faces sorted by label, stable; starts has label_count + 1 entries. */
+static void sort_by_label(const uint32_t *labels, uint32_t face_count, uint32_t label_count, uint32_t *starts,
+                          uint32_t *faces) {
+    memset(starts, 0, ((size_t)label_count + 1) * sizeof *starts);
+    for (uint32_t f = 0; f < face_count; ++f) ++starts[labels[f] + 1];
+    for (uint32_t k = 0; k < label_count; ++k) starts[k + 1] += starts[k];
+    for (uint32_t f = 0; f < face_count; ++f) faces[starts[labels[f]]++] = f;
+    for (uint32_t k = label_count; k > 0; --k) starts[k] = starts[k - 1];
+    starts[0] = 0;
+}
+
+static fct_result split_by_label(fct_scene *scene, const char *name, const fct_mesh *mesh,
+                                 const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts) {
+    const fct_env *env = scene->env;
+    fct_result result = FCT_OK;
+    uint32_t *starts = fct_allocate(env, (size_t)label_count + 1, sizeof *starts);
+    uint32_t *faces = fct_allocate(env, mesh->face_count, sizeof *faces);
+    if (!starts || !faces) {
+        result = fct_fail_memory(env, "a model's parts");
+        goto done;
+    }
+    sort_by_label(labels, mesh->face_count, label_count, starts, faces);
+    uint32_t used = 0;
+    for (uint32_t k = 0; k < label_count; ++k) used += starts[k + 1] > starts[k];
+    parts->labels = fct_allocate(env, used, sizeof *parts->labels);
+    if (!parts->labels) {
+        result = fct_fail_memory(env, "a model's parts");
+        goto done;
+    }
+    for (uint32_t k = 0; k < label_count && result == FCT_OK; ++k) {
+        uint32_t count = starts[k + 1] - starts[k];
+        if (count == 0) continue;
+        result = add_part(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count);
+        if (result == FCT_OK) parts->labels[parts->count++] = k;
+    }
+done:
+    fct_release(env, starts);
+    fct_release(env, faces);
+    return result;
+}
+
+fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *mesh, fct_tree *tree,
+                           const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts) {
+    const fct_env *env = scene->env;
+    *parts = (fct_scene_parts){.first = scene->model_count};
+    fct_result result = FCT_OK;
+    if (labels) {
+        result = split_by_label(scene, name, mesh, labels, label_count, parts);
+    } else {
+        parts->labels = fct_allocate_zero(env, 1, sizeof *parts->labels);
+        fct_scene_model own = {.tree = tree};
+        if (!parts->labels) {
+            release_model(env, &own);
+            return fct_fail_memory(env, "a model");
+        }
+        result = tree ? add_model(scene, name, &own) : add_part(scene, name, mesh, NULL, mesh->face_count);
+        parts->count = 1;
+    }
+    if (result != FCT_OK) {
+        while (scene->model_count > parts->first) release_model(env, scene->own + --scene->model_count);
+        fct_release(env, parts->labels);
+        *parts = (fct_scene_parts){0};
+    }
+    return result;
+}
+
+/* ---- Instances ---- */
+
+static fct_result set_transform(const fct_env *env, const char *name, const float transform[12],
+                                fct_instance *instance, fct_scene_frame *frame) {
+    const float *m = transform ? transform : fct_transform_identity;
+    switch (fct_transform_set(m, instance, frame->to_model)) {
+    case FCT_TRANSFORM_NOT_FINITE:
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "instance \"%s\": the transform holds a number that is not finite", name);
+    case FCT_TRANSFORM_SINGULAR:
+        return fct_fail(env, FCT_ERROR_DATA, "instance \"%s\": the transform is singular", name);
+    case FCT_TRANSFORM_GOOD:
+        break;
+    }
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) frame->linear[3 * i + j] = (float)frame->to_model[4 * i + j];
+    frame->identity = memcmp(m, fct_transform_identity, sizeof fct_transform_identity) == 0;
+    frame->shrink = fct_transform_shrink(instance);
+    return FCT_OK;
+}
+
+fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, uint32_t count,
+                           const uint32_t *materials, const float transform[12]) {
+    assert(!scene->committed);
+    const fct_env *env = scene->env;
+    fct_instance instance = {.object = scene->object_count};
+    fct_scene_frame frame = {0};
+    fct_result result = copy_name(env, "instance", name, instance.name, sizeof instance.name);
+    if (result == FCT_OK) result = set_transform(env, name, transform, &instance, &frame);
+    size_t needed = (size_t)scene->instance_count + count;
+    if (result == FCT_OK && needed > INT32_MAX / 2)
+        result = fct_fail(env, FCT_ERROR_DATA, "the scene has more than 2^30 instances");
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&scene->instances, &scene->instance_capacity, needed,
+                          sizeof *scene->instances);
+    if (result == FCT_OK)
+        result =
+            fct_grow(env, (void **)&scene->frames, &scene->frame_capacity, needed, sizeof *scene->frames);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&scene->objects, &scene->object_capacity,
+                          (size_t)scene->object_count + 1, sizeof *scene->objects);
+    if (result != FCT_OK) return result;
+    scene->objects[scene->object_count++] = (fct_scene_object){scene->instance_count, count};
+    for (uint32_t k = 0; k < count; ++k) {
+        assert(materials[k] < scene->material_count);
+        instance.model = first + k;
+        instance.material = materials[k];
+        scene->instances[scene->instance_count] = instance;
+        scene->frames[scene->instance_count++] = frame;
+    }
+    return FCT_OK;
+}
+
+fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_mesh *mesh, fct_tree *tree,
+                                const float transform[12], uint32_t material,
+                                const uint32_t *face_materials) {
+    assert(!scene->committed && (!tree || !face_materials));
+    assert(face_materials || material < scene->material_count);
+    const fct_env *env = scene->env;
+    fct_scene_parts parts = {0};
+    fct_instance probe; /* a bad transform is told before the mesh is clustered */
+    fct_scene_frame frame;
+    fct_result result = set_transform(env, name, transform, &probe, &frame);
+    if (result == FCT_OK && !tree) result = fct_mesh_validate(env, mesh);
+    for (uint32_t f = 0; result == FCT_OK && face_materials && f < mesh->face_count; ++f)
+        if (face_materials[f] >= scene->material_count)
+            result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\": face %u has material %u of %u", name, f,
+                              face_materials[f], scene->material_count);
+    if (result != FCT_OK) {
+        if (tree) fct_tree_destroy(tree);
+        return result;
+    }
+    uint32_t count = scene->model_count;
+    result = fct_scene_split(scene, name, mesh, tree, face_materials, scene->material_count, &parts);
+    if (result != FCT_OK) return result;
+    result = fct_scene_place(scene, name, parts.first, parts.count, face_materials ? parts.labels : &material,
+                             transform);
+    if (result != FCT_OK)
+        while (scene->model_count > count) release_model(env, scene->own + --scene->model_count);
+    fct_release(env, parts.labels);
+    return result;
+}
+
+fct_result fct_scene_add_instance(fct_scene *scene, const char *name, uint32_t object,
+                                  const float transform[12], uint32_t material) {
+    assert(object < scene->object_count);
+    fct_scene_object from = scene->objects[object];
+    uint32_t *materials = fct_allocate(scene->env, from.count, sizeof *materials);
+    if (!materials) return fct_fail_memory(scene->env, "an instance");
+    for (uint32_t k = 0; k < from.count; ++k)
+        materials[k] = material == FCT_NONE ? scene->instances[from.first + k].material : material;
+    fct_result result =
+        fct_scene_place(scene, name, scene->instances[from.first].model, from.count, materials, transform);
+    fct_release(scene->env, materials);
+    return result;
+}
+
+void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera) {
+    scene->camera = *camera;
+    scene->camera.given = true;
+}
+
+/* ---- Commit ---- */
+
+static fct_result build_bvhs(fct_scene *scene) {
+    const fct_env *env = scene->env;
+    for (uint32_t m = 0; m < scene->model_count; ++m) {
+        fct_scene_model *own = scene->own + m;
+        fct_result result = fct_bvh_create(env, own->tree, scene->backend, &own->bvh);
+        if (result == FCT_OK && scene->backend == FCT_BACKEND_EMBREE)
+            result = fct_bvh_create(env, own->tree, FCT_BACKEND_OBB, &own->points);
+        if (result != FCT_OK) return result;
+        scene->models[m].bvh = own->bvh;
+    }
+    return FCT_OK;
+}
+
+static fct_result place_bounds(fct_scene *scene, fct_bounds *bounds) {
+    for (uint32_t i = 0; i < scene->instance_count; ++i) {
+        fct_instance *instance = scene->instances + i;
+        const fct_scene_model *own = scene->own + instance->model;
+        fct_bounds model = fct_bvh_bounds(own->bvh);
+        fct_result result =
+            fct_transform_bounds(scene->env, own->tree, &model, instance->to_world, &instance->bounds);
+        if (result != FCT_OK) return result;
+        for (int c = 0; c < 3; ++c)
+            if (!isfinite(instance->bounds.lower[c]) || !isfinite(instance->bounds.upper[c]))
+                return fct_fail(scene->env, FCT_ERROR_DATA,
+                                "instance \"%s\" reaches beyond what a float can hold", instance->name);
+        bounds[i] = instance->bounds;
+        scene->frames[i].bvh = own->bvh;
+        scene->face_count += fct_tree_get(own->tree).face_count;
+    }
+    return FCT_OK;
+}
+
+/* From the front, a little above and to the right (y is up), so that the sphere around the bounds fits. */
+static void view_the_whole(fct_scene *scene) {
+    double square = 0;
+    v3 toward = v3_unit(v3_make(.45, .35, .85));
+    for (int c = 0; c < 3; ++c) {
+        double size = (double)scene->bounds.upper[c] - scene->bounds.lower[c];
+        scene->camera.target[c] = (float)(.5 * ((double)scene->bounds.upper[c] + scene->bounds.lower[c]));
+        square += size * size;
+    }
+    double radius = fmax(.5 * sqrt(square), 1e-30);
+    scene->camera.vertical_fov = 40;
+    double distance = radius / sin(20 * 3.14159265358979323846 / 180);
+    v3_store(scene->camera.position, v3_mad(v3_load(scene->camera.target), distance, toward));
+    scene->camera.up[1] = 1;
+}
+
+static fct_result check_groups(fct_scene *scene) {
+    uint32_t id;
+    if (scene->light_group_count == 0) {
+        fct_result result = fct_scene_add_light_group(scene, "all", &id);
+        if (result != FCT_OK) return result;
+    }
+    for (uint32_t m = 0; m < scene->material_count; ++m)
+        if (scene->materials[m].light_group >= scene->light_group_count)
+            return fct_fail(scene->env, FCT_ERROR_DATA, "material \"%s\" is in light group %u of %u",
+                            scene->materials[m].name, scene->materials[m].light_group,
+                            scene->light_group_count);
+    return FCT_OK;
+}
+
+fct_result fct_scene_commit(fct_scene *scene) {
+    assert(!scene->committed);
+    const fct_env *env = scene->env;
+    if (scene->instance_count == 0) return fct_fail(env, FCT_ERROR_DATA, "the scene has no instances");
+    fct_result result = check_groups(scene);
+    if (result == FCT_OK) result = build_bvhs(scene);
+    if (result != FCT_OK) return result;
+    fct_bounds *bounds = fct_allocate(env, scene->instance_count, sizeof *bounds);
+    scene->volumes = fct_allocate(env, 2 * (size_t)scene->instance_count - 1, sizeof *scene->volumes);
+    if (!bounds || !scene->volumes) {
+        fct_release(env, bounds);
+        return fct_fail_memory(env, "the volumes of a scene");
+    }
+    result = place_bounds(scene, bounds);
+    if (result == FCT_OK)
+        result = fct_scene_build_volumes(env, scene->instance_count, bounds, scene->volumes);
+    if (result == FCT_OK)
+        result = fct_scene_build_nodes(env, scene->instance_count, scene->volumes, &scene->nodes);
+    fct_release(env, bounds);
+    if (result != FCT_OK) return result;
+    scene->bounds = scene->volumes[0].bounds;
+    if (!scene->camera.given) view_the_whole(scene);
+    scene->committed = true;
+    return FCT_OK;
+}
+
+fct_scene_view fct_scene_get(const fct_scene *scene) {
+    return (fct_scene_view){.material_count = scene->material_count,
+                            .model_count = scene->model_count,
+                            .instance_count = scene->instance_count,
+                            .volume_count = scene->committed ? 2 * scene->instance_count - 1 : 0,
+                            .light_group_count = scene->light_group_count,
+                            .object_count = scene->object_count,
+                            .materials = scene->materials,
+                            .models = scene->models,
+                            .instances = scene->instances,
+                            .volumes = scene->volumes,
+                            .light_groups = (const char *const *)scene->light_groups,
+                            .bounds = scene->bounds,
+                            .camera = scene->camera,
+                            .face_count = scene->face_count};
+}
