@@ -1,0 +1,151 @@
+/* mesh/soup.c: see soup.h. */
+#include "mesh/soup.h"
+
+#include <string.h>
+
+#include "mesh/triangulate.h"
+
+void fct_names_release(const fct_env *env, char **names, uint32_t count) {
+    if (!names) return;
+    for (uint32_t i = 0; i < count; ++i) fct_release(env, names[i]);
+    fct_release(env, names);
+}
+
+char *fct_copy_text(const fct_env *env, const char *text, size_t length) {
+    char *copy = fct_allocate(env, length + 1, 1);
+    if (!copy) return NULL;
+    memcpy(copy, text, length);
+    copy[length] = 0;
+    return copy;
+}
+
+void fct_soup_release(const fct_env *env, fct_soup *soup) {
+    fct_release(env, soup->positions);
+    fct_release(env, soup->colors);
+    fct_release(env, soup->normals);
+    fct_release(env, soup->corners);
+    fct_release(env, soup->starts);
+    fct_release(env, soup->texcoords);
+    fct_release(env, soup->polygon_colors);
+    fct_release(env, soup->materials);
+    fct_names_release(env, soup->material_names, soup->material_count);
+    *soup = (fct_soup){0};
+}
+
+static fct_result check_soup(const fct_env *env, const char *name, const fct_soup *soup) {
+    uint32_t largest = 0;
+    for (size_t i = 0; i < soup->corner_count; ++i)
+        largest = soup->corners[i] > largest ? soup->corners[i] : largest;
+    if (soup->corner_count && largest >= soup->vertex_count) {
+        size_t i = 0;
+        while (soup->corners[i] < soup->vertex_count) ++i;
+        size_t face = i / 3;
+        if (soup->starts)
+            for (face = 0; soup->starts[face + 1] <= i;) ++face;
+        return fct_fail(env, FCT_ERROR_DATA, "%s: face %zu: vertex index %d is out of range, of %u vertices",
+                        name, face, (int)soup->corners[i], soup->vertex_count);
+    }
+    size_t faces = soup->starts ? soup->corner_count - 2 * (size_t)soup->polygon_count : soup->polygon_count;
+    if (faces > FCT_MESH_LIMIT || soup->vertex_count > FCT_MESH_LIMIT)
+        return fct_fail(env, FCT_ERROR_DATA, "%s: more than %llu vertices or triangles", name,
+                        (unsigned long long)FCT_MESH_LIMIT);
+    return FCT_OK;
+}
+
+/* Moves what belongs to vertices, and the material names. */
+static void move_shared(fct_soup *soup, fct_mesh *out) {
+    out->vertex_count = soup->vertex_count;
+    out->positions = soup->positions;
+    out->colors = soup->colors;
+    out->normals = soup->normals;
+    out->material_count = soup->material_count;
+    out->material_names = soup->material_names;
+    soup->positions = soup->colors = soup->normals = NULL;
+    soup->material_names = NULL;
+    soup->material_count = 0;
+}
+
+static void move_triangles(fct_soup *soup, fct_mesh *out) {
+    out->face_count = soup->polygon_count;
+    out->triangles = soup->corners;
+    out->texcoords = soup->texcoords;
+    out->face_colors = soup->polygon_colors;
+    out->materials = soup->materials;
+    soup->corners = soup->materials = NULL;
+    soup->texcoords = soup->polygon_colors = NULL;
+}
+
+static void cut_polygons(const fct_env *env, const char *name, const fct_soup *soup,
+                         const fct_polygon_scratch *scratch, uint32_t *local, fct_mesh *out) {
+    uint64_t budget = 64 * (uint64_t)soup->corner_count + (1u << 28);
+    uint32_t face = 0;
+    for (uint32_t polygon = 0; polygon < soup->polygon_count; ++polygon) {
+        uint32_t first = soup->starts[polygon], count = soup->starts[polygon + 1] - first;
+        fct_triangulate(soup->positions, soup->corners + first, count, scratch, &budget, local);
+        for (uint32_t k = 0; k + 2 < count; ++k, ++face) {
+            for (uint32_t j = 0; j < 3; ++j) {
+                size_t corner = first + local[3 * k + j], place = 3 * (size_t)face + j;
+                out->triangles[place] = soup->corners[corner];
+                if (out->texcoords)
+                    memcpy(out->texcoords + 2 * place, soup->texcoords + 2 * corner, 2 * sizeof(float));
+            }
+            out->source_faces[face] = polygon;
+            if (out->materials) out->materials[face] = soup->materials[polygon];
+            if (out->face_colors)
+                memcpy(out->face_colors + 3 * (size_t)face, soup->polygon_colors + 3 * (size_t)polygon,
+                       3 * sizeof(float));
+        }
+    }
+    if (!budget)
+        fct_note(env, FCT_MESSAGE_WARNING,
+                 "%s: concave polygons of very many corners: some were cut as fans and may overlap", name);
+}
+
+static fct_result triangulate_soup(const fct_env *env, const char *name, fct_soup *soup, fct_mesh *out) {
+    uint32_t widest = 3;
+    for (uint32_t i = 0; i < soup->polygon_count; ++i) {
+        uint32_t count = soup->starts[i + 1] - soup->starts[i];
+        widest = count > widest ? count : widest;
+    }
+    fct_polygon_scratch scratch = {.flat = fct_allocate(env, widest, sizeof *scratch.flat),
+                                   .next = fct_allocate(env, widest, sizeof(uint32_t)),
+                                   .previous = fct_allocate(env, widest, sizeof(uint32_t)),
+                                   .reflex = fct_allocate(env, widest, 1)};
+    uint32_t *local = fct_allocate(env, widest, 3 * sizeof(uint32_t));
+    unsigned arrays = FCT_MESH_SOURCE_FACES | (soup->texcoords ? FCT_MESH_TEXCOORDS : 0) |
+                      (soup->polygon_colors ? FCT_MESH_FACE_COLORS : 0) |
+                      (soup->materials ? FCT_MESH_MATERIALS : 0);
+    fct_result result = FCT_OK;
+    fct_mesh faces = {0};
+    if (!scratch.flat || !scratch.next || !scratch.previous || !scratch.reflex || !local)
+        result = fct_fail_memory(env, "triangulation");
+    else
+        result = fct_mesh_create(env, 0, (uint32_t)(soup->corner_count - 2 * (size_t)soup->polygon_count),
+                                 arrays, &faces);
+    if (result == FCT_OK) {
+        cut_polygons(env, name, soup, &scratch, local, &faces);
+        fct_release(env, faces.positions);
+        *out = faces;
+    }
+    fct_release(env, scratch.flat);
+    fct_release(env, scratch.next);
+    fct_release(env, scratch.previous);
+    fct_release(env, scratch.reflex);
+    fct_release(env, local);
+    return result;
+}
+
+fct_result fct_soup_mesh(const fct_env *env, const char *name, fct_soup *soup, fct_mesh *out) {
+    *out = (fct_mesh){0};
+    fct_result result = check_soup(env, name, soup);
+    bool triangles = !soup->starts || soup->corner_count == 3 * (size_t)soup->polygon_count;
+    if (result == FCT_OK && triangles) move_triangles(soup, out);
+    if (result == FCT_OK && !triangles) result = triangulate_soup(env, name, soup, out);
+    if (result == FCT_OK) {
+        move_shared(soup, out);
+        result = fct_mesh_check(env, name, out);
+    }
+    fct_soup_release(env, soup);
+    if (result != FCT_OK) fct_mesh_release(env, out);
+    return result;
+}
