@@ -1,0 +1,139 @@
+/* tools/facetree.c: the program: finds the subcommand and hands over. */
+#include "tools/tool.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    const char *name, *summary;
+    int (*run)(int argc, char **argv);
+} commands[] = {
+#ifdef TOOL_HAS_MAKE
+    {"make", "make an example scene or mesh", tool_make},
+#endif
+    {"info", "count what a file holds; check a hierarchy file", tool_info},
+    {"cluster", "build the hierarchy of face clusters of a mesh", tool_cluster},
+    {"partition", "cut a mesh into K clusters", tool_partition},
+    {"boxes", "oriented boxes of K clusters", tool_boxes},
+    {"raycast", "shoot rays; check one backend against the other", tool_raycast},
+    {"closest", "find the nearest surface points", tool_closest},
+    {"bake", "radiosity of a scene to vertex colours", tool_bake},
+    {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
+    {"compare", "measure how far two meshes lie apart", tool_compare},
+#ifdef TOOL_HAS_RENDER
+    {"render", "draw a mesh, a scene, clusters or boxes", tool_render},
+#endif
+};
+enum { COMMANDS = sizeof commands / sizeof *commands };
+
+static int run_command(int index, int argc, char **argv) {
+    char name[64];
+    snprintf(name, sizeof name, "facetree %s", commands[index].name);
+    argv[0] = name;
+    return commands[index].run(argc, argv);
+}
+
+static int find(const char *name) {
+    for (int i = 0; i < COMMANDS; ++i)
+        if (!strcmp(name, commands[i].name)) return i;
+    return -1;
+}
+
+static int unknown(const char *name) {
+    const char *names[COMMANDS + 2] = {"help"};
+    for (int i = 0; i < COMMANDS; ++i) names[i + 1] = commands[i].name;
+    const char *nearest = tool_nearest(name, names);
+    if (nearest)
+        fprintf(stderr, "facetree: unknown command '%s'; did you mean '%s'?\n", name, nearest);
+    else
+        fprintf(stderr, "facetree: unknown command '%s'; 'facetree help' lists them\n", name);
+    return TOOL_USAGE;
+}
+
+static int print_overview(void) {
+    puts("Usage: facetree COMMAND [OPTION...] ...\n"
+         "Trees of face clusters of triangle meshes, for rays, radiosity and simplification.\n");
+    for (int i = 0; i < COMMANDS; ++i) printf("  %-10s %s\n", commands[i].name, commands[i].summary);
+    puts("  help       explain a command: facetree help COMMAND\n\n"
+         "      --help     print this\n"
+         "      --version  print the version");
+    return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
+}
+
+static int print_man(void) {
+    printf(".TH FACETREE 1 \"\" \"facetree %s\"\n"
+           ".SH NAME\nfacetree \\- trees of face clusters of triangle meshes\n"
+           ".SH SYNOPSIS\n\\fBfacetree\\fR \\fICOMMAND\\fR [\\fIOPTION\\fR...] ...\n"
+           ".SH DESCRIPTION\nGroups the triangles of a mesh into a tree of nearly flat, compact face "
+           "clusters, and "
+           "uses it for rays, for radiosity and for simplification.\n.SH COMMANDS\n",
+           fct_version());
+    for (int i = 0; i < COMMANDS; ++i)
+        printf(".TP\n.BR facetree\\-%s (1)\n%s\n", commands[i].name, commands[i].summary);
+    return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
+}
+
+/* help [COMMAND], and help --man [COMMAND] for the build. */
+static int help(int argc, char **argv) {
+    bool man = argc > 1 && !strcmp(argv[1], "--man");
+    const char *name = argc > 1 + man ? argv[1 + man] : NULL;
+    if (argc > 2 + man) {
+        fprintf(stderr, "facetree help: expected one command, found %d\n", argc - 1 - man);
+        return TOOL_USAGE;
+    }
+    if (!name) return man ? print_man() : print_overview();
+    int index = find(name);
+    if (index < 0) return unknown(name);
+    char action[8];
+    snprintf(action, sizeof action, "%s", man ? "--man" : "--help");
+    char *words[] = {NULL, action, NULL};
+    return run_command(index, 2, words);
+}
+
+typedef struct top {
+    int argc;
+    char **argv;
+    int code;
+} top;
+
+/* In order: the first word that is no option is the command, and the rest is its own. */
+static error_t parse(int key, char *text, struct argp_state *state) {
+    top *t = state->input;
+    int first = state->next - 1, index;
+    switch (key) {
+    case 'h':
+        t->code = print_overview();
+        break;
+    case 'V':
+        printf("facetree %s\n", fct_version());
+        t->code = fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
+        break;
+    case ARGP_KEY_ARG:
+        if (!strcmp(text, "help"))
+            t->code = help(t->argc - first, t->argv + first);
+        else if ((index = find(text)) >= 0)
+            t->code = run_command(index, t->argc - first, t->argv + first);
+        else
+            t->code = unknown(text);
+        break;
+    case ARGP_KEY_NO_ARGS:
+        t->code = TOOL_USAGE;
+        fputs("facetree: expected a command; 'facetree help' lists them\n", stderr);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return ECANCELED; /* argp has nothing more to do */
+}
+
+int main(int argc, char **argv) {
+    static const struct argp_option options[] = {
+        {"help", 'h', NULL, 0, NULL, 0}, {"version", 'V', NULL, 0, NULL, 0}, {0}};
+    const struct argp argp = {.options = options, .parser = parse};
+    top t = {argc, argv, TOOL_USAGE};
+    error_t error =
+        argp_parse(&argp, argc, argv, ARGP_IN_ORDER | ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &t);
+    if (error != ECANCELED)
+        fputs("facetree: unknown option; 'facetree help' lists commands and options\n", stderr);
+    return t.code;
+}
