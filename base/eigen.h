@@ -1,0 +1,15 @@
+/* base/eigen.h: eigenvalues and eigenvectors of a symmetric 3x3 matrix, in closed form. */
+#ifndef FCT_BASE_EIGEN_H
+#define FCT_BASE_EIGEN_H
+
+#include "base/vec.h"
+
+/* m = xx xy xz yy yz zz. Ascending eigenvalues and unit eigenvectors, a right-handed frame, for any finite m,
+ * whatever its scale.
+ *
+ * Equal eigenvalues: the vectors span the right space and are otherwise arbitrary, but a function of m alone.
+ * A diagonal matrix, so zero and multiples of the identity too, gives the coordinate axes, those of equal
+ * value in the order x, y, z. */
+void fct_eigen3(const double m[6], double values[3], v3 vectors[3]);
+
+#endif

@@ -1,0 +1,109 @@
+/* base/sort.c: see sort.h. Least significant byte first. Each pass counts the byte's values per chunk, turns
+ * the counts into places in (value, chunk) order, and moves the pairs; chunks are fixed, so that the result
+ * does not depend on threads. Bytes that are the same in all keys take no pass.
+ */
+#include "base/sort.h"
+
+#include <string.h>
+
+#include "base/parallel.h"
+
+enum { DIGITS = 256, GRAIN = 1 << 16, SMALL = 48 };
+
+typedef struct pass {
+    const uint64_t *keys;
+    const uint32_t *values;
+    uint64_t *keys_out;
+    uint32_t *values_out;
+    uint32_t (*places)[DIGITS]; /* per chunk: counts, then places */
+    uint64_t *differing;        /* per chunk: bits in which its keys differ from the first key */
+    unsigned shift;
+} pass;
+
+static void find_differing(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    pass *p = user;
+    uint64_t first = p->keys[0], differing = 0;
+    for (size_t i = begin; i < end; ++i) differing |= p->keys[i] ^ first;
+    p->differing[chunk] = differing;
+}
+
+static void count_digits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    pass *p = user;
+    uint32_t *counts = p->places[chunk];
+    memset(counts, 0, sizeof p->places[chunk]);
+    for (size_t i = begin; i < end; ++i) ++counts[p->keys[i] >> p->shift & (DIGITS - 1)];
+}
+
+static void move_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    pass *p = user;
+    uint32_t *places = p->places[chunk];
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t place = places[p->keys[i] >> p->shift & (DIGITS - 1)]++;
+        p->keys_out[place] = p->keys[i];
+        p->values_out[place] = p->values[i];
+    }
+}
+
+static void sort_small(uint64_t *keys, uint32_t *values, size_t count) {
+    for (size_t i = 1; i < count; ++i) {
+        uint64_t key = keys[i];
+        uint32_t value = values[i];
+        size_t j = i;
+        for (; j > 0 && keys[j - 1] > key; --j) keys[j] = keys[j - 1], values[j] = values[j - 1];
+        keys[j] = key, values[j] = value;
+    }
+}
+
+static void counts_to_places(pass *p, size_t chunks) {
+    uint32_t place = 0;
+    for (size_t digit = 0; digit < DIGITS; ++digit)
+        for (size_t chunk = 0; chunk < chunks; ++chunk) {
+            uint32_t count = p->places[chunk][digit];
+            p->places[chunk][digit] = place;
+            place += count;
+        }
+}
+
+fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count) {
+    if (count <= SMALL) {
+        sort_small(keys, values, count);
+        return FCT_OK;
+    }
+    size_t chunks = fct_chunk_count(count, GRAIN);
+    uint64_t *other_keys = fct_allocate(env, count, sizeof *other_keys);
+    uint32_t *other_values = fct_allocate(env, count, sizeof *other_values);
+    pass p = {.keys = keys, .values = values, .keys_out = other_keys, .values_out = other_values};
+    p.places = fct_allocate(env, chunks, sizeof *p.places);
+    p.differing = fct_allocate(env, chunks, sizeof *p.differing);
+    fct_result result = FCT_OK;
+    if (count > UINT32_MAX || !other_keys || !other_values || !p.places || !p.differing) {
+        result = fct_fail_memory(env, "sorting");
+        goto done;
+    }
+    fct_parallel_for(env, count, GRAIN, find_differing, &p);
+    uint64_t differing = 0;
+    for (size_t chunk = 0; chunk < chunks; ++chunk) differing |= p.differing[chunk];
+    for (p.shift = 0; p.shift < 64; p.shift += 8) {
+        if (!(differing >> p.shift & (DIGITS - 1))) continue;
+        fct_parallel_for(env, count, GRAIN, count_digits, &p);
+        counts_to_places(&p, chunks);
+        fct_parallel_for(env, count, GRAIN, move_pairs, &p);
+        uint64_t *swap_keys = (uint64_t *)p.keys;
+        uint32_t *swap_values = (uint32_t *)p.values;
+        p.keys = p.keys_out, p.values = p.values_out;
+        p.keys_out = swap_keys, p.values_out = swap_values;
+    }
+    if (p.keys != keys) {
+        memcpy(keys, p.keys, count * sizeof *keys);
+        memcpy(values, p.values, count * sizeof *values);
+    }
+done:
+    fct_release(env, other_keys);
+    fct_release(env, other_values);
+    fct_release(env, p.places);
+    fct_release(env, p.differing);
+    return result;
+}

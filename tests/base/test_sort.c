@@ -1,0 +1,63 @@
+/* The radix sort: ascending, stable, the same for every thread count, clean under a failing allocator. */
+#include "support.h"
+
+#include "base/sort.h"
+
+static uint64_t hash(uint64_t x) {
+    x ^= x >> 31, x *= 0x9E3779B97F4A7C15u, x ^= x >> 29, x *= 0xBF58476D1CE4E5B9u;
+    return x ^ x >> 32;
+}
+
+static void check_sorted(size_t count, uint64_t mask, uint32_t threads) {
+    fct_env env = fct_env_default();
+    env.thread_count = threads;
+    uint64_t *keys = malloc(count * sizeof *keys + 1);
+    uint32_t *values = malloc(count * sizeof *values + 1);
+    for (size_t i = 0; i < count; ++i) keys[i] = hash(i + 1) & mask, values[i] = (uint32_t)i;
+    assert_int_equal(fct_sort_pairs(&env, keys, values, count), FCT_OK);
+    uint64_t seen = 0, expected = 0;
+    for (size_t i = 0; i < count; ++i) {
+        assert_true(keys[i] == (hash((uint64_t)values[i] + 1) & mask));
+        if (i) assert_true(keys[i - 1] < keys[i] || (keys[i - 1] == keys[i] && values[i - 1] < values[i]));
+        seen += values[i], expected += i;
+    }
+    assert_true(seen == expected);
+    free(keys);
+    free(values);
+}
+
+static void sorts_and_is_stable(void **state) {
+    (void)state;
+    const size_t counts[] = {0, 1, 2, 47, 48, 49, 1000, 65536, 65537, 300000};
+    const uint64_t masks[] = {UINT64_MAX, 0, 7, 0xFF00, 0xFF000000000000FF, 0xFFFFFFFF};
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; ++c)
+        for (size_t m = 0; m < sizeof masks / sizeof *masks; ++m)
+            for (uint32_t threads = 1; threads <= 3; ++threads) check_sorted(counts[c], masks[m], threads);
+}
+
+static void float_keys_keep_the_order(void **state) {
+    (void)state;
+    const float values[] = {-INFINITY, -1e30f, -1, -1e-30f, -0.0f, 0.0f, 1e-40f, 1, 2, 1e30f, INFINITY};
+    for (size_t i = 1; i < sizeof values / sizeof *values; ++i)
+        assert_true(fct_float_key(values[i - 1]) < fct_float_key(values[i]));
+}
+
+static void survives_no_memory(void **state) {
+    (void)state;
+    for (long fail_at = 1; fail_at <= 4; ++fail_at) {
+        recorder r = {.fail_at = fail_at};
+        fct_env env = recorder_env(&r);
+        uint64_t keys[100];
+        uint32_t values[100];
+        for (uint32_t i = 0; i < 100; ++i) keys[i] = 99 - i, values[i] = i;
+        assert_int_equal(fct_sort_pairs(&env, keys, values, 100), FCT_ERROR_MEMORY);
+        assert_int_equal(r.alive, 0);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(sorts_and_is_stable),
+                                       cmocka_unit_test(float_keys_keep_the_order),
+                                       cmocka_unit_test(survives_no_memory)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
