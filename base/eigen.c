@@ -47,6 +47,9 @@ void fct_eigen3(const double m[6], double values[3], v3 vectors[3]) {
     for (int i = 0; i < 6; ++i) a[i] = b[i] = m[i] / scale;
     double third = (a[0] + a[3] + a[5]) / 3;
     b[0] -= third, b[3] -= third, b[5] -= third;
+    double spread = 0; /* of the traceless part, which may be far below 1 */
+    for (int i = 0; i < 6; ++i) spread = fmax(spread, fabs(b[i]));
+    for (int i = 0; i < 6; ++i) b[i] /= spread;
     double p =
         sqrt((b[0] * b[0] + b[3] * b[3] + b[5] * b[5]) / 6 + (b[1] * b[1] + b[2] * b[2] + b[4] * b[4]) / 3);
     for (int i = 0; i < 6; ++i) b[i] /= p;
