@@ -47,7 +47,7 @@ typedef struct tool {
     char error[1536];
     char phase[64];
     double phase_start, drawn;
-    bool bar_visible;
+    bool bar_visible, bar_off;
 } tool;
 
 typedef enum tool_output_use {
@@ -112,6 +112,8 @@ double tool_seconds(void);
 size_t tool_peak_bytes(void);
 /* Prints the one object of --json (and frees it); without --json it only frees it. Returns an exit code. */
 int tool_json(tool *t, json_t *object);
+/* The same for commands whose answer is the object: as lines "key: value" for people without --json. */
+int tool_print(tool *t, json_t *object);
 /* Through the environment's allocator; NULL after a recorded error. */
 void *tool_allocate(tool *t, size_t count, size_t size);
 void tool_release(tool *t, void *memory);
@@ -156,7 +158,10 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
 /* Whether the name is that of a scene: .json or .gltf. */
 bool tool_is_scene_name(const char *path);
-int tool_parse_backend(struct argp_state *state, const char *text, fct_backend *backend);
+/* The colour of cluster `index`, linear: neighbours differ clearly, and no two of 7 million are the same. */
+void tool_palette(uint32_t index, float color[3]);
+error_t tool_parse_backend(struct argp_state *state, const char *name, const char *text,
+                           fct_backend *backend);
 
 /* --- man pages (tool_man.c) --- */
 void tool_print_man(const tool_command *command, const struct argp_option *common);

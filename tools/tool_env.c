@@ -130,7 +130,7 @@ static bool show_progress(void *user, const char *phase, double done) {
     tool *t = user;
     if (interrupted) return false;
     bool terminal = isatty(STDERR_FILENO);
-    if (t->quiet || !(terminal || t->progress)) return true;
+    if (t->quiet || t->bar_off || !(terminal || t->progress)) return true;
     double now = tool_seconds();
     if (strncmp(phase, t->phase, sizeof t->phase - 1) != 0) {
         snprintf(t->phase, sizeof t->phase, "%s", phase);
@@ -218,7 +218,7 @@ int tool_json(tool *t, json_t *object) {
     if (!object) return t->json ? tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output") : TOOL_DONE;
     if (t->json) {
         clear_bar(t);
-        if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) || fputc('\n', stdout) == EOF)
+        if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) || fputc('\n', stdout) == EOF)
             code = tool_fail(t, TOOL_OUTPUT, "standard output cannot be written");
     }
     json_decref(object);

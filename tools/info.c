@@ -1,0 +1,181 @@
+/* tools/info.c: facetree info: what a mesh, a hierarchy file or a scene holds. */
+#include "tools/tool.h"
+
+#include <inttypes.h>
+#include <limits.h>
+#include <string.h>
+
+enum { KEY_VERIFY = TOOL_KEY };
+
+static const struct argp_option options_table[] = {
+    {"verify", KEY_VERIFY, NULL, 0, "Read a hierarchy file throughout: checksums, ranges, containment, areas",
+     0},
+    {0}};
+
+static error_t parse(int key, char *text, struct argp_state *state) {
+    (void)text;
+    if (key != KEY_VERIFY) return ARGP_ERR_UNKNOWN;
+    *(bool *)state->input = true;
+    return 0;
+}
+
+static json_t *numbers(const float *values, int count) {
+    json_t *array = json_array();
+    for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));
+    return array;
+}
+
+static void set_count(json_t *object, const char *key, uint64_t value) {
+    json_object_set_new(object, key, json_integer((json_int_t)value));
+}
+
+static void set_bounds(json_t *object, const fct_bounds *bounds) {
+    json_object_set_new(
+        object, "bounds",
+        json_pack("{s:o, s:o}", "lower", numbers(bounds->lower, 3), "upper", numbers(bounds->upper, 3)));
+}
+
+/* Polygons of the file: runs of the same number in source_faces. */
+static uint32_t polygons(const fct_mesh *mesh) {
+    uint32_t count = mesh->face_count ? 1 : 0;
+    if (!mesh->source_faces) return mesh->face_count;
+    for (uint32_t f = 1; f < mesh->face_count; ++f)
+        count += mesh->source_faces[f] != mesh->source_faces[f - 1];
+    return count;
+}
+
+static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
+    fct_mesh_report r;
+    int code = tool_result(t, fct_mesh_inspect(&t->env, mesh, &r));
+    if (code != TOOL_DONE) return code;
+    set_count(object, "vertices", r.vertices);
+    set_count(object, "faces", r.faces);
+    set_count(object, "polygons", polygons(mesh));
+    set_count(object, "edges", r.edges);
+    set_count(object, "boundary_edges", r.boundary_edges);
+    set_count(object, "boundary_loops", r.boundary_loops);
+    set_count(object, "nonmanifold_edges", r.nonmanifold_edges);
+    set_count(object, "misoriented_edges", r.misoriented_edges);
+    set_count(object, "nonmanifold_vertices", r.nonmanifold_vertices);
+    set_count(object, "degenerate_faces", r.degenerate_faces);
+    set_count(object, "duplicate_faces", r.duplicate_faces);
+    set_count(object, "unreferenced_vertices", r.unreferenced_vertices);
+    set_count(object, "components", r.components);
+    set_count(object, "materials", mesh->material_count);
+    json_object_set_new(object, "vertex_colors", json_boolean(mesh->colors != NULL));
+    json_object_set_new(object, "face_colors", json_boolean(mesh->face_colors != NULL));
+    json_object_set_new(object, "normals", json_boolean(mesh->normals != NULL));
+    json_object_set_new(object, "texture_coordinates", json_boolean(mesh->texcoords != NULL));
+    if (r.vertices) set_bounds(object, &r.bounds);
+    json_object_set_new(object, "area", json_real(r.area));
+    json_object_set_new(object, "diagonal", json_real(r.diagonal));
+    return TOOL_DONE;
+}
+
+static json_t *build_options(const fct_tree_def *def) {
+    json_t *object =
+        json_pack("{s:s, s:s, s:s, s:f, s:f, s:f, s:I}", "method",
+                  def->method == FCT_CLUSTER_ROUNDS ? "rounds" : "greedy", "cost",
+                  def->cost == FCT_COST_MEAN ? "mean" : "increment", "fit_measure",
+                  def->fit_measure == FCT_FIT_POINTS ? "points" : "area", "fit", def->fit_weight, "direction",
+                  def->direction_weight, "shape", def->shape_weight, "roots", (json_int_t)def->root_count);
+    if (def->max_cost < 1e300) json_object_set_new(object, "max_cost", json_real(def->max_cost));
+    return object;
+}
+
+static int describe_tree(tool *t, const char *path, bool verify, json_t *object) {
+    fct_tree *tree;
+    fct_mesh mesh = {0};
+    int code = tool_result(t, fct_tree_open(&t->env, path, &tree));
+    if (code != TOOL_DONE) return code;
+    if (verify) code = tool_result(t, fct_tree_verify(&t->env, tree));
+    if (code == TOOL_DONE) code = tool_result(t, fct_tree_mesh(&t->env, tree, &mesh));
+    if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
+    if (code == TOOL_DONE) {
+        fct_tree_view view = fct_tree_get(tree);
+        char hash[24];
+        snprintf(hash, sizeof hash, "%016" PRIx64, view.source_hash);
+        set_count(object, "roots", view.root_count);
+        set_count(object, "inner_nodes", view.node_count);
+        set_count(object, "depth", view.depth);
+        json_object_set_new(object, "mean_depth", json_real(view.mean_depth));
+        json_object_set_new(object, "source", json_string(view.source));
+        json_object_set_new(object, "source_hash", json_string(hash));
+        json_object_set_new(object, "build", build_options(&view.def));
+        if (verify) json_object_set_new(object, "verified", json_true());
+    }
+    fct_mesh_release(&t->env, &mesh);
+    fct_tree_destroy(tree);
+    return code;
+}
+
+static int describe_scene(tool *t, const char *path, json_t *object) {
+    fct_scene *scene;
+    int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &scene));
+    if (code != TOOL_DONE) return code;
+    fct_scene_view view = fct_scene_get(scene);
+    uint32_t emitters = 0;
+    for (uint32_t i = 0; i < view.instance_count; ++i) {
+        const float *e = view.materials[view.instances[i].material].emission;
+        emitters += e[0] > 0 || e[1] > 0 || e[2] > 0;
+    }
+    set_count(object, "faces", view.face_count);
+    set_count(object, "objects", view.object_count);
+    set_count(object, "instances", view.instance_count);
+    set_count(object, "models", view.model_count);
+    set_count(object, "materials", view.material_count);
+    set_count(object, "emitting_instances", emitters);
+    set_count(object, "light_groups", view.light_group_count);
+    json_object_set_new(object, "camera", json_boolean(view.camera.given));
+    set_bounds(object, &view.bounds);
+    fct_scene_destroy(scene);
+    return TOOL_DONE;
+}
+
+static int run(tool *t, void *options) {
+    const char *path = t->inputs[0];
+    bool verify = *(bool *)options, tree = tool_ends(path, "fct"), scene = tool_is_scene_name(path);
+    fct_mesh mesh = {0};
+    if (verify && !tree)
+        return tool_fail(t, TOOL_USAGE, "--verify: expected a hierarchy file (.fct), found '%s'", path);
+    json_t *object = json_pack("{s:s, s:s}", "file", path, "kind",
+                               tree    ? "hierarchy"
+                               : scene ? "scene"
+                                       : "mesh");
+    int code;
+    if (!object) {
+        code = tool_fail(t, TOOL_DATA, "the file's name is not UTF-8");
+    } else if (tree) {
+        code = describe_tree(t, path, verify, object);
+    } else if (scene) {
+        code = describe_scene(t, path, object);
+    } else {
+        code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
+        if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
+        fct_mesh_release(&t->env, &mesh);
+    }
+    if (code == TOOL_DONE) return tool_print(t, object);
+    json_decref(object);
+    return code;
+}
+
+int tool_info(int argc, char **argv) {
+    static const tool_command command = {
+        .name = "info",
+        .synopsis = "FILE",
+        .summary = "count what a file holds; check a hierarchy file",
+        .text = "FILE is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of a mesh: vertices, "
+                "faces, polygons "
+                "before they became triangles, boundary, non-manifold and misoriented edges, components, "
+                "degenerate "
+                "and duplicate faces. Of a hierarchy also depth, roots, and the options of its build.\n\n"
+                "JSON keys: as printed.",
+        .options = options_table,
+        .parse = parse,
+        .run = run,
+        .inputs_min = 1,
+        .inputs_max = 1,
+        .output = TOOL_OUTPUT_UNUSED};
+    bool verify = false;
+    return tool_main(&command, argc, argv, &verify);
+}
