@@ -1,0 +1,281 @@
+/* simplify/topology.c: from an indexed mesh to points, wedges, rings and edges.
+ *
+ * Vertices with equal coordinates become one point (equal bits, with -0 read as 0); wedges are the distinct
+ * (point, attributes). Faces with two corners at one point are left out here and for good; faces of no area
+ * with three distinct points stay, for they hold their neighbours together. Linear in corners (expected, for
+ * the hash tables); the numbering follows the input's order.
+ */
+#include "simplify/state.h"
+
+enum { KEY_WORDS = 7 };
+
+/* Writes the words that make item i distinct. */
+typedef void key_of(const fct_simplifier *s, const uint32_t *base, uint32_t i, uint32_t key[KEY_WORDS]);
+
+static uint32_t float_bits(float value) {
+    uint32_t bits;
+    value += 0.0f; /* -0 becomes 0 */
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+static void position_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
+    (void)base;
+    for (int k = 0; k < 3; ++k) key[k] = float_bits(s->mesh->positions[3 * (size_t)v + k]);
+}
+
+static void vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
+    key[0] = base[v];
+    for (int k = 0; k < 3; ++k) {
+        if (s->mesh->colors) key[1 + k] = float_bits(s->mesh->colors[3 * (size_t)v + k]);
+        if (s->mesh->normals) key[4 + k] = float_bits(s->mesh->normals[3 * (size_t)v + k]);
+    }
+}
+
+static void corner_key(const fct_simplifier *s, const uint32_t *base, uint32_t c, uint32_t key[KEY_WORDS]) {
+    key[0] = base[s->mesh->triangles[c]];
+    for (int k = 0; k < 2; ++k) key[1 + k] = float_bits(s->mesh->texcoords[2 * (size_t)c + k]);
+}
+
+static uint64_t hash_key(const uint32_t key[KEY_WORDS]) {
+    uint64_t h = 0x9e3779b97f4a7c15u;
+    for (int k = 0; k < KEY_WORDS; ++k) {
+        h = (h ^ key[k]) * 0xbf58476d1ce4e5b9u;
+        h ^= h >> 29;
+    }
+    return h ^ h >> 32;
+}
+
+/* Numbers the items [0, count) whose id is not FCT_NONE on entry by distinct key, in order of first
+ * appearance; ids[i] receives the number. */
+static fct_result number_keys(const fct_simplifier *s, key_of *key, const uint32_t *base, uint32_t count,
+                              uint32_t *ids, uint32_t *distinct) {
+    size_t size = 64;
+    while (size < 2 * (size_t)count) size *= 2;
+    uint32_t *table = fct_allocate(s->env, size, sizeof *table); /* representative items */
+    if (!table) return fct_fail_memory(s->env, "a table of vertices");
+    memset(table, 0xff, size * sizeof *table);
+    *distinct = 0;
+    uint32_t mine[KEY_WORDS] = {0}, other[KEY_WORDS] = {0};
+    for (uint32_t i = 0; i < count; ++i) {
+        if (ids[i] == FCT_NONE) continue;
+        key(s, base, i, mine);
+        size_t slot = hash_key(mine) & (size - 1);
+        for (; table[slot] != FCT_NONE; slot = (slot + 1) & (size - 1)) {
+            key(s, base, table[slot], other);
+            if (!memcmp(mine, other, sizeof mine)) break;
+        }
+        if (table[slot] == FCT_NONE) {
+            table[slot] = i;
+            ids[i] = (*distinct)++;
+        } else
+            ids[i] = ids[table[slot]];
+    }
+    fct_release(s->env, table);
+    return FCT_OK;
+}
+
+static fct_result make_points(fct_simplifier *s) {
+    const fct_mesh *mesh = s->mesh;
+    s->point_of = fct_allocate(s->env, mesh->vertex_count, sizeof *s->point_of);
+    if (!s->point_of) return fct_fail_memory(s->env, "the points of a mesh");
+    memset(s->point_of, 0xff, mesh->vertex_count * sizeof *s->point_of);
+    for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) s->point_of[mesh->triangles[c]] = 0;
+    fct_result result =
+        number_keys(s, position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
+    if (result != FCT_OK) return result;
+
+    uint32_t count = s->point_count;
+    s->positions = fct_allocate(s->env, count, 3 * sizeof *s->positions);
+    s->sources = fct_allocate(s->env, count, sizeof *s->sources);
+    s->point_parents = fct_allocate(s->env, count, sizeof *s->point_parents);
+    s->first_corners = fct_allocate(s->env, count, sizeof *s->first_corners);
+    s->last_corners = fct_allocate(s->env, count, sizeof *s->last_corners);
+    s->valences = fct_allocate_zero(s->env, count, sizeof *s->valences);
+    if (!s->positions || !s->sources || !s->point_parents || !s->first_corners || !s->last_corners ||
+        !s->valences)
+        return fct_fail_memory(s->env, "the points of a mesh");
+    v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
+        if (s->point_of[v] == FCT_NONE) continue;
+        v3 p = v3_load(mesh->positions + 3 * (size_t)v);
+        lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
+        upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
+    }
+    s->center = count ? v3_scale(v3_add(lower, upper), .5) : (v3){0, 0, 0};
+    v3 size = v3_sub(upper, lower);
+    s->extent = count ? fmax(size.x, fmax(size.y, size.z)) : 1;
+    if (!(s->extent > 0)) s->extent = 1;
+    for (uint32_t v = mesh->vertex_count; v-- > 0;) {
+        uint32_t p = s->point_of[v];
+        if (p == FCT_NONE) continue;
+        v3 at = v3_scale(v3_sub(v3_load(mesh->positions + 3 * (size_t)v), s->center), 1 / s->extent);
+        s->positions[3 * (size_t)p] = at.x, s->positions[3 * (size_t)p + 1] = at.y;
+        s->positions[3 * (size_t)p + 2] = at.z;
+        s->sources[p] = v;
+    }
+    for (uint32_t p = 0; p < count; ++p) s->point_parents[p] = p;
+    memset(s->first_corners, 0xff, count * sizeof *s->first_corners);
+    return FCT_OK;
+}
+
+/* The faces in terms of points, and each point's list of corners. */
+static fct_result make_rings(fct_simplifier *s) {
+    size_t corners = 3 * (size_t)s->mesh->face_count;
+    s->triangles = fct_allocate(s->env, corners, sizeof *s->triangles);
+    s->next_corners = fct_allocate(s->env, corners, sizeof *s->next_corners);
+    s->side_edges = fct_allocate(s->env, corners, sizeof *s->side_edges);
+    if (!s->triangles || !s->next_corners || !s->side_edges)
+        return fct_fail_memory(s->env, "the corners of a mesh");
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
+        const uint32_t *in = s->mesh->triangles + 3 * (size_t)f;
+        uint32_t *out = s->triangles + 3 * (size_t)f;
+        for (int k = 0; k < 3; ++k) out[k] = s->point_of[in[k]];
+        if (out[0] == out[1] || out[1] == out[2] || out[2] == out[0]) {
+            out[0] = FCT_NONE;
+            continue;
+        }
+        ++s->live_faces;
+        for (uint32_t k = 0; k < 3; ++k) {
+            uint32_t p = out[k], c = 3 * f + k;
+            if (s->first_corners[p] == FCT_NONE)
+                s->first_corners[p] = c;
+            else
+                s->next_corners[s->last_corners[p]] = c;
+            s->last_corners[p] = c;
+            s->next_corners[c] = FCT_NONE;
+            ++s->valences[p];
+        }
+    }
+    return FCT_OK;
+}
+
+static fct_result make_wedges(fct_simplifier *s) {
+    const fct_mesh *mesh = s->mesh;
+    s->wedge_count = s->point_count;
+    if (!s->channel_count) return FCT_OK;
+    size_t corners = 3 * (size_t)mesh->face_count;
+    s->corner_wedges = fct_allocate_zero(s->env, corners, sizeof *s->corner_wedges);
+    uint32_t *class_of = fct_allocate(s->env, mesh->vertex_count, sizeof *class_of);
+    fct_result result = s->corner_wedges && class_of ? FCT_OK : fct_fail_memory(s->env, "wedges");
+    if (result != FCT_OK) goto done;
+    memcpy(class_of, s->point_of, mesh->vertex_count * sizeof *class_of);
+    s->class_count = s->point_count;
+    if (mesh->colors || mesh->normals)
+        result = number_keys(s, vertex_key, s->point_of, mesh->vertex_count, class_of, &s->class_count);
+    if (result != FCT_OK) goto done;
+    s->wedge_count = s->class_count;
+    if (mesh->texcoords)
+        result =
+            number_keys(s, corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
+    else
+        for (size_t c = 0; c < corners; ++c) s->corner_wedges[c] = class_of[mesh->triangles[c]];
+    if (result != FCT_OK) goto done;
+
+    s->first_wedges = fct_allocate(s->env, s->point_count, sizeof *s->first_wedges);
+    s->wedge_parents = fct_allocate(s->env, s->wedge_count, sizeof *s->wedge_parents);
+    s->next_wedges = fct_allocate(s->env, s->wedge_count, sizeof *s->next_wedges);
+    s->wedge_uses = fct_allocate_zero(s->env, s->wedge_count, sizeof *s->wedge_uses);
+    s->wedge_classes = fct_allocate_zero(s->env, s->wedge_count, sizeof *s->wedge_classes);
+    s->class_parents = fct_allocate(s->env, s->class_count, sizeof *s->class_parents);
+    if (!s->first_wedges || !s->wedge_parents || !s->next_wedges || !s->wedge_uses || !s->wedge_classes ||
+        !s->class_parents) {
+        result = fct_fail_memory(s->env, "wedges");
+        goto done;
+    }
+    memset(s->first_wedges, 0xff, s->point_count * sizeof *s->first_wedges);
+    for (uint32_t w = 0; w < s->wedge_count; ++w) s->wedge_parents[w] = w;
+    for (uint32_t k = 0; k < s->class_count; ++k) s->class_parents[k] = k;
+    for (uint32_t c = 0; c < corners; ++c) {
+        if (corner_dead(s, c)) continue;
+        uint32_t w = s->corner_wedges[c], p = s->triangles[c];
+        if (s->wedge_uses[w]++) continue;
+        s->wedge_classes[w] = class_of[mesh->triangles[c]];
+        s->next_wedges[w] = s->first_wedges[p];
+        s->first_wedges[p] = w;
+    }
+done:
+    fct_release(s->env, class_of);
+    return result;
+}
+
+/* Whether two faces differ in what makes a border of the side they share: material, face colour. */
+static bool faces_differ(const fct_simplifier *s, uint32_t f, uint32_t g) {
+    const fct_mesh *mesh = s->mesh;
+    if (mesh->materials && mesh->materials[f] != mesh->materials[g]) return true;
+    if (!mesh->face_colors) return false;
+    double sum = 0;
+    for (int k = 0; k < 3; ++k)
+        sum += fabs((double)mesh->face_colors[3 * (size_t)f + k] - mesh->face_colors[3 * (size_t)g + k]);
+    return sum > s->def->feature_threshold;
+}
+
+typedef struct edge_builder {
+    uint32_t *marks;  /* point -> the point whose edges are being made */
+    uint32_t *slots;  /* point -> its edge with that point */
+    uint32_t *apexes; /* edge -> apex of its first face */
+    uint32_t *faces;  /* edge -> its first face */
+} edge_builder;
+
+/* Side c joins point a with a point of a higher number. */
+static void add_side(fct_simplifier *s, edge_builder *b, uint32_t a, uint32_t other, uint32_t c) {
+    uint32_t apex = s->triangles[corner_previous(c)], f = c / 3;
+    if (b->marks[other] != a) {
+        uint32_t e = s->edge_count++;
+        b->marks[other] = a;
+        b->slots[other] = e;
+        b->apexes[e] = apex;
+        b->faces[e] = f;
+        s->edge_ends[2 * (size_t)e] = a, s->edge_ends[2 * (size_t)e + 1] = other;
+        s->edge_flags[e] = EDGE_BOUNDARY;
+    }
+    uint32_t e = b->slots[other];
+    s->side_edges[c] = e;
+    if (b->apexes[e] != apex) s->edge_flags[e] &= (uint8_t)~EDGE_BOUNDARY;
+    if (faces_differ(s, b->faces[e], f)) s->edge_flags[e] |= EDGE_BORDER;
+}
+
+static fct_result make_edges(fct_simplifier *s) {
+    size_t corners = 3 * (size_t)s->live_faces; /* the most edges there can be */
+    edge_builder b = {0};
+    b.marks = fct_allocate(s->env, s->point_count, sizeof *b.marks);
+    b.slots = fct_allocate(s->env, s->point_count, sizeof *b.slots);
+    b.apexes = fct_allocate(s->env, corners, sizeof *b.apexes);
+    b.faces = fct_allocate(s->env, corners, sizeof *b.faces);
+    s->edge_ends = fct_allocate(s->env, corners, 2 * sizeof *s->edge_ends);
+    s->edge_flags = fct_allocate_zero(s->env, corners, sizeof *s->edge_flags);
+    fct_result result = FCT_OK;
+    if (!b.marks || !b.slots || !b.apexes || !b.faces || !s->edge_ends || !s->edge_flags) {
+        result = fct_fail_memory(s->env, "the edges of a mesh");
+        goto done;
+    }
+    memset(b.marks, 0xff, s->point_count * sizeof *b.marks);
+    for (uint32_t a = 0; a < s->point_count; ++a)
+        for (uint32_t c = s->first_corners[a]; c != FCT_NONE; c = s->next_corners[c]) {
+            uint32_t previous = corner_previous(c);
+            uint32_t y = s->triangles[corner_next(c)], z = s->triangles[previous];
+            if (y > a) add_side(s, &b, a, y, c);
+            if (z > a) add_side(s, &b, a, z, previous);
+        }
+    s->edge_parents = fct_allocate(s->env, s->edge_count, sizeof *s->edge_parents);
+    s->edge_states = fct_allocate_zero(s->env, s->edge_count, sizeof *s->edge_states);
+    s->edge_ends_only = fct_allocate_zero(s->env, s->edge_count, sizeof *s->edge_ends_only);
+    if (!s->edge_parents || !s->edge_states || !s->edge_ends_only)
+        result = fct_fail_memory(s->env, "the edges of a mesh");
+    else
+        for (uint32_t e = 0; e < s->edge_count; ++e) s->edge_parents[e] = e;
+done:
+    fct_release(s->env, b.marks);
+    fct_release(s->env, b.slots);
+    fct_release(s->env, b.apexes);
+    fct_release(s->env, b.faces);
+    return result;
+}
+
+fct_result fct_simplify_topology(fct_simplifier *s) {
+    fct_result result = make_points(s);
+    if (result == FCT_OK) result = make_rings(s);
+    if (result == FCT_OK) result = make_wedges(s);
+    if (result == FCT_OK) result = make_edges(s);
+    return result;
+}
