@@ -156,6 +156,8 @@ void tool_rows_release(tool *t, tool_rows *rows);
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
 /* A mesh from a mesh file or a .fct file. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
+/* Saves a mesh with the given factor on its colours for display. */
+int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure);
 /* Whether the name is that of a scene: .json or .gltf. */
 bool tool_is_scene_name(const char *path);
 /* The colour of cluster `index`, linear: neighbours differ clearly, and no two of 7 million are the same. */

@@ -35,6 +35,12 @@ int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
     return code;
 }
 
+int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure) {
+    fct_mesh_save_def def = fct_mesh_save_def_default();
+    def.exposure = (float)exposure;
+    return tool_result(t, fct_mesh_save(&t->env, path, mesh, &def));
+}
+
 error_t tool_parse_backend(struct argp_state *state, const char *name, const char *text,
                            fct_backend *backend) {
     static const char *const names[] = {"obb", "embree", NULL};

@@ -1,0 +1,128 @@
+/* tools/closest.c: facetree closest: the surface point nearest to each point of a text file. */
+#include "tools/tool.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef struct closest_options {
+    const char *points;
+    double max_distance;
+} closest_options;
+
+enum { KEY_POINTS = TOOL_KEY, KEY_MAX_DISTANCE };
+
+static const struct argp_option options_table[] = {
+    {"points", KEY_POINTS, "FILE", 0, "Points, one a line: x y z; - is standard input", 0},
+    {"max-distance", KEY_MAX_DISTANCE, "D", 0, "Look no further; -1 is written where nothing is as near", 0},
+    {0}};
+
+static error_t parse(int key, char *text, struct argp_state *state) {
+    closest_options *o = state->input;
+    switch (key) {
+    case KEY_POINTS:
+        o->points = text;
+        return 0;
+    case KEY_MAX_DISTANCE:
+        return tool_parse_real(state, "--max-distance", text, 0, INFINITY, &o->max_distance);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void print_closest(FILE *stream, const fct_closest *c) {
+    fprintf(stream, "%u %.9g %.9g %.9g %.9g\n", c->face, (double)c->point[0], (double)c->point[1],
+            (double)c->point[2], (double)c->distance);
+}
+
+static int find_in_model(tool *t, const closest_options *o, const tool_rows *points, fct_closest *found) {
+    fct_tree *tree;
+    fct_bvh *bvh = NULL;
+    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code != TOOL_DONE) return code;
+    code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &bvh));
+    if (code == TOOL_DONE)
+        fct_bvh_closest_points(bvh, points->count, points->values, (float)o->max_distance, found);
+    fct_bvh_destroy(bvh);
+    fct_tree_destroy(tree);
+    return code;
+}
+
+static int find_in_scene(tool *t, const closest_options *o, const tool_rows *points, fct_closest *found,
+                         uint32_t *instances) {
+    fct_scene *scene;
+    int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], FCT_BACKEND_OBB, &scene));
+    if (code != TOOL_DONE) return code;
+    for (size_t i = 0; i < points->count; ++i)
+        if (!fct_scene_closest_point(scene, points->values + 3 * i, (float)o->max_distance, instances + i,
+                                     found + i))
+            found[i].face = FCT_NONE;
+    fct_scene_destroy(scene);
+    return code;
+}
+
+static int write_found(tool *t, const fct_closest *found, const uint32_t *instances, size_t count,
+                       size_t *hits) {
+    tool_writer writer = {0};
+    bool wanted = !t->json || t->output;
+    int code = wanted ? tool_writer_open(t, t->output ? t->output : "-", &writer) : TOOL_DONE;
+    if (code != TOOL_DONE) return code;
+    for (size_t i = 0; i < count; ++i) {
+        bool hit = found[i].face != FCT_NONE;
+        *hits += hit;
+        if (!wanted) continue;
+        if (hit && instances) fprintf(writer.stream, "%u ", instances[i]);
+        if (hit)
+            print_closest(writer.stream, found + i);
+        else
+            fputs("-1\n", writer.stream);
+    }
+    return wanted ? tool_writer_close(t, &writer, TOOL_DONE) : TOOL_DONE;
+}
+
+static int run(tool *t, void *options) {
+    const closest_options *o = options;
+    if (!o->points) return tool_fail(t, TOOL_USAGE, "expected --points FILE");
+    if (!strcmp(o->points, "-") && !strcmp(t->inputs[0], "-"))
+        return tool_fail(t, TOOL_USAGE, "the mesh and the points cannot both come from standard input");
+    bool scene = tool_is_scene_name(t->inputs[0]);
+    tool_rows points;
+    size_t hits = 0;
+    int code = tool_rows_read(t, o->points, 3, 3, NULL, &points);
+    if (code != TOOL_DONE) return code;
+    fct_closest *found = tool_allocate(t, points.count, sizeof *found);
+    uint32_t *instances = found && scene ? tool_allocate(t, points.count, sizeof *instances) : NULL;
+    if (!found || (scene && !instances)) code = TOOL_MEMORY;
+    double start = tool_seconds();
+    if (code == TOOL_DONE)
+        code = scene ? find_in_scene(t, o, &points, found, instances) : find_in_model(t, o, &points, found);
+    double seconds = tool_seconds() - start;
+    if (code == TOOL_DONE) code = write_found(t, found, instances, points.count, &hits);
+    if (code == TOOL_DONE)
+        code = tool_json(t, json_pack("{s:I, s:I, s:f}", "points", (json_int_t)points.count, "found",
+                                      (json_int_t)hits, "seconds", seconds));
+    tool_release(t, instances);
+    tool_release(t, found);
+    tool_rows_release(t, &points);
+    return code;
+}
+
+int tool_closest(int argc, char **argv) {
+    static const tool_command command = {
+        .name = "closest",
+        .synopsis = "IN --points FILE [-o FILE]",
+        .summary = "find the nearest surface points",
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of every point the nearest "
+                "point of "
+                "the surface is written as 'face x y z distance', in a scene 'instance face x y z distance'. "
+                "Without "
+                "-o they go to standard output; with --json they are only counted.\n\n"
+                "JSON keys: points, found, seconds (with opening or building the hierarchy).",
+        .options = options_table,
+        .parse = parse,
+        .run = run,
+        .inputs_min = 1,
+        .inputs_max = 1,
+        .output = TOOL_OUTPUT_OPTIONAL};
+    closest_options options = {.max_distance = INFINITY};
+    return tool_main(&command, argc, argv, &options);
+}

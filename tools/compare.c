@@ -1,0 +1,69 @@
+/* tools/compare.c: facetree compare: the distance between two surfaces, and between their colours. */
+#include "tools/tool.h"
+
+enum { KEY_SAMPLES = TOOL_KEY };
+
+static const struct argp_option options_table[] = {
+    {"samples", KEY_SAMPLES, "N", 0, "Samples on each face, beside the vertices (default 100)", 0}, {0}};
+
+static error_t parse(int key, char *text, struct argp_state *state) {
+    if (key != KEY_SAMPLES) return ARGP_ERR_UNKNOWN;
+    return tool_parse_count32(state, "--samples", text, 0, 1000000, state->input);
+}
+
+static json_t *report(const fct_mesh_error *e, double seconds) {
+    double d = e->diameter > 0 ? e->diameter : 1;
+    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:f}", "e_avg",
+                     e->e_avg, "e_max", e->e_max, "e_avg_ab", e->e_avg_ab, "e_avg_ba", e->e_avg_ba,
+                     "e_max_ab", e->e_max_ab, "e_max_ba", e->e_max_ba, "e_avg_relative", e->e_avg / (d * d),
+                     "e_max_relative", e->e_max / d, "diameter", e->diameter, "color_rms", e->color_rms,
+                     "color_max", e->color_max, "color_rms_relative", e->color_rms_relative, "samples",
+                     (json_int_t)e->samples, "seconds", seconds);
+}
+
+static int run(tool *t, void *options) {
+    fct_tree *trees[2] = {NULL, NULL};
+    fct_bvh *bvhs[2] = {NULL, NULL};
+    fct_mesh_error error;
+    int code = TOOL_DONE;
+    for (int i = 0; i < 2 && code == TOOL_DONE; ++i) {
+        code = tool_open_tree(t, t->inputs[i], NULL, &trees[i]);
+        if (code == TOOL_DONE)
+            code = tool_result(t, fct_bvh_create(&t->env, trees[i], FCT_BACKEND_OBB, &bvhs[i]));
+    }
+    double start = tool_seconds();
+    if (code == TOOL_DONE)
+        code = tool_result(
+            t, fct_mesh_compare(&t->env, bvhs[0], bvhs[1], *(uint32_t *)options, t->seed, &error));
+    if (code == TOOL_DONE) code = tool_print(t, report(&error, tool_seconds() - start));
+    for (int i = 0; i < 2; ++i) {
+        fct_bvh_destroy(bvhs[i]);
+        fct_tree_destroy(trees[i]);
+    }
+    return code;
+}
+
+int tool_compare(int argc, char **argv) {
+    static const tool_command command = {
+        .name = "compare",
+        .synopsis = "A B",
+        .summary = "measure how far two meshes lie apart",
+        .text = "Samples every vertex and N points of every face of each mesh, and takes the distance to the "
+                "other. "
+                "e_avg is the mean squared distance, e_max the largest distance; _ab is from A to B, _ba "
+                "from B to A; "
+                "e_avg_relative is over the squared diameter (the diagonal of A's bounds), e_max_relative "
+                "over the "
+                "diameter. Colours are compared where both meshes have them on their vertices.\n\n"
+                "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, e_max_ba, e_avg_relative, "
+                "e_max_relative, "
+                "diameter, color_rms, color_max, color_rms_relative, samples, seconds.",
+        .options = options_table,
+        .parse = parse,
+        .run = run,
+        .inputs_min = 2,
+        .inputs_max = 2,
+        .output = TOOL_OUTPUT_UNUSED};
+    uint32_t samples = 100;
+    return tool_main(&command, argc, argv, &samples);
+}

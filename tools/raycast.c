@@ -1,0 +1,282 @@
+/* tools/raycast.c: facetree raycast: rays from a text file to hits, and the check of one backend against the
+ * other. */
+#include "tools/tool.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct ray_options {
+    const char *rays;
+    fct_backend backend;
+    bool backend_given, occlusion, check;
+    uint64_t count; /* of made rays; 0: not given */
+} ray_options;
+
+enum { KEY_RAYS = TOOL_KEY, KEY_OCCLUSION, KEY_BACKEND, KEY_CHECK, KEY_COUNT };
+
+static const struct argp_option options_table[] = {
+    {"rays", KEY_RAYS, "FILE", 0, "Rays, one a line: ox oy oz dx dy dz [tmin tmax]; - is standard input", 0},
+    {"occlusion", KEY_OCCLUSION, NULL, 0, "Only tell whether anything is hit: 1 or 0 a line", 0},
+    {"backend", KEY_BACKEND, "NAME", 0, "obb (default) or embree", 0},
+    {"check", KEY_CHECK, NULL, 0, "Shoot the rays through both backends and count differences", 0},
+    {"count", KEY_COUNT, "N", 0,
+     "With --check and without --rays: make N rays of all kinds (default 1000000)", 0},
+    {0}};
+
+static error_t parse(int key, char *text, struct argp_state *state) {
+    ray_options *o = state->input;
+    switch (key) {
+    case KEY_RAYS:
+        o->rays = text;
+        return 0;
+    case KEY_OCCLUSION:
+        o->occlusion = true;
+        return 0;
+    case KEY_BACKEND:
+        o->backend_given = true;
+        return tool_parse_backend(state, "--backend", text, &o->backend);
+    case KEY_CHECK:
+        o->check = true;
+        return 0;
+    case KEY_COUNT:
+        return tool_parse_count(state, "--count", text, 1, UINT32_MAX, &o->count);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* What the options ask for together. */
+static int check_options(tool *t, const ray_options *o) {
+    if (o->check && o->backend_given)
+        return tool_fail(t, TOOL_USAGE, "--check runs both backends; --backend chooses one");
+    if (o->check && o->occlusion)
+        return tool_fail(t, TOOL_USAGE, "--check includes occlusion; --occlusion is for output");
+    if (o->check && t->output) return tool_fail(t, TOOL_USAGE, "--check writes no hits; -o is for hits");
+    if (o->count && (!o->check || o->rays))
+        return tool_fail(t, TOOL_USAGE, "--count: expected --check without --rays beside it");
+    if (!o->check && !o->rays) return tool_fail(t, TOOL_USAGE, "expected --rays FILE or --check");
+    if (o->check && tool_is_scene_name(t->inputs[0]))
+        return tool_fail(t, TOOL_USAGE, "--check: expected a mesh or a hierarchy file, found the scene '%s'",
+                         t->inputs[0]);
+    if (o->rays && !strcmp(o->rays, "-") && !strcmp(t->inputs[0], "-"))
+        return tool_fail(t, TOOL_USAGE, "the mesh and the rays cannot both come from standard input");
+    return TOOL_DONE;
+}
+
+static int read_rays(tool *t, const char *path, fct_ray **rays, size_t *count) {
+    static const float usual[2] = {0, INFINITY};
+    tool_rows rows;
+    *rays = NULL;
+    int code = tool_rows_read(t, path, 6, 8, usual, &rows);
+    if (code != TOOL_DONE) return code;
+    *rays = tool_allocate(t, rows.count, sizeof **rays);
+    if (!*rays) code = TOOL_MEMORY;
+    for (size_t i = 0; i < rows.count && *rays; ++i) {
+        const float *r = rows.values + 8 * i;
+        (*rays)[i] = (fct_ray){{r[0], r[1], r[2]}, r[6], {r[3], r[4], r[5]}, r[7]};
+    }
+    *count = rows.count;
+    tool_rows_release(t, &rows);
+    return code;
+}
+
+/* --- Hits --- */
+
+typedef struct outcome {
+    size_t hits;
+    double seconds; /* of the queries alone */
+} outcome;
+
+static int report(tool *t, size_t rays, const outcome *o) {
+    double rate = o->seconds > 0 ? (double)rays / o->seconds : 0;
+    return tool_json(t, json_pack("{s:I, s:I, s:f, s:f, s:I}", "rays", (json_int_t)rays, "hits",
+                                  (json_int_t)o->hits, "seconds", o->seconds, "rays_per_second", rate,
+                                  "peak_bytes", (json_int_t)tool_peak_bytes()));
+}
+
+/* NULL where hits go nowhere: --json without -o. */
+static int open_output(tool *t, tool_writer *writer) {
+    *writer = (tool_writer){0};
+    return t->json && !t->output ? TOOL_DONE : tool_writer_open(t, t->output ? t->output : "-", writer);
+}
+
+static int close_output(tool *t, tool_writer *writer) {
+    return writer->stream ? tool_writer_close(t, writer, TOOL_DONE) : TOOL_DONE;
+}
+
+static int closest_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, size_t count, outcome *o) {
+    tool_writer writer;
+    fct_hit *hits = tool_allocate(t, count, sizeof *hits);
+    if (!hits) return TOOL_MEMORY;
+    double start = tool_seconds();
+    fct_bvh_closest_hits(bvh, count, rays, hits);
+    o->seconds = tool_seconds() - start;
+    int code = open_output(t, &writer);
+    for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
+        bool hit = hits[i].face != FCT_NONE;
+        o->hits += hit;
+        if (!writer.stream) continue;
+        if (hit)
+            fprintf(writer.stream, "%u %.9g %.9g %.9g\n", hits[i].face, (double)hits[i].t, (double)hits[i].u,
+                    (double)hits[i].v);
+        else
+            fputs("-1\n", writer.stream);
+    }
+    if (code == TOOL_DONE) code = close_output(t, &writer);
+    tool_release(t, hits);
+    return code;
+}
+
+static int occlusion_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, size_t count, outcome *o) {
+    tool_writer writer;
+    uint64_t *bits = tool_allocate(t, count / 64 + 1, sizeof *bits);
+    if (!bits) return TOOL_MEMORY;
+    double start = tool_seconds();
+    fct_bvh_any_hits(bvh, count, rays, bits);
+    o->seconds = tool_seconds() - start;
+    int code = open_output(t, &writer);
+    for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
+        bool hit = bits[i / 64] >> (i % 64) & 1;
+        o->hits += hit;
+        if (writer.stream) fputs(hit ? "1\n" : "0\n", writer.stream);
+    }
+    if (code == TOOL_DONE) code = close_output(t, &writer);
+    tool_release(t, bits);
+    return code;
+}
+
+static int cast_in_model(tool *t, const ray_options *options, const fct_ray *rays, size_t count) {
+    fct_tree *tree;
+    fct_bvh *bvh = NULL;
+    outcome o = {0};
+    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code != TOOL_DONE) return code;
+    code = tool_result(t, fct_bvh_create(&t->env, tree, options->backend, &bvh));
+    if (code == TOOL_DONE)
+        code = options->occlusion ? occlusion_in_model(t, bvh, rays, count, &o)
+                                  : closest_in_model(t, bvh, rays, count, &o);
+    if (code == TOOL_DONE) code = report(t, count, &o);
+    fct_bvh_destroy(bvh);
+    fct_tree_destroy(tree);
+    return code;
+}
+
+static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *rays, size_t count) {
+    fct_scene *scene;
+    tool_writer writer;
+    outcome o = {0};
+    int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], options->backend, &scene));
+    if (code != TOOL_DONE) return code;
+    code = open_output(t, &writer);
+    double start = tool_seconds();
+    for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
+        fct_scene_hit hit;
+        bool found = options->occlusion ? fct_scene_any_hit(scene, rays + i, NULL)
+                                        : fct_scene_closest_hit(scene, rays + i, &hit, NULL);
+        o.hits += found;
+        if (!writer.stream) continue;
+        if (options->occlusion)
+            fputs(found ? "1\n" : "0\n", writer.stream);
+        else if (found)
+            fprintf(writer.stream, "%u %u %.9g %.9g %.9g\n", hit.instance, hit.face, (double)hit.t,
+                    (double)hit.u, (double)hit.v);
+        else
+            fputs("-1\n", writer.stream);
+    }
+    o.seconds = tool_seconds() - start;
+    if (code == TOOL_DONE) code = close_output(t, &writer);
+    if (code == TOOL_DONE) code = report(t, count, &o);
+    fct_scene_destroy(scene);
+    return code;
+}
+
+/* --- Check --- */
+
+static int report_check(tool *t, const fct_ray_check *c) {
+    tool_say(t, "%zu rays, %zu hits, %zu differences: %zu explained, %zu unexplained; %zu in occlusion",
+             c->rays, c->hits, c->differences, c->explained, c->unexplained, c->occlusion_differences);
+    tool_say(t, "obb %.3f s (%.2f M rays/s), embree %.3f s (%.2f M rays/s)", c->seconds_obb,
+             (double)c->rays / fmax(c->seconds_obb, 1e-9) / 1e6, c->seconds_embree,
+             (double)c->rays / fmax(c->seconds_embree, 1e-9) / 1e6);
+    int code = tool_json(t, json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:{s:f, s:f}}", "rays",
+                                      (json_int_t)c->rays, "hits", (json_int_t)c->hits, "differences",
+                                      (json_int_t)c->differences, "explained", (json_int_t)c->explained,
+                                      "unexplained", (json_int_t)c->unexplained, "occlusion_differences",
+                                      (json_int_t)c->occlusion_differences, "seconds", "obb", c->seconds_obb,
+                                      "embree", c->seconds_embree));
+    if (code != TOOL_DONE) return code;
+    return c->unexplained || c->occlusion_differences ? TOOL_NO : TOOL_DONE;
+}
+
+static int check(tool *t, const ray_options *options, fct_ray *rays, size_t count) {
+    fct_tree *tree;
+    fct_bvh *obb = NULL, *embree = NULL;
+    fct_ray *made = NULL;
+    fct_ray_check counts;
+    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code != TOOL_DONE) return code;
+    code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &obb));
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_EMBREE, &embree));
+    if (code == TOOL_DONE && !options->rays) {
+        count = options->count ? options->count : 1000000;
+        rays = made = tool_allocate(t, count, sizeof *made);
+        if (made)
+            fct_ray_mix(obb, t->seed, count, made);
+        else
+            code = TOOL_MEMORY;
+    }
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_check(&t->env, obb, embree, count, rays, &counts));
+    if (code == TOOL_DONE) code = report_check(t, &counts);
+    tool_release(t, made);
+    fct_bvh_destroy(embree);
+    fct_bvh_destroy(obb);
+    fct_tree_destroy(tree);
+    return code;
+}
+
+static int run(tool *t, void *user) {
+    const ray_options *options = user;
+    fct_ray *rays = NULL;
+    size_t count = 0;
+    int code = check_options(t, options);
+    if (code == TOOL_DONE && options->rays) code = read_rays(t, options->rays, &rays, &count);
+    if (code == TOOL_DONE) {
+        if (options->check)
+            code = check(t, options, rays, count);
+        else if (tool_is_scene_name(t->inputs[0]))
+            code = cast_in_scene(t, options, rays, count);
+        else
+            code = cast_in_model(t, options, rays, count);
+    }
+    tool_release(t, rays);
+    return code;
+}
+
+int tool_raycast(int argc, char **argv) {
+    static const tool_command command = {
+        .name = "raycast",
+        .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]",
+        .summary = "shoot rays; check one backend against the other",
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of every ray the closest "
+                "hit with "
+                "tmin <= t <= tmax is written as 'face t u v', -1 on a miss; the hit is (1 - u - v) p0 + u "
+                "p1 + v p2. "
+                "In a scene it is 'instance face t u v'. Without -o hits go to standard output; with --json "
+                "they are "
+                "only counted.\n\n"
+                "--check settles every difference between the backends in double precision; the exit code is "
+                "1 when "
+                "one is left unexplained.\n\n"
+                "JSON keys: rays, hits, seconds, rays_per_second, peak_bytes; with --check rays, hits, "
+                "differences, "
+                "explained, unexplained, occlusion_differences, seconds{obb, embree}.",
+        .options = options_table,
+        .parse = parse,
+        .run = run,
+        .inputs_min = 1,
+        .inputs_max = 1,
+        .output = TOOL_OUTPUT_OPTIONAL};
+    ray_options options = {.backend = FCT_BACKEND_OBB};
+    return tool_main(&command, argc, argv, &options);
+}
