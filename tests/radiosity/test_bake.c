@@ -1,0 +1,323 @@
+/* The solver against closed forms (docs/radiosity.md lists them) and its own invariants. */
+#include "support.h"
+
+#include "base/vec.h"
+#include "facetree/radiosity.h"
+
+static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+typedef struct fixture {
+    fct_env env;
+    fct_scene *scene;
+} fixture;
+
+static void note(void *user, fct_severity severity, const char *text) {
+    (void)user;
+    if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
+}
+
+static fixture begin(void) {
+    fixture f = {.env = fct_env_default()};
+    f.env.message = note;
+    assert_int_equal(fct_scene_create(&f.env, FCT_BACKEND_OBB, &f.scene), FCT_OK);
+    return f;
+}
+
+static uint32_t material(fixture *f, float reflectance, float emission) {
+    fct_material m = {.name = "grey"};
+    snprintf(m.name, sizeof m.name, "m%g-%g", reflectance, emission);
+    for (int c = 0; c < 3; ++c) m.reflectance[c] = reflectance, m.emission[c] = emission;
+    uint32_t id;
+    assert_int_equal(fct_scene_add_material(f->scene, &m, &id), FCT_OK);
+    return id;
+}
+
+static void turn_inside_out(fct_mesh *mesh) {
+    for (uint32_t i = 0; i < mesh->face_count; ++i) {
+        uint32_t *t = mesh->triangles + 3 * (size_t)i, swap = t[1];
+        t[1] = t[2], t[2] = swap;
+    }
+}
+
+static void add(fixture *f, const char *name, fct_mesh *mesh, const float transform[12], uint32_t id,
+                const uint32_t *face_materials) {
+    assert_int_equal(fct_scene_add_object(f->scene, name, mesh, NULL, transform, id, face_materials), FCT_OK);
+    fct_mesh_release(&f->env, mesh);
+}
+
+/* The square of side 1 about the origin of its plane, facing +z, under a transform. */
+static void add_square(fixture *f, const char *name, uint32_t n, const float transform[12], uint32_t id) {
+    fct_mesh square = make_grid(&f->env, n);
+    for (uint32_t v = 0; v < square.vertex_count; ++v)
+        for (int k = 0; k < 2; ++k) square.positions[3 * v + (uint32_t)k] -= .5F;
+    add(f, name, &square, transform, id, NULL);
+}
+
+static fct_bake *bake(fixture *f, fct_final final, double error) {
+    assert_int_equal(fct_scene_commit(f->scene), FCT_OK);
+    fct_bake_def def = fct_bake_def_default();
+    def.final = final;
+    def.error = error;
+    fct_bake *b;
+    assert_int_equal(fct_bake_create(&f->env, f->scene, &def, &b), FCT_OK);
+    fct_bake_stats s = fct_bake_get_stats(b);
+    assert_true(s.converged);
+    double lost = fabs(s.power_emitted - s.power_absorbed - s.power_escaped) / s.power_emitted;
+    if (lost > .01)
+        fail_msg("power: emitted %g, absorbed %g, escaped %g", s.power_emitted, s.power_absorbed,
+                 s.power_escaped);
+    return b;
+}
+
+static void end(fixture *f, fct_bake *b) {
+    fct_bake_destroy(b);
+    fct_scene_destroy(f->scene);
+}
+
+/* Mean of channel 1 over the lit mesh of an instance, by area, and the root mean square distance from
+ * `expected`. */
+static double mean_radiosity(fixture *f, fct_bake *b, uint32_t instance, double expected, double *rms) {
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_instance(b, instance, &mesh), FCT_OK);
+    double area = 0, sum = 0, square = 0;
+    for (uint32_t i = 0; i < mesh.face_count; ++i) {
+        const uint32_t *t = mesh.triangles + 3 * (size_t)i;
+        v3 p[3];
+        for (int k = 0; k < 3; ++k) p[k] = v3_load(mesh.positions + 3 * (size_t)t[k]);
+        double a = .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))) / 3;
+        for (int k = 0; k < 3; ++k) {
+            double c = mesh.colors[3 * (size_t)t[k] + 1];
+            area += a, sum += a * c, square += a * (c - expected) * (c - expected);
+        }
+    }
+    fct_mesh_release(&f->env, &mesh);
+    if (rms) *rms = sqrt(square / area);
+    return sum / area;
+}
+
+static void expect_radiosity(fixture *f, fct_bake *b, uint32_t instance, double expected, double tolerance) {
+    double rms, mean = mean_radiosity(f, b, instance, expected, &rms);
+    printf("    instance %u: mean %.6g, expected %.6g, off by %.2f %%, rms %.2f %%\n", instance, mean,
+           expected, 100 * (mean / expected - 1), 100 * rms / expected);
+    if (fabs(mean - expected) > tolerance * expected) fail_msg("mean %g instead of %g", mean, expected);
+    if (rms > 2 * tolerance * expected) fail_msg("rms %g about %g", rms, expected);
+}
+
+static void furnace_is_even(void **state) {
+    (void)state;
+    for (int final = FCT_FINAL_NONE; final <= FCT_FINAL_GATHER; ++final) {
+        fixture f = begin();
+        fct_mesh sphere = make_sphere(&f.env, 24);
+        turn_inside_out(&sphere);
+        add(&f, "sphere", &sphere, identity, material(&f, .5F, 1), NULL);
+        fct_bake *b = bake(&f, (fct_final) final, 1);
+        expect_radiosity(&f, b, 0, 2, final == FCT_FINAL_NONE ? .05 : .01);
+        end(&f, b);
+    }
+}
+
+static void furnace_of_a_scanned_head_is_even(void **state) {
+    (void)state;
+    if (!file_exists(FACETREE_DATA "/rocker-arm.obj")) skip();
+    fixture f = begin();
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_load(&f.env, FACETREE_DATA "/rocker-arm.obj", &mesh), FCT_OK);
+    turn_inside_out(&mesh);
+    add(&f, "arm", &mesh, identity, material(&f, .8F, 1), NULL);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    expect_radiosity(&f, b, 0, 5, .01);
+    end(&f, b);
+}
+
+static void sphere_spreads_its_light_evenly(void **state) {
+    (void)state;
+    fixture f = begin();
+    fct_mesh sphere = make_sphere(&f.env, 30);
+    turn_inside_out(&sphere);
+    uint32_t ids[2] = {material(&f, .5F, 0), material(&f, .5F, 1)};
+    uint32_t *faces = malloc(sphere.face_count * sizeof *faces);
+    double areas[2] = {0, 0};
+    for (uint32_t i = 0; i < sphere.face_count; ++i) {
+        v3 p[3];
+        for (int k = 0; k < 3; ++k)
+            p[k] = v3_load(sphere.positions + 3 * sphere.triangles[3 * i + (uint32_t)k]);
+        bool lit = p[0].z + p[1].z + p[2].z > 3 * .8;
+        faces[i] = ids[lit];
+        areas[lit] += v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+    }
+    add(&f, "sphere", &sphere, identity, 0, faces);
+    free(faces);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    double share = areas[1] / (areas[0] + areas[1]), dark = .5 * share / .5;
+    fct_scene_view view = fct_scene_get(f.scene);
+    for (uint32_t i = 0; i < view.instance_count; ++i)
+        expect_radiosity(&f, b, i, view.instances[i].material == ids[1] ? 1 + dark : dark, .01);
+    end(&f, b);
+}
+
+static void open_hemisphere_loses_half(void **state) {
+    (void)state;
+    fixture f = begin();
+    fct_mesh sphere = make_sphere(&f.env, 32), half;
+    turn_inside_out(&sphere);
+    uint32_t *faces = malloc(sphere.face_count * sizeof *faces), n = 0;
+    for (uint32_t i = 0; i < sphere.face_count; ++i) {
+        float z = 0;
+        for (int k = 0; k < 3; ++k) z += sphere.positions[3 * sphere.triangles[3 * i + (uint32_t)k] + 2];
+        if (z > 0) faces[n++] = i;
+    }
+    assert_int_equal(fct_mesh_extract(&f.env, &sphere, faces, n, &half, NULL), FCT_OK);
+    fct_mesh_release(&f.env, &sphere);
+    free(faces);
+    add(&f, "cap", &half, identity, material(&f, .5F, 1), NULL);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    expect_radiosity(&f, b, 0, 4 / 3., .01);
+    end(&f, b);
+}
+
+static void concentric_spheres_exchange(void **state) {
+    (void)state;
+    fixture f = begin();
+    fct_mesh inner = make_sphere(&f.env, 32), outer = make_sphere(&f.env, 32);
+    turn_inside_out(&outer);
+    const float half[12] = {.5F, 0, 0, 0, 0, .5F, 0, 0, 0, 0, .5F, 0};
+    add(&f, "inner", &inner, half, material(&f, .5F, 1), NULL);
+    add(&f, "outer", &outer, identity, material(&f, .8F, 0), NULL);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    expect_radiosity(&f, b, 0, 4 / 3., .01);
+    expect_radiosity(&f, b, 1, 2 / 3., .01);
+    end(&f, b);
+}
+
+/* Receiver of reflectance r, E = B / r is the form factor from the receiver to a lamp of e = 1. */
+static void expect_form_factor(fixture *f, double expected, double tolerance) {
+    fct_bake *b = bake(f, FCT_FINAL_GATHER, 1);
+    double mean = mean_radiosity(f, b, 0, 0, NULL) / .5;
+    printf("    form factor %.6f, expected %.6f, off by %.2f %%\n", mean, expected,
+           100 * (mean / expected - 1));
+    if (fabs(mean - expected) > tolerance * expected)
+        fail_msg("form factor %g instead of %g", mean, expected);
+    end(f, b);
+}
+
+static const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 1};
+
+static void parallel_squares(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
+    add_square(&f, "lamp", 2, above, material(&f, 0, 1));
+    expect_form_factor(&f, .199824896, .01);
+}
+
+static void perpendicular_squares(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
+    /* at x = .5, facing -x */
+    const float wall[12] = {0, 0, -1, .5F, 0, 1, 0, 0, 1, 0, 0, .5F};
+    add_square(&f, "lamp", 2, wall, material(&f, 0, 1));
+    expect_form_factor(&f, .200043776, .01);
+}
+
+static void blocked_squares(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
+    add_square(&f, "lamp", 2, above, material(&f, 0, 1));
+    const float blocker[12] = {.5F, 0, 0, 0, 0, .5F, 0, 0, 0, 0, .5F, .5F};
+    add_square(&f, "blocker", 1, blocker, material(&f, 0, 0));
+    expect_form_factor(&f, .099506, .02);
+}
+
+/* A long room cut in two by a wall 4 cm thick that stands on its one floor: light in one part, none in the
+ * other. */
+static void no_light_leaks_under_a_wall(void **state) {
+    (void)state;
+    fixture f = begin();
+    uint32_t white = material(&f, .7F, 0), light = material(&f, 0, 5);
+    fct_mesh room = make_grid(&f.env, 1); /* replaced by a box of six faces */
+    fct_mesh_release(&f.env, &room);
+    assert_int_equal(fct_mesh_create(&f.env, 8, 12, 0, &room), FCT_OK);
+    for (uint32_t v = 0; v < 8; ++v) {
+        room.positions[3 * v] = v & 1 ? 4.F : 0;
+        room.positions[3 * v + 1] = v & 2 ? 2.F : 0;
+        room.positions[3 * v + 2] = v & 4 ? 2.F : 0;
+    }
+    /* inward winding */
+    static const uint32_t faces[36] = {0, 1, 3, 0, 3, 2, 4, 7, 5, 4, 6, 7, 0, 5, 1, 0, 4, 5,
+                                       2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 7, 3, 1, 5, 7};
+    memcpy(room.triangles, faces, sizeof faces);
+    add(&f, "room", &room, identity, white, NULL);
+    fct_mesh wall;
+    assert_int_equal(fct_mesh_create(&f.env, 8, 12, 0, &wall), FCT_OK);
+    for (uint32_t v = 0; v < 8; ++v) {
+        wall.positions[3 * v] = v & 1 ? 2.02F : 1.98F;
+        wall.positions[3 * v + 1] = v & 2 ? 2.F : 0;
+        wall.positions[3 * v + 2] = v & 4 ? 2.F : 0;
+    }
+    memcpy(wall.triangles, faces, sizeof faces);
+    turn_inside_out(&wall);
+    add(&f, "wall", &wall, identity, white, NULL);
+    const float place[12] = {.4F, 0, 0, 1, 0, -.4F, 0, 1, 0, 0, -.4F, 1.95F};
+    add_square(&f, "lamp", 1, place, light);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_mesh lit;
+    assert_int_equal(fct_bake_instance(b, 0, &lit), FCT_OK);
+    double worst = 0, bright = 0;
+    for (uint32_t v = 0; v < lit.vertex_count; ++v) {
+        double c = lit.colors[3 * v + 1];
+        if (lit.positions[3 * v] > 2.021F)
+            worst = fmax(worst, c);
+        else
+            bright = fmax(bright, c);
+    }
+    printf("    dark room: at most %g beside %g\n", worst, bright);
+    fct_mesh_release(&f.env, &lit);
+    if (worst > .002 * bright) fail_msg("%g leaks into the dark room", worst);
+    end(&f, b);
+}
+
+/* A lamp that nearly touches a wall lights it like an infinite plane would: E = e, and no value runs away. */
+static void lamp_near_a_wall_is_stable(void **state) {
+    (void)state;
+    static const float gaps[] = {.0001F, .001F, .01F, .1F, .3F};
+    for (size_t i = 0; i < sizeof gaps / sizeof *gaps; ++i) {
+        fixture f = begin();
+        add_square(&f, "wall", 4, identity, material(&f, .5F, 0));
+        const float place[12] = {.2F, 0, 0, 0, 0, -.2F, 0, 0, 0, 0, -.2F, gaps[i]};
+        add_square(&f, "lamp", 1, place, material(&f, .2F, 1));
+        fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+        fct_mesh lit;
+        assert_int_equal(fct_bake_instance(b, 0, &lit), FCT_OK);
+        for (uint32_t v = 0; v < lit.vertex_count; ++v) {
+            assert_true(lit.colors[3 * v + 1] >= 0);
+            assert_true(lit.colors[3 * v + 1] <= .5 * 1.2);
+        }
+        fct_probe probe;
+        const float point[3] = {0, 0, 0}, normal[3] = {0, 0, 1};
+        assert_int_equal(fct_bake_probe(b, 1, point, normal, &probe), FCT_OK);
+        double h = gaps[i], a = .1 / sqrt(.01 + h * h), expected = 4 / 3.14159265358979 * a * atan(a);
+        printf("    gap %g: E %.4f, direct %.4f\n", h, probe.irradiance[1], expected);
+        assert_true(probe.irradiance[1] > .98 * expected);
+        assert_true(probe.irradiance[1] < 1.15 * expected + .02);
+        fct_mesh_release(&f.env, &lit);
+        end(&f, b);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(furnace_is_even),
+        cmocka_unit_test(furnace_of_a_scanned_head_is_even),
+        cmocka_unit_test(sphere_spreads_its_light_evenly),
+        cmocka_unit_test(open_hemisphere_loses_half),
+        cmocka_unit_test(concentric_spheres_exchange),
+        cmocka_unit_test(parallel_squares),
+        cmocka_unit_test(perpendicular_squares),
+        cmocka_unit_test(blocked_squares),
+        cmocka_unit_test(no_light_leaks_under_a_wall),
+        cmocka_unit_test(lamp_near_a_wall_is_stable),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
