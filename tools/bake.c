@@ -1,5 +1,6 @@
 /* tools/bake.c: facetree bake: a scene's radiosity to vertex colours, in one file or one file an object, and
  * to probes. */
+#define _GNU_SOURCE
 #include "tools/tool.h"
 
 #include <limits.h>
