@@ -56,7 +56,7 @@ FCT_API void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ra
 FCT_API void fct_bvh_any_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, uint64_t *occluded);
 
 /* Two backends' answers on the same rays, each disagreement settled by testing the faces concerned in double
- * precision. */
+ * precision. Times are of one thread. */
 typedef struct fct_ray_check {
     size_t rays, hits;
     size_t differences; /* neither the same face nor the same t to 1e-5 of the extent, or hit against miss */
@@ -66,9 +66,15 @@ typedef struct fct_ray_check {
     size_t occlusion_differences; /* any-hit against our own closest hit */
     double seconds_obb, seconds_embree;
 } fct_ray_check;
-/* Both over the same tree: `obb` and `embree`. Errors: MEMORY. */
+/* Both over the same tree: `obb` and `embree`. Errors: MEMORY, CANCELLED. */
 FCT_API fct_result fct_bvh_check(const fct_env *env, const fct_bvh *obb, const fct_bvh *embree, size_t count,
                                  const fct_ray *rays, fct_ray_check *out);
+
+/* `count` rays of every kind that has broken a ray tracer, kind i % 12 at place i: anywhere; from the
+ * surface; grazing; along an axis; along an axis through a vertex to the last bit; through a vertex; through
+ * an edge; from up to 10^6 diameters away; with a direction of length 2^-60 to 2^60; between two points of
+ * the surface; in a coordinate plane; from a vertex. The same rays for the same tree and seed. */
+FCT_API void fct_ray_mix(const fct_bvh *bvh, uint64_t seed, size_t count, fct_ray *rays);
 
 typedef struct fct_closest {
     float point[3];

@@ -1,0 +1,153 @@
+/* base/simd.h: eight floats at a time. The only file with intrinsics: AVX2 where the compiler offers it, else
+ * (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the target has.
+ *
+ * Both forms round every operation on its own (no fused multiply-add) and treat NaN alike: min(a, b) is a < b
+ * ? a : b, comparisons with NaN are false. So a kernel gives the same bits in both.
+ */
+#ifndef FCT_BASE_SIMD_H
+#define FCT_BASE_SIMD_H
+
+#include <stdint.h>
+
+#if defined(__AVX2__) && !defined(FCT_SCALAR)
+#include <immintrin.h>
+
+typedef __m256 f8;
+typedef __m256i i8;
+
+static inline f8 f8_set(float a) {
+    return _mm256_set1_ps(a);
+}
+static inline f8 f8_load(const float *p) {
+    return _mm256_loadu_ps(p);
+}
+static inline void f8_store(float *p, f8 a) {
+    _mm256_storeu_ps(p, a);
+}
+static inline f8 f8_add(f8 a, f8 b) {
+    return _mm256_add_ps(a, b);
+}
+static inline f8 f8_sub(f8 a, f8 b) {
+    return _mm256_sub_ps(a, b);
+}
+static inline f8 f8_mul(f8 a, f8 b) {
+    return _mm256_mul_ps(a, b);
+}
+static inline f8 f8_div(f8 a, f8 b) {
+    return _mm256_div_ps(a, b);
+}
+static inline f8 f8_min(f8 a, f8 b) {
+    return _mm256_min_ps(a, b);
+}
+static inline f8 f8_max(f8 a, f8 b) {
+    return _mm256_max_ps(a, b);
+}
+static inline f8 f8_abs(f8 a) {
+    return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a);
+}
+/* |a| with the sign of s */
+static inline f8 f8_copysign(f8 a, f8 s) {
+    f8 sign = _mm256_set1_ps(-0.0f);
+    return _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, s));
+}
+/* Bit i: a_i <= b_i. */
+static inline uint32_t f8_le(f8 a, f8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
+}
+static inline uint32_t f8_lt(f8 a, f8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LT_OQ));
+}
+static inline uint32_t f8_eq(f8 a, f8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_EQ_OQ));
+}
+static inline i8 i8_load_bytes(const uint8_t *p) {
+    return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
+}
+/* table[index_i] of the eight floats `table`; indices 0 to 7 */
+static inline f8 f8_lookup8(f8 table, i8 index) {
+    return _mm256_permutevar8x32_ps(table, index);
+}
+/* table[index_i] of the sixteen floats low, high; indices 0 to 15 */
+static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
+    f8 pick = _mm256_castsi256_ps(_mm256_slli_epi32(index, 28));
+    return _mm256_blendv_ps(_mm256_permutevar8x32_ps(low, index), _mm256_permutevar8x32_ps(high, index),
+                            pick);
+}
+
+#else
+
+typedef struct f8 {
+    float v[8];
+} f8;
+typedef struct i8 {
+    int32_t v[8];
+} i8;
+
+#define FCT_F8(expression)                                                                                   \
+    f8 r;                                                                                                    \
+    for (int i = 0; i < 8; ++i) r.v[i] = (expression);                                                       \
+    return r
+#define FCT_M8(expression)                                                                                   \
+    uint32_t mask = 0;                                                                                       \
+    for (int i = 0; i < 8; ++i) mask |= (uint32_t)(expression) << i;                                         \
+    return mask
+
+static inline f8 f8_set(float a) {
+    FCT_F8(a);
+}
+static inline f8 f8_load(const float *p) {
+    FCT_F8(p[i]);
+}
+static inline void f8_store(float *p, f8 a) {
+    for (int i = 0; i < 8; ++i) p[i] = a.v[i];
+}
+static inline f8 f8_add(f8 a, f8 b) {
+    FCT_F8(a.v[i] + b.v[i]);
+}
+static inline f8 f8_sub(f8 a, f8 b) {
+    FCT_F8(a.v[i] - b.v[i]);
+}
+static inline f8 f8_mul(f8 a, f8 b) {
+    FCT_F8(a.v[i] * b.v[i]);
+}
+static inline f8 f8_div(f8 a, f8 b) {
+    FCT_F8(a.v[i] / b.v[i]);
+}
+static inline f8 f8_min(f8 a, f8 b) {
+    FCT_F8(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
+}
+static inline f8 f8_max(f8 a, f8 b) {
+    FCT_F8(a.v[i] > b.v[i] ? a.v[i] : b.v[i]);
+}
+static inline f8 f8_abs(f8 a) {
+    FCT_F8(__builtin_fabsf(a.v[i]));
+}
+static inline f8 f8_copysign(f8 a, f8 s) {
+    FCT_F8(__builtin_copysignf(a.v[i], s.v[i]));
+}
+static inline uint32_t f8_le(f8 a, f8 b) {
+    FCT_M8(a.v[i] <= b.v[i]);
+}
+static inline uint32_t f8_lt(f8 a, f8 b) {
+    FCT_M8(a.v[i] < b.v[i]);
+}
+static inline uint32_t f8_eq(f8 a, f8 b) {
+    FCT_M8(a.v[i] == b.v[i]);
+}
+static inline i8 i8_load_bytes(const uint8_t *p) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = p[i];
+    return r;
+}
+static inline f8 f8_lookup8(f8 table, i8 index) {
+    FCT_F8(table.v[index.v[i] & 7]);
+}
+static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
+    FCT_F8(index.v[i] & 8 ? high.v[index.v[i] & 7] : low.v[index.v[i] & 7]);
+}
+
+#undef FCT_F8
+#undef FCT_M8
+#endif
+
+#endif

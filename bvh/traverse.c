@@ -1,0 +1,232 @@
+/* bvh/traverse.c: closest and any hit through nodes of eight.
+ *
+ * The nearest child is entered first, the others wait on a stack ordered by distance. Triangles: Woop,
+ * Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013: vertices are moved to the ray's origin
+ * and sheared so that the ray is the z axis; the signs of three edge functions decide, and since neighbours
+ * compute those of a shared edge from the same numbers, none slips between. Every product is rounded on its
+ * own: a fused multiply-add would break that symmetry. An edge function that comes out zero is computed
+ * again in double, where it is exact.
+ */
+#include "base/simd.h"
+#include "bvh/ray.h"
+
+typedef struct traversal {
+    const fct_bvh *bvh;
+    const fct_prepared_ray *ray;
+    fct_raw_hit hit; /* hit.t: nothing beyond matters */
+    fct_visits visits;
+} traversal;
+
+/* Eight axis boxes: entry distances, and a bit for each box met within [t_min, t_max]. */
+static inline uint32_t meet_axis(const fct_axis_node *node, const fct_prepared_ray *r, float t_max,
+                                 float enter[8]) {
+    f8 first = f8_set(r->t_min), last = f8_set(t_max);
+    for (int k = 0; k < 3; ++k) {
+        f8 origin = f8_set(r->origin[k]), inverse = f8_set(r->inverse[k]);
+        f8 a = f8_mul(f8_sub(f8_load(node->bounds[k][r->side[k]]), origin), inverse);
+        f8 b = f8_mul(f8_sub(f8_load(node->bounds[k][1 - r->side[k]]), origin), inverse);
+        first = f8_max(a, first);
+        last = f8_min(b, last);
+    }
+    f8_store(enter, first);
+    return f8_le(first, last);
+}
+
+/* The same with eight oriented boxes, each [-1, 1]^3 under its own map. */
+static inline uint32_t meet_oriented(const fct_oriented_node *node, const fct_prepared_ray *r,
+                                     const float origin[3], float t_max, float enter[8]) {
+    f8 first = f8_set(r->t_min), last = f8_set(t_max);
+    f8 ox = f8_set(origin[0]), oy = f8_set(origin[1]), oz = f8_set(origin[2]);
+    f8 dx = f8_set(r->direction[0]), dy = f8_set(r->direction[1]), dz = f8_set(r->direction[2]);
+    for (int k = 0; k < 3; ++k) {
+        f8 mx = f8_load(node->map[k][0]), my = f8_load(node->map[k][1]), mz = f8_load(node->map[k][2]);
+        f8 at =
+            f8_add(f8_add(f8_mul(mx, ox), f8_mul(my, oy)), f8_add(f8_mul(mz, oz), f8_load(node->map[k][3])));
+        f8 go = f8_add(f8_add(f8_mul(mx, dx), f8_mul(my, dy)), f8_mul(mz, dz));
+        /* Slower than this, the ray stays within the padding all the way through. */
+        f8 inverse = f8_div(f8_set(1), f8_copysign(f8_max(f8_abs(go), f8_set(1e-18f)), go));
+        f8 middle = f8_sub(f8_set(0), f8_mul(at, inverse)), half = f8_abs(inverse);
+        first = f8_max(f8_sub(middle, half), first);
+        last = f8_min(f8_add(middle, half), last);
+    }
+    f8_store(enter, first);
+    return f8_le(first, last);
+}
+
+/* The leaf's vertices as the ray sees them: 16 places, the second eight doubled where there are only eight.
+ */
+typedef struct sheared {
+    f8 x[2], y[2], z[2];
+} sheared;
+
+static inline void shear_vertices(const fct_leaf *leaf, const fct_prepared_ray *r, sheared *s) {
+    const float *rows = fct_leaf_vertices(leaf);
+    uint32_t stride = 8u * leaf->vertex_octets;
+    f8 ox = f8_set(r->origin[r->axis[0]]), oy = f8_set(r->origin[r->axis[1]]),
+       oz = f8_set(r->origin[r->axis[2]]);
+    f8 sx = f8_set(r->shear[0]), sy = f8_set(r->shear[1]), sz = f8_set(r->shear[2]);
+    for (uint32_t i = 0; i < 2; ++i) {
+        const float *at = rows + (i && leaf->vertex_octets == 2 ? 8 : 0);
+        f8 z = f8_sub(f8_load(at + r->axis[2] * stride), oz);
+        s->x[i] = f8_sub(f8_sub(f8_load(at + r->axis[0] * stride), ox), f8_mul(sx, z));
+        s->y[i] = f8_sub(f8_sub(f8_load(at + r->axis[1] * stride), oy), f8_mul(sy, z));
+        s->z[i] = f8_mul(sz, z);
+    }
+}
+
+/* Settles one triangle that the eight-wide test could not refuse. x, y, z: corners a, b, c. */
+static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, const float x[3],
+                          const float y[3], const float z[3]) {
+    float u = x[2] * y[1] - y[2] * x[1], v = x[0] * y[2] - y[0] * x[2], w = x[1] * y[0] - y[1] * x[0];
+    double du = (double)u, dv = (double)v, dw = (double)w;
+    if (u == 0 || v == 0 || w == 0) {
+        du = (double)x[2] * (double)y[1] - (double)y[2] * (double)x[1];
+        dv = (double)x[0] * (double)y[2] - (double)y[0] * (double)x[2];
+        dw = (double)x[1] * (double)y[0] - (double)y[1] * (double)x[0];
+    }
+    if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
+    double det = du + dv + dw;
+    if (det == 0) return false;
+    float at = (float)((du * (double)z[0] + dv * (double)z[1] + dw * (double)z[2]) / det);
+    if (!(at >= t->ray->t_min && at <= t->hit.t)) return false;
+    uint32_t place = leaf->first + number;
+    const uint32_t *ids = t->bvh->view.face_ids;
+    if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
+    t->hit = (fct_raw_hit){.t = at, .u = (float)(dv / det), .v = (float)(dw / det), .place = place};
+    return true;
+}
+
+/* Up to 16 triangles; whether one is hit nearer than t->hit.t. */
+static inline bool meet_leaf(traversal *t, const fct_leaf *leaf, bool any) {
+    sheared s;
+    bool found = false;
+    shear_vertices(leaf, t->ray, &s);
+    const uint8_t *corners = fct_leaf_corners(leaf);
+    t->visits.triangles += leaf->count;
+    for (uint32_t first = 0; first < leaf->count; first += 8, corners += 24) {
+        i8 a = i8_load_bytes(corners), b = i8_load_bytes(corners + 8), c = i8_load_bytes(corners + 16);
+        f8 ax = f8_lookup16(s.x[0], s.x[1], a), ay = f8_lookup16(s.y[0], s.y[1], a);
+        f8 bx = f8_lookup16(s.x[0], s.x[1], b), by = f8_lookup16(s.y[0], s.y[1], b);
+        f8 cx = f8_lookup16(s.x[0], s.x[1], c), cy = f8_lookup16(s.y[0], s.y[1], c);
+        f8 u = f8_sub(f8_mul(cx, by), f8_mul(cy, bx));
+        f8 v = f8_sub(f8_mul(ax, cy), f8_mul(ay, cx));
+        f8 w = f8_sub(f8_mul(bx, ay), f8_mul(by, ax));
+        f8 zero = f8_set(0);
+        uint32_t mixed = f8_lt(f8_min(u, f8_min(v, w)), zero) & f8_lt(zero, f8_max(u, f8_max(v, w)));
+        uint32_t open = ((uint32_t)leaf->mask >> first) & 0xffu & ~mixed;
+        if (!open) continue;
+        float x[3][8], y[3][8], z[3][8];
+        f8_store(x[0], ax), f8_store(x[1], bx), f8_store(x[2], cx);
+        f8_store(y[0], ay), f8_store(y[1], by), f8_store(y[2], cy);
+        f8_store(z[0], f8_lookup16(s.z[0], s.z[1], a));
+        f8_store(z[1], f8_lookup16(s.z[0], s.z[1], b));
+        f8_store(z[2], f8_lookup16(s.z[0], s.z[1], c));
+        for (; open; open &= open - 1) {
+            uint32_t i = (uint32_t)__builtin_ctz(open);
+            float tx[3] = {x[0][i], x[1][i], x[2][i]}, ty[3] = {y[0][i], y[1][i], y[2][i]},
+                  tz[3] = {z[0][i], z[1][i], z[2][i]};
+            if (!settle(t, leaf, first + i, tx, ty, tz)) continue;
+            found = true;
+            if (any) return true;
+        }
+    }
+    return found;
+}
+
+/* A waiting child: entry distance (not negative, so its bits order like the number) above the reference. */
+static inline uint64_t wait_entry(float enter, uint32_t ref) {
+    union {
+        float f;
+        uint32_t u;
+    } bits = {.f = enter};
+    return (uint64_t)bits.u << 32 | ref;
+}
+
+static inline float wait_distance(uint64_t entry) {
+    union {
+        uint32_t u;
+        float f;
+    } bits = {.u = (uint32_t)(entry >> 32)};
+    return bits.f;
+}
+
+/* Puts the children met on the stack, farthest first, and returns its new height. */
+static inline uint32_t push_children(uint64_t *stack, uint32_t height, uint32_t met, const float enter[8],
+                                     const uint32_t child[8]) {
+    uint32_t base = height;
+    for (; met; met &= met - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(met);
+        uint64_t entry = wait_entry(enter[i], child[i]);
+        uint32_t at = height++;
+        while (at > base && stack[at - 1] < entry) stack[at] = stack[at - 1], --at;
+        stack[at] = entry;
+    }
+    return height;
+}
+
+static inline bool traverse(traversal *t, bool any) {
+    const fct_prepared_ray *r = t->ray;
+    const fct_bvh *bvh = t->bvh;
+    float centered[3];
+    for (int k = 0; k < 3; ++k) centered[k] = r->origin[k] - bvh->center[k];
+    uint64_t stack[FCT_STACK_SIZE];
+    uint32_t height = 1;
+    stack[0] = wait_entry(r->t_min, bvh->root);
+    bool found = false;
+    while (height) {
+        uint64_t entry = stack[--height];
+        if (wait_distance(entry) > t->hit.t) continue;
+        uint32_t ref = (uint32_t)entry;
+        if (ref & FCT_REF_LEAF) {
+            if (meet_leaf(t, fct_bvh_leaf(bvh, ref), any)) {
+                found = true;
+                if (any) return true;
+            }
+            continue;
+        }
+        float enter[8];
+        const uint32_t *child;
+        uint32_t met;
+        ++t->visits.nodes;
+        t->visits.boxes += 8;
+        if (ref & FCT_REF_ORIENTED) {
+            const fct_oriented_node *node = fct_bvh_node(bvh, ref);
+            met = meet_oriented(node, r, centered, t->hit.t, enter);
+            child = node->child;
+        } else {
+            const fct_axis_node *node = fct_bvh_node(bvh, ref);
+            met = meet_axis(node, r, t->hit.t, enter);
+            child = node->child;
+        }
+        height = push_children(stack, height, met, enter, child);
+    }
+    return found;
+}
+
+static traversal begin(const fct_bvh *bvh, const fct_prepared_ray *ray) {
+    return (traversal){
+        .bvh = bvh, .ray = ray, .hit = {.t = ray->t_max, .place = FCT_NONE}, .visits = {0, 0, 0}};
+}
+
+static void add_visits(fct_visits *visits, const fct_visits *more) {
+    if (!visits) return;
+    visits->nodes += more->nodes;
+    visits->boxes += more->boxes;
+    visits->triangles += more->triangles;
+}
+
+bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit,
+                          fct_visits *visits) {
+    traversal t = begin(bvh, ray);
+    bool found = traverse(&t, false);
+    *hit = t.hit;
+    add_visits(visits, &t.visits);
+    return found;
+}
+
+bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits) {
+    traversal t = begin(bvh, ray);
+    bool found = traverse(&t, true);
+    add_visits(visits, &t.visits);
+    return found;
+}
