@@ -34,7 +34,7 @@ error_t tool_parse_count(struct argp_state *state, const char *name, const char 
 
 error_t tool_parse_count32(struct argp_state *state, const char *name, const char *text, uint32_t least,
                            uint32_t most, uint32_t *value) {
-    uint64_t wide;
+    uint64_t wide = 0;
     error_t error = tool_parse_count(state, name, text, least, most, &wide);
     if (!error) *value = (uint32_t)wide;
     return error;
