@@ -1,0 +1,88 @@
+/* cluster/build.c: fct_tree_build: dual graph, contraction, order, boxes. */
+#include <string.h>
+
+#include "cluster/tree.h"
+
+fct_tree_def fct_tree_def_default(void) {
+    return (fct_tree_def){.size = sizeof(fct_tree_def),
+                          .method = FCT_CLUSTER_GREEDY,
+                          .cost = FCT_COST_INCREMENT,
+                          .fit_measure = FCT_FIT_AREA,
+                          .fit_weight = -1,
+                          .direction_weight = -1,
+                          .shape_weight = -1,
+                          .root_count = 1,
+                          .max_cost = INFINITY};
+}
+
+static fct_result contract(fct_work *work, const fct_mesh *mesh) {
+    fct_result result = FCT_OK;
+    if (mesh->materials) result = fct_work_greedy(work, false);
+    work->phase_ends[0] = work->merge_count;
+    if (result == FCT_OK) result = fct_work_greedy(work, true);
+    work->phase_ends[1] = work->merge_count;
+    if (result == FCT_OK) result = fct_work_join(work, mesh);
+    work->phase_ends[2] = work->merge_count;
+    return result;
+}
+
+/* The options as used, with the default weights filled in. */
+static fct_tree_def used_def(const fct_tree_def *def, const fct_metric *metric) {
+    fct_tree_def used = *def;
+    used.fit_weight = (double)metric->fit_weight;
+    used.direction_weight = (double)metric->direction_weight;
+    used.shape_weight = (double)metric->shape_weight;
+    used.source = NULL;
+    return used;
+}
+
+static fct_result copy_source(const fct_env *env, const fct_tree_def *def, fct_tree *tree) {
+    tree->view.source_hash = def->source_hash;
+    if (!def->source) return FCT_OK;
+    size_t size = strlen(def->source) + 1;
+    tree->source = fct_allocate(env, size, 1);
+    if (!tree->source) return fct_fail_memory(env, "the tree");
+    memcpy(tree->source, def->source, size);
+    tree->view.source = tree->source;
+    return FCT_OK;
+}
+
+static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                        fct_tree_stats *stats, fct_tree *tree) {
+    fct_work work;
+    double start = fct_seconds();
+    fct_result result = fct_work_create(env, mesh, def, &work);
+    if (result != FCT_OK) return result;
+    double dual = fct_seconds();
+    result = contract(&work, mesh);
+    if (result == FCT_OK) {
+        tree->view.def = used_def(def, &work.metric);
+        result = fct_tree_order(&work, mesh, def, tree);
+    }
+    fct_work_release(&work);
+    if (result == FCT_OK) result = copy_source(env, def, tree);
+    double contracted = fct_seconds();
+    if (result == FCT_OK) result = fct_tree_describe(tree);
+    if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};
+    return result;
+}
+
+fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                          fct_tree_stats *stats, fct_tree **out) {
+    *out = NULL;
+    fct_tree_def options = def ? *def : fct_tree_def_default();
+    if (options.size != sizeof options)
+        return fct_fail(env, FCT_ERROR_INTERNAL, "fct_tree_def has size %u, this library's is %zu",
+                        options.size, sizeof options);
+    if (mesh->face_count == 0) return fct_fail(env, FCT_ERROR_DATA, "a mesh without faces has no tree");
+    fct_result result = fct_mesh_validate(env, mesh);
+    if (result != FCT_OK) return result;
+    fct_tree *tree = fct_tree_new(env);
+    if (!tree) return fct_fail_memory(env, "the tree");
+    result = build(env, mesh, &options, stats, tree);
+    if (result == FCT_OK)
+        *out = tree;
+    else
+        fct_tree_destroy(tree);
+    return result;
+}

@@ -1,0 +1,53 @@
+/* cluster/metric.h: what merging two clusters costs.
+ *
+ * Everything is measured on the model moved to the origin and scaled to a bounding-box diagonal of 1. A
+ * record holds sums over a cluster in floats, centred on the cluster's own centroid: the raw form A - b b^T /
+ * c (8.11) loses its digits in floats, the centred one keeps them. Records are combined, never subtracted.
+ */
+#ifndef FCT_CLUSTER_METRIC_H
+#define FCT_CLUSTER_METRIC_H
+
+#include "base/vec.h"
+#include "facetree/cluster.h"
+
+typedef struct fct_record {
+    float covariance[6]; /* sum over the fit measure of (x - centroid)(x - centroid)^T */
+    float centroid[3];   /* of the fit measure */
+    float weight;        /* the whole measure: the area, or the number of points */
+    float vector[3];     /* S = sum A_k n_k */
+    float area;          /* sum A_k */
+    float perimeter;
+    float fit; /* area times the mean squared distance to the cluster's plane */
+} fct_record;
+
+/* What the direction error of the MEAN cost needs; in double, for its terms cancel (8.13). */
+typedef struct fct_direction {
+    double moment[6]; /* sum A_k n_k n_k^T */
+    double vector[3], area;
+} fct_direction;
+
+typedef struct fct_metric {
+    fct_cluster_cost cost;
+    fct_fit_measure measure;
+    float fit_weight, direction_weight, shape_weight;
+    v3 origin;    /* of the unit model, in the mesh's coordinates */
+    double scale; /* mesh unit to unit model */
+} fct_metric;
+
+/* Weights below zero in def become the defaults of its cost. */
+fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds);
+
+/* The record of one triangle; direction may be NULL. perimeter in the mesh's unit. */
+void fct_metric_face(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
+                     float perimeter, fct_record *record, fct_direction *direction);
+
+/* Cost of merging a and b that share a border of length `shared` (unit model). da, db only for MEAN. A NaN is
+ * never returned. */
+float fct_metric_cost(const fct_metric *metric, const fct_record *a, const fct_record *b, float shared,
+                      const fct_direction *da, const fct_direction *db);
+
+/* a becomes the union of a and b. */
+void fct_metric_merge(const fct_metric *metric, fct_record *a, const fct_record *b, float shared,
+                      fct_direction *da, const fct_direction *db);
+
+#endif

@@ -1,0 +1,59 @@
+/* cluster/work.h: a clustering in progress: live clusters, the edges between them, and the merges so far.
+ *
+ * A cluster lives in the slot of one of its faces. Build ids: f < F is the leaf of face f, F + i is merge i;
+ * a merge's children always have smaller build ids.
+ */
+#ifndef FCT_CLUSTER_WORK_H
+#define FCT_CLUSTER_WORK_H
+
+#include "base/env.h"
+#include "cluster/metric.h"
+
+typedef struct fct_edge {
+    uint32_t a, b; /* slots */
+    float shared;  /* border, unit model */
+} fct_edge;
+
+typedef struct fct_work {
+    const fct_env *env;
+    fct_metric metric;
+    uint32_t face_count;
+    /* per slot */
+    fct_record *records;
+    fct_direction *directions; /* MEAN only */
+    uint32_t *counts;          /* faces */
+    uint8_t *heights;          /* of the subtree */
+    uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
+    const uint32_t *materials; /* of the face of the slot, or NULL */
+    /* per merge, F - 1 of them */
+    uint32_t (*children)[2]; /* build ids */
+    float *costs;
+    uint32_t merge_count;
+    uint32_t phase_ends[3]; /* merges within materials, across materials, without a shared edge */
+    /* live edges */
+    fct_edge *edges;
+    uint32_t edge_count;
+} fct_work;
+
+/* Leaf of `limit` below which a merge of `count` faces in all is put off: 3 log2 n - 1, so that a join of
+ * parts above keeps the whole tree within 3 log2 F, and no more than 2 log2 n + 8. */
+uint32_t fct_height_limit(uint32_t count);
+
+/* Records of all faces and the edges of the dual graph. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out);
+void fct_work_release(fct_work *work);
+
+/* Cost of merging the clusters of two slots. */
+float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared);
+/* Whether the union keeps the height limit. */
+bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
+/* Notes the merge; slot a holds the union, slot b dies. */
+void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost);
+
+/* Contracts along live edges, cheapest first, until no allowed one is left; with `across` false only between
+ * clusters of one material. Leaves the edges that remain. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_greedy(fct_work *work, bool across);
+/* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_join(fct_work *work, const fct_mesh *mesh);
+
+#endif
