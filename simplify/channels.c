@@ -12,9 +12,9 @@ static const float *channel_values(const fct_mesh *mesh, const fct_channel *chan
                                    uint32_t *stride) {
     *stride = channel->source == CHANNEL_TEXCOORD ? 2 : 3;
     *count = channel->source == CHANNEL_TEXCOORD ? 3 * (size_t)mesh->face_count : mesh->vertex_count;
-    return channel->source == CHANNEL_COLOR      ? mesh->colors
-           : channel->source == CHANNEL_NORMAL   ? mesh->normals
-                                                 : mesh->texcoords;
+    return channel->source == CHANNEL_COLOR    ? mesh->colors
+           : channel->source == CHANNEL_NORMAL ? mesh->normals
+                                               : mesh->texcoords;
 }
 
 static void add_channels(fct_simplifier *s, int source, uint32_t components, double factor) {
@@ -35,8 +35,7 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
 
 static void full_range(const float *values, size_t count, double *lower, double *upper) {
     *lower = INFINITY, *upper = -INFINITY;
-    for (size_t i = 0; i < count; ++i)
-        *lower = fmin(*lower, values[i]), *upper = fmax(*upper, values[i]);
+    for (size_t i = 0; i < count; ++i) *lower = fmin(*lower, values[i]), *upper = fmax(*upper, values[i]);
     if (count == 0) *lower = *upper = 0;
 }
 

@@ -1,9 +1,9 @@
 /* simplify/contract.c: the loop that takes the cheapest edge and contracts it.
  *
- * Quadrics only grow, so the cost an edge was queued with is a lower bound: an edge is looked at again when it
- * comes up, and goes back if it has become dearer. Where two edges become one, one of them is dropped. Refused
- * edges return to the queue when a contraction changes their surroundings. A contraction is O(faces around the
- * smaller end) at a hub, a point of more than SIMPLIFY_HUB faces, and O(both rings) elsewhere.
+ * Quadrics only grow, so the cost an edge was queued with is a lower bound: an edge is looked at again when
+ * it comes up, and goes back if it has become dearer. Where two edges become one, one of them is dropped.
+ * Refused edges return to the queue when a contraction changes their surroundings. A contraction is O(faces
+ * around the smaller end) at a hub, a point of more than SIMPLIFY_HUB faces, and O(both rings) elsewhere.
  */
 #include "base/parallel.h"
 #include "simplify/placement.h"
@@ -27,8 +27,7 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
     queue_push(&s->queue, e, s->queue.current);
 }
 
-/* Collects the corners at a point that is no hub, and drops the dead ones from its list. */
-static uint32_t gather_ring(fct_simplifier *s, uint32_t point, uint32_t *ring) {
+uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring) {
     uint32_t count = 0, last = FCT_NONE;
     for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
         if (corner_dead(s, c)) continue;
@@ -47,9 +46,8 @@ static uint32_t gather_ring(fct_simplifier *s, uint32_t point, uint32_t *ring) {
     return count;
 }
 
-/* Whether moving corner ring[i]'s point to `at` turns a face over that does not vanish with `other`. */
-static bool folds_over(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other, v3 from,
-                       v3 at) {
+bool fct_simplify_folds_over(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
+                             v3 from, v3 at) {
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
         if (x == other || y == other) continue;
@@ -136,8 +134,7 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
             uint32_t class_keep = find_root(s->class_parents, s->wedge_classes[keep]);
             s->class_parents[find_root(s->class_parents, s->wedge_classes[w])] = class_keep;
         }
-        memcpy(s->attributes + (size_t)s->channel_count * keep, values[i],
-               s->channel_count * sizeof(double));
+        memcpy(s->attributes + (size_t)s->channel_count * keep, values[i], s->channel_count * sizeof(double));
         s->next_wedges[keep] = s->first_wedges[a];
         s->first_wedges[a] = keep;
     }
@@ -231,11 +228,12 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
     uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
     uint32_t a = ends[keep], b = ends[1 - keep];
     bool hub = s->valences[a] > SIMPLIFY_HUB;
-    uint32_t count_a = hub ? 0 : gather_ring(s, a, s->ring_a), count_b = gather_ring(s, b, s->ring_b);
+    uint32_t count_a = hub ? 0 : fct_simplify_gather(s, a, s->ring_a),
+             count_b = fct_simplify_gather(s, b, s->ring_b);
     uint32_t shared = 0;
     for (uint32_t i = 0; i < count_b; ++i)
-        shared += s->triangles[corner_next(s->ring_b[i])] == a ||
-                  s->triangles[corner_previous(s->ring_b[i])] == a;
+        shared +=
+            s->triangles[corner_next(s->ring_b[i])] == a || s->triangles[corner_previous(s->ring_b[i])] == a;
     if (shared == 0) {
         drop_edge(s, e);
         return false;
@@ -245,8 +243,8 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
         return false;
     }
     if (s->def->check_foldover &&
-        (folds_over(s, s->ring_a, count_a, b, point_position(s, a), candidate.at) ||
-         folds_over(s, s->ring_b, count_b, a, point_position(s, b), candidate.at))) {
+        (fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), candidate.at) ||
+         fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), candidate.at))) {
         if (s->edge_ends_only[e] || s->def->placement > FCT_PLACE_SEGMENT)
             refuse_edge(s, e);
         else {

@@ -1,6 +1,6 @@
 /* simplify/link.c: the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999): contracting an edge keeps the
- * topology when what surrounds both ends is what surrounds the edge. An open boundary counts as one more point
- * that all boundary edges see; edges of more than two faces are not touched.
+ * topology when what surrounds both ends is what surrounds the edge. An open boundary counts as one more
+ * point that all boundary edges see; edges of more than two faces are not touched.
  */
 #include "simplify/state.h"
 
@@ -55,7 +55,8 @@ bool fct_simplify_link_holds(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t
     for (uint32_t i = 0; i < open_count; ++i)
         if (faces_at(s, open_b[i]) == 1) return false;
 
-    /* Common neighbours must be apexes of the faces at the edge, and no face of both may lie across from it. */
+    /* Common neighbours must be apexes of the faces at the edge, and no face of both may lie across from it.
+     */
     uint32_t common = 0, apexes = 0;
     for (uint32_t i = 0; i < count_b; ++i) {
         uint32_t x = s->triangles[corner_next(s->ring_b[i])];

@@ -88,7 +88,8 @@ static const double *end_attributes(const fct_simplifier *s, const fct_groups *g
                                     uint32_t end) {
     uint32_t chosen = FCT_NONE;
     for (uint32_t i = 0; i < g->wedge_count; ++i)
-        if (g->group_of[i] == group && (chosen == FCT_NONE || (g->second[i] == end && g->second[chosen] != end)))
+        if (g->group_of[i] == group &&
+            (chosen == FCT_NONE || (g->second[i] == end && g->second[chosen] != end)))
             chosen = i;
     return s->attributes + (size_t)s->channel_count * g->wedges[chosen];
 }
@@ -212,8 +213,7 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     bool hub_a = s->valences[a] > SIMPLIFY_HUB, hub_b = s->valences[b] > SIMPLIFY_HUB;
     if ((hub_a && hub_b) || !position_quadric(s, a, b, r, &g, sums)) return false;
     if (hub_a || hub_b)
-        *out = (fct_candidate){
-            .at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
+        *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
     else if (s->steering && s->def->placement == FCT_PLACE_SUBSET)
         place_subset(s, &g, sums, pa, pb, out);
     else

@@ -4,8 +4,8 @@
 
 #include "simplify/quadric.h"
 
-/* The wedges at both ends of an edge, grouped by the faces that go with it: where such a face joins a wedge of
- * one end and a wedge of the other, these become one. */
+/* The wedges at both ends of an edge, grouped by the faces that go with it: where such a face joins a wedge
+ * of one end and a wedge of the other, these become one. */
 typedef struct fct_groups {
     uint32_t wedge_count, group_count;
     uint32_t wedges[SIMPLIFY_MAX_WEDGES];

@@ -2,9 +2,9 @@
  *
  * A face adds a third of its area times the squared distance from its plane, a 2-plane in position and
  * attributes, to each of its corners. Open edges and borders between materials or face colours add the plane
- * through the edge and perpendicular to each of its faces, weighted by the squared length (3.6). A seam, where
- * the two sides of an edge carry different attributes, does so in proportion to the squared difference: faint
- * seams may move. Faces of no area add nothing.
+ * through the edge and perpendicular to each of its faces, weighted by the squared length (3.6). A seam,
+ * where the two sides of an edge carry different attributes, does so in proportion to the squared difference:
+ * faint seams may move. Faces of no area add nothing.
  */
 #include "simplify/quadric.h"
 
@@ -63,7 +63,8 @@ static void add_plane(double *q, v3 n, v3 p, double weight) {
     q[9] += weight * d * d;
 }
 
-/* q = the squared distance from the 2-plane through x[0..2] in R^(3 + m) (5.8)-(5.10), for a face of weight 1.
+/* q = the squared distance from the 2-plane through x[0..2] in R^(3 + m) (5.8)-(5.10), for a face of
+ * weight 1.
  */
 static void make_plane_n(double *q, uint32_t m, double x[3][3 + SIMPLIFY_MAX_CHANNELS]) {
     uint32_t n = 3 + m;
@@ -90,8 +91,7 @@ static void make_plane_n(double *q, uint32_t m, double x[3][3 + SIMPLIFY_MAX_CHA
         double *cross = q + POSITION_QUADRIC + 4 * i;
         for (uint32_t j = 0; j < 3; ++j) cross[j] = -e1[3 + i] * e1[j] - e2[3 + i] * e2[j];
         cross[3] = b[3 + i];
-        for (uint32_t j = i; j < m; ++j)
-            *square++ = (i == j) - e1[3 + i] * e1[3 + j] - e2[3 + i] * e2[3 + j];
+        for (uint32_t j = i; j < m; ++j) *square++ = (i == j) - e1[3 + i] * e1[3 + j] - e2[3 + i] * e2[3 + j];
     }
 }
 
@@ -128,8 +128,8 @@ static double wedge_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
     double sum = 0;
     for (uint32_t i = 0; i < s->channel_count; ++i) {
         const fct_channel *channel = &s->channels[i];
-        double d = s->attributes[(size_t)s->channel_count * w + i] -
-                   s->attributes[(size_t)s->channel_count * u + i];
+        double d =
+            s->attributes[(size_t)s->channel_count * w + i] - s->attributes[(size_t)s->channel_count * u + i];
         double range = channel->upper - channel->lower;
         if (range > 0) sum += d * d / (range * range);
     }
@@ -151,7 +151,8 @@ static void find_seams(const fct_simplifier *s, float *strength, uint32_t *first
         uint32_t here = s->corner_wedges[c], there = s->corner_wedges[corner_next(c)];
         bool same_way = s->triangles[c] == s->triangles[d];
         uint32_t from = s->corner_wedges[d], to = s->corner_wedges[corner_next(d)];
-        double gap = fmax(wedge_gap(s, here, same_way ? from : to), wedge_gap(s, there, same_way ? to : from));
+        double gap =
+            fmax(wedge_gap(s, here, same_way ? from : to), wedge_gap(s, there, same_way ? to : from));
         if (gap > strength[e]) strength[e] = (float)gap;
     }
 }

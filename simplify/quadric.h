@@ -3,8 +3,8 @@
  * Q(p, a) = p^T A p + 2 b^T p + c + 2 a^T (C p + d) + a^T D a, packed as
  *   [0, 6) A as xx xy xz yy yz zz, [6, 9) b, 9 c, 10 the area that was added up,
  *   then for each attribute its row of C and its d (4), then D's upper triangle by rows.
- * Eliminating the attributes leaves the first 11 numbers, the quadric of the position whose attributes are the
- * best for it (a Schur complement); the sum of these over the wedges of a point is the point's.
+ * Eliminating the attributes leaves the first 11 numbers, the quadric of the position whose attributes are
+ * the best for it (a Schur complement); the sum of these over the wedges of a point is the point's.
  */
 #ifndef FCT_SIMPLIFY_QUADRIC_H
 #define FCT_SIMPLIFY_QUADRIC_H

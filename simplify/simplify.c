@@ -41,11 +41,12 @@ static fct_result check(const fct_env *env, const fct_mesh *mesh, const fct_simp
 }
 
 static void release(fct_simplifier *s) {
-    void *arrays[] = {s->point_of,      s->positions,    s->sources,        s->point_parents, s->first_corners,
-                      s->last_corners,  s->valences,     s->first_wedges,   s->triangles,     s->next_corners,
-                      s->side_edges,    s->corner_wedges, s->edge_ends,     s->edge_parents,  s->edge_states,
-                      s->edge_ends_only, s->edge_flags,  s->quadrics,       s->attributes,    s->wedge_parents,
-                      s->next_wedges,   s->wedge_uses,   s->wedge_classes,  s->class_parents, s->link_marks};
+    void *arrays[] = {
+        s->point_of,       s->positions,     s->sources,       s->point_parents, s->first_corners,
+        s->last_corners,   s->valences,      s->first_wedges,  s->triangles,     s->next_corners,
+        s->side_edges,     s->corner_wedges, s->edge_ends,     s->edge_parents,  s->edge_states,
+        s->edge_ends_only, s->edge_flags,    s->quadrics,      s->attributes,    s->wedge_parents,
+        s->next_wedges,    s->wedge_uses,    s->wedge_classes, s->class_parents, s->link_marks};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     queue_release(s->env, &s->queue);
 }
@@ -121,11 +122,10 @@ static fct_result write_mesh(fct_simplifier *s, fct_mesh *out) {
         uint32_t key = vertex_key(s, c);
         if (numbers[key] == FCT_NONE) numbers[key] = vertices++;
     }
-    unsigned arrays = (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
-                      (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) |
-                      (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
-                      (mesh->materials ? FCT_MESH_MATERIALS : 0) |
-                      (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
+    unsigned arrays =
+        (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
+        (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
+        (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     fct_result result = fct_mesh_create(s->env, vertices, s->live_faces, arrays, out);
     if (result == FCT_OK) result = copy_names(s->env, mesh, out);
     uint32_t to = 0;
@@ -168,7 +168,8 @@ fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simp
     ready = fct_seconds();
     if (result == FCT_OK) result = fct_simplify_contract(s, &stop);
     contracted = fct_seconds();
-    if (result == FCT_OK && def->refit_passes) result = fct_simplify_refit(s);
+    bool refit = s->live_faces < s->face_count && def->placement != FCT_PLACE_SUBSET;
+    if (result == FCT_OK && refit && def->refit_passes) result = fct_simplify_refit(s);
     if (result == FCT_OK) result = write_mesh(s, out);
     if (result != FCT_OK) fct_mesh_release(env, out);
     if (result == FCT_OK && stats)

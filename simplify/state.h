@@ -1,13 +1,13 @@
 /* simplify/state.h: what one run of the simplifier holds.
  *
- * Topology lives on points: places in space, which input vertices with equal coordinates share. Attributes live
- * on wedges: the distinct attribute values that meet at a point. A point with one value has one wedge; on a
- * crease or a texture seam it has several, which move together, so that a seam cannot open into a crack. A mesh
- * without attributes has exactly one wedge a point, of the same number.
+ * Topology lives on points: places in space, which input vertices with equal coordinates share. Attributes
+ * live on wedges: the distinct attribute values that meet at a point. A point with one value has one wedge;
+ * on a crease or a texture seam it has several, which move together, so that a seam cannot open into a crack.
+ * A mesh without attributes has exactly one wedge a point, of the same number.
  *
- * Corner c = 3 f + k. Side c runs from corner c to the next corner of its face. A contraction moves all corners
- * of one point to another; a removed face has triangles[3 f] == FCT_NONE and leaves the rings when these are
- * walked next. Coordinates are in the unit cube around the origin.
+ * Corner c = 3 f + k. Side c runs from corner c to the next corner of its face. A contraction moves all
+ * corners of one point to another; a removed face has triangles[3 f] == FCT_NONE and leaves the rings when
+ * these are walked next. Coordinates are in the unit cube around the origin.
  */
 #ifndef FCT_SIMPLIFY_STATE_H
 #define FCT_SIMPLIFY_STATE_H
@@ -41,42 +41,43 @@ typedef struct fct_simplifier {
     v3 center;
     double extent; /* of the longest side of the bounds; 1 where that is 0 */
 
-    uint32_t point_count, wedge_count, edge_count, live_faces;
-    uint32_t *point_of; /* vertex -> point; FCT_NONE when no face uses it */
+    uint32_t point_count, wedge_count, edge_count;
+    uint32_t face_count, live_faces; /* at the start, without degenerate ones, and now */
+    uint32_t *point_of;              /* vertex -> point; FCT_NONE when no face uses it */
 
     /* By point. */
-    double *positions;        /* x 3 */
-    uint32_t *sources;        /* input vertex whose position it is, FCT_NONE once moved elsewhere */
-    uint32_t *point_parents;  /* what it was contracted to, itself while alive */
+    double *positions;       /* x 3 */
+    uint32_t *sources;       /* input vertex whose position it is, FCT_NONE once moved elsewhere */
+    uint32_t *point_parents; /* what it was contracted to, itself while alive */
     uint32_t *first_corners, *last_corners, *valences;
-    uint32_t *first_wedges;   /* NULL without attributes */
+    uint32_t *first_wedges; /* NULL without attributes */
 
     /* By corner. */
-    uint32_t *triangles;      /* points */
+    uint32_t *triangles; /* points */
     uint32_t *next_corners;
     uint32_t *side_edges;
-    uint32_t *corner_wedges;  /* NULL without attributes; resolve with fct_wedge_find */
+    uint32_t *corner_wedges; /* NULL without attributes; resolve with fct_wedge_find */
 
     /* By edge. */
-    uint32_t *edge_ends;      /* x 2 points */
-    uint32_t *edge_parents;   /* twin that took its place */
+    uint32_t *edge_ends;    /* x 2 points */
+    uint32_t *edge_parents; /* twin that took its place */
     uint8_t *edge_states;
-    uint8_t *edge_ends_only;  /* the minimiser turned a face over: place at an end or the middle */
-    uint8_t *edge_flags;      /* until the quadrics are made */
+    uint8_t *edge_ends_only; /* the minimiser turned a face over: place at an end or the middle */
+    uint8_t *edge_flags;     /* until the quadrics are made */
 
     /* By wedge. The first `steering` of `channels` are dimensions of the quadrics. */
     uint32_t steering, channel_count, quadric_size;
     fct_channel channels[SIMPLIFY_MAX_CHANNELS];
-    double *quadrics;         /* x quadric_size */
-    double *attributes;       /* x channel_count, NULL without attributes */
+    double *quadrics;   /* x quadric_size */
+    double *attributes; /* x channel_count, NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
-    uint32_t *wedge_classes;  /* wedges of one class are one output vertex; resolve with class_parents */
+    uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
     uint32_t *class_parents;
     uint32_t class_count;
 
     fct_queue queue;
     uint32_t ring_a[SIMPLIFY_HUB], ring_b[SIMPLIFY_HUB]; /* corners around the ends of the edge at hand */
-    uint32_t *link_marks;                                 /* by point, with keep_topology */
+    uint32_t *link_marks;                                /* by point, with keep_topology */
     uint32_t link_epoch;
     double max_error2; /* largest squared error of a contraction made */
 } fct_simplifier;
@@ -98,7 +99,8 @@ static inline bool corner_dead(const fct_simplifier *s, uint32_t c) {
     return s->triangles[c - c % 3] == FCT_NONE;
 }
 static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
-    return (v3){s->positions[3 * (size_t)p], s->positions[3 * (size_t)p + 1], s->positions[3 * (size_t)p + 2]};
+    return (v3){s->positions[3 * (size_t)p], s->positions[3 * (size_t)p + 1],
+                s->positions[3 * (size_t)p + 2]};
 }
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
     return s->corner_wedges ? find_root(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];
@@ -113,7 +115,13 @@ fct_result fct_simplify_attributes(fct_simplifier *s);
 fct_result fct_simplify_quadrics(fct_simplifier *s);
 /* link.c: whether contracting b into a keeps the topology, by their rings. */
 bool fct_simplify_link_holds(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b);
-/* contract.c: contracts until a stop. */
+/* contract.c: whether moving the point of these corners from `from` to `at` turns a face over that does not
+ * also touch `other`. */
+bool fct_simplify_folds_over(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
+                             v3 from, v3 at);
+/* Collects the live corners at a point that is no hub, and drops the dead ones from its list. */
+uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring);
+/* Contracts until a stop. */
 fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop);
 /* refit.c: moves the points that are left closer to the input. */
 fct_result fct_simplify_refit(fct_simplifier *s);

@@ -81,8 +81,7 @@ static fct_result make_points(fct_simplifier *s) {
     if (!s->point_of) return fct_fail_memory(s->env, "the points of a mesh");
     memset(s->point_of, 0xff, mesh->vertex_count * sizeof *s->point_of);
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) s->point_of[mesh->triangles[c]] = 0;
-    fct_result result =
-        number_keys(s, position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
+    fct_result result = number_keys(s, position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
     if (result != FCT_OK) return result;
 
     uint32_t count = s->point_count;
@@ -147,6 +146,7 @@ static fct_result make_rings(fct_simplifier *s) {
             ++s->valences[p];
         }
     }
+    s->face_count = s->live_faces;
     return FCT_OK;
 }
 
@@ -166,8 +166,7 @@ static fct_result make_wedges(fct_simplifier *s) {
     if (result != FCT_OK) goto done;
     s->wedge_count = s->class_count;
     if (mesh->texcoords)
-        result =
-            number_keys(s, corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
+        result = number_keys(s, corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
     else
         for (size_t c = 0; c < corners; ++c) s->corner_wedges[c] = class_of[mesh->triangles[c]];
     if (result != FCT_OK) goto done;
