@@ -1,0 +1,154 @@
+# tests/tools/test_commands.sh: what each command answers: files, JSON keys, standard input and output.
+source "$(dirname "$0")/support.sh"
+cube 2 >cube.off
+sphere 16 >sphere.off # 2 * 32 * 15 = 960 faces
+grid 8 '.1 * x * y' >grid.off
+
+# --- cluster, info ---
+expect 0 cluster sphere.off -o sphere.fct --json
+keys faces vertices roots depth mean_depth seconds read dual contract boxes write total peak_bytes file_bytes
+holds "$(value faces) == 960 && $(value vertices) == 482 && $(value roots) == 1"
+holds "$(value depth) <= 30 && $(value mean_depth) >= 9 && $(value peak_bytes) > 1000000"
+holds "$(value file_bytes) == $(stat -c %s sphere.fct)"
+expect 0 info sphere.fct --verify --json
+keys faces vertices boundary_edges nonmanifold_edges components depth source build verified
+holds "$(value faces) == 960 && $(value boundary_edges) == 0 && $(value components) == 1"
+check "the source is recorded" test "$(value source)" = sphere.off
+expect 0 info sphere.fct
+check "info prints lines" grep -qE '^faces +960$' out
+expect 0 info grid.off --json
+holds "$(value faces) == 128 && $(value boundary_edges) == 32 && $(value boundary_loops) == 1"
+expect 0 cluster sphere.off -o roots.fct --roots 7 --cost mean --fit 2 --direction 1 --shape .5 --fit-measure points --json
+holds "$(value roots) == 7"
+expect 0 info roots.fct --json
+check "the options of the build are recorded" test "$(value cost) $(value fit_measure) $(value fit) $(value shape)" = "mean points 2.0 0.5"
+expect 0 cluster sphere.off -o quiet.fct --quiet
+check "--quiet says nothing" test ! -s out -a ! -s err
+expect 0 cluster sphere.off -o progress.fct --progress
+check "--progress shows a bar" grep -q '\[#' err
+
+# Several files and folders go to a folder.
+mkdir in
+cp cube.off grid.off in
+cp sphere.off in/ball.off
+echo text >in/notes.txt
+expect 0 cluster in -o trees --json
+keys faces files peak_bytes total
+holds "$(value faces) == 12 + 128 + 960"
+check "a hierarchy for each mesh" test "$(ls trees | tr '\n' ' ')" = "ball.fct cube.fct grid.fct "
+expect 0 cluster sphere.off -o ball.fct
+check "the same bytes as one by one, but for the name" test "$(stat -c %s ball.fct)" -ge "$(stat -c %s trees/ball.fct)"
+expect 0 cluster cube.off grid.off -o both/
+for tree in trees/*.fct both/*.fct; do expect 0 info "$tree" --verify; done
+expect 64 cluster in/cube.off cube.off -o both
+says "would both be written to"
+mkdir empty
+expect 66 cluster empty -o both
+echo nonsense >in/bad.off
+expect 65 cluster in -o trees 2>/dev/null || { [ "$code" = 65 ] && failures=$((failures - 1)); } # two lines: the file's and the sum
+check "the bad file is named" grep -q 'in/bad.off' err
+
+# --- partition, boxes ---
+for k in 1 2 17 960; do
+    expect 0 partition sphere.fct -k $k -o labels.txt --json
+    keys clusters mean_fit mean_direction mean_irregularity connected
+    holds "$(value clusters) == $k"
+    check "connected clusters" test "$(value connected)" = true
+    check "$k labels on 960 lines" test "$(wc -l <labels.txt) $(sort -u labels.txt | wc -l)" = "960 $k"
+done
+expect 0 partition sphere.off -k 5 -o -
+check "labels on standard output and words on stderr" test "$(wc -l <out)" = 960 -a -s err
+sort -u out >labels
+check "labels count from 0" test "$(tr '\n' ' ' <labels)" = "0 1 2 3 4 "
+expect 0 partition sphere.fct --max-cost 0 -o labels.txt --json
+holds "$(value clusters) >= 1 && $(value clusters) <= 960"
+for ending in ply off glb obj; do
+    expect 0 partition sphere.fct -k 9 -o parts.$ending
+    expect 0 info parts.$ending --json
+    holds "$(value faces) == 960"
+done
+expect 0 info parts.glb --json
+check "vertices have colours" test "$(value vertex_colors)" = true
+expect 0 info parts.ply --json
+check "faces have colours" test "$(value face_colors)" = true
+expect 0 boxes sphere.fct -k 6 -o boxes.json
+check "boxes tell their geometry" grep -q half_extents boxes.json
+check "six boxes" test "$(grep -c '"center"' boxes.json)" = 6
+expect 0 boxes sphere.fct -k 6 --json
+keys clusters boxes center axes half_extents plane area faces
+expect 0 boxes sphere.fct -k 6
+check "JSON on standard output" grep -q '"boxes"' out
+expect 0 boxes sphere.fct -k 6 -o boxes.ply
+expect 0 info boxes.ply --json
+holds "$(value faces) == 72 && $(value vertices) == 48 && $(value boundary_edges) == 0 && $(value misoriented_edges) == 0"
+
+# --- raycast, closest ---
+cat >rays.txt <<'END'
+# from outside, from inside, past, too short, beginning behind
+0 0 5  0 0 -1
+0 0 0  1 0 0 # a comment
+5 5 5  0 0 1
+
+0 0 5  0 0 -1  0 3
+0 0 5  0 0 -2  2.5 inf
+END
+expect 0 raycast cube.off --rays rays.txt
+awk '{ print ($1 < 0 ? "miss" : $2) }' out | tr '\n' ' ' >ts
+check "closest hits of a cube" test "$(cat ts)" = "4 1 miss miss 3 "
+cp out obb.txt
+expect 0 raycast cube.off --rays - -o hits.txt --backend embree <rays.txt
+check "both backends agree" test "$(awk '{ print $1 < 0 ? -1 : $2 }' hits.txt)" = "$(awk '{ print $1 < 0 ? -1 : $2 }' obb.txt)"
+expect 0 raycast cube.off --rays rays.txt --occlusion
+check "occlusion" test "$(tr '\n' ' ' <out)" = "1 1 0 0 1 "
+expect 0 raycast cube.off --rays rays.txt --json
+keys rays hits seconds
+holds "$(value rays) == 5 && $(value hits) == 3"
+expect 0 raycast sphere.fct --check --json
+keys rays hits differences explained unexplained seconds obb embree
+holds "$(value rays) == 1000000 && $(value unexplained) == 0 && $(value hits) > 100000"
+expect 0 raycast cube.off --check --rays rays.txt --json
+holds "$(value rays) == 5 && $(value unexplained) == 0"
+for bad in '0 0 0 1 1' '0 0 0 1 1 1 0 1 2' '0 0 x 1 1 1' '0 0 nan 1 1 1' 'inf 0 0 1 0 0' '1e99 0 0 1 0 0' '0 0 0 1 0 0 nan'; do
+    printf '0 0 0 1 0 0\n%s\n' "$bad" >bad.txt
+    expect 65 raycast cube.off --rays bad.txt
+    says "bad.txt:2: expected"
+done
+expect 66 raycast cube.off --rays missing.txt
+: >none.txt
+expect 0 raycast cube.off --rays none.txt
+check "no rays, no hits" test ! -s out
+printf '3 0 0\n0.9 0 0\n' >points.txt
+expect 0 closest cube.off --points points.txt
+check "nearest points of a cube" test "$(awk '{ print $2, $3, $4, $5 }' out | head -n 1)" = "1 0 0 2"
+holds "$(awk 'NR == 2 { print $5 }' out) > .0999 && $(awk 'NR == 2 { print $5 }' out) < .1001"
+expect 0 closest cube.off --points points.txt --max-distance 1 -o near.txt
+check "-1 where nothing is near" test "$(head -n 1 near.txt)" = -1
+printf '1 2\n' >bad.txt
+expect 65 closest cube.off --points bad.txt
+says "bad.txt:1: expected 3 numbers, found 2"
+
+# --- compare, simplify ---
+expect 0 compare sphere.off sphere.off --json
+keys e_avg e_max e_avg_ab e_avg_ba e_max_ab e_max_ba diameter color_rms color_max
+holds "$(value e_avg) < 1e-12 && $(value e_max) < 1e-6 && $(value diameter) > 3.4 && $(value diameter) < 3.5"
+awk 'NR > 2 && NF == 3 { $3 += .25 } { print }' grid.off >raised.off
+expect 0 compare grid.off raised.off --json --samples 10
+holds "$(value e_avg) > .05 && $(value e_avg) < .0626 && $(value e_max) <= .25001 && $(value e_max) > .2499"
+expect 0 simplify sphere.off --faces 100 -o small.ply --json
+keys faces_before faces_after stopped_because max_cost seconds init contract total peak_bytes
+holds "$(value faces_before) == 960 && $(value faces_after) <= 100 && $(value faces_after) >= 98"
+check "it says why it stopped" test "$(value stopped_because)" = faces
+expect 0 simplify sphere.fct --ratio .25 -o quarter.off --placement subset --refit 0 --keep-topology
+expect 0 info quarter.off --json
+holds "$(value faces) <= 240 && $(value faces) >= 238 && $(value boundary_edges) == 0"
+expect 0 compare sphere.off quarter.off --json
+holds "$(value e_max_ab) < .1"
+expect 0 simplify sphere.off --max-error .01 -o fine.obj --json
+check "it stops at the error" test "$(value stopped_because)" = error
+holds "$(value max_cost) <= .01 && $(value faces_after) < 960"
+expect 65 simplify sphere.off --faces 10 --attributes color -o x.ply
+says "expected a color"
+expect 0 simplify - --faces 20 -o - <small.ply
+check "a PLY on standard output" test "$(head -c 3 out)" = ply
+leftovers
+finish
