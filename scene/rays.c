@@ -45,8 +45,9 @@ static inline void enter(const fct_scene_node *node, const slabs *s, float t_min
         float fx = (x1[k] - ox) * ix, fy = (y1[k] - oy) * iy, fz = (z1[k] - oz) * iz;
         float near = nx > ny ? nx : ny, far = fx < fy ? fx : fy;
         near = nz > near ? nz : near, far = fz < far ? fz : far;
-        /* three roundings on either side */
-        near = near - fabsf(near) * 4e-7f, far = far + fabsf(far) * 4e-7f;
+        /* three roundings on either side; products, so that the infinities of an empty child stay what they
+         * are */
+        near *= near > 0 ? 1 - 4e-7f : 1 + 4e-7f, far *= far > 0 ? 1 + 4e-7f : 1 - 4e-7f;
         near = near > t_min ? near : t_min, far = far < t_max ? far : t_max;
         entry[k] = near <= far ? near : INFINITY;
     }
