@@ -23,22 +23,23 @@
 #define FCT_TOP_DEPTH  80
 #define FCT_STACK_SIZE (7 * FCT_TOP_DEPTH + 1)
 
-/* A child: bit 31 for a leaf, bit 30 for an oriented node, the rest its place in units of 64 bytes; FCT_NONE
- * for an empty slot. */
+/* A child: bit 31 for a leaf, bit 30 for an oriented node, the rest its place in units of 64 bytes. */
 #define FCT_REF_LEAF     0x80000000u
 #define FCT_REF_ORIENTED 0x40000000u
 #define FCT_REF_UNIT     64
 
 typedef struct fct_axis_node {
-    float bounds[3][2][8]; /* axis, lower or upper, child; empty slots have lower > upper */
+    float bounds[3][2][8]; /* axis, lower or upper, child */
     uint32_t child[8];
-    uint32_t unused[8];
+    uint32_t present; /* bit i: there is a child i */
+    uint32_t unused[7];
 } fct_axis_node;
 
 typedef struct fct_oriented_node {
     float map[3][4][8]; /* row, (x y z 1), child: applied to positions relative to the centre */
     uint32_t child[8];
-    uint32_t unused[8];
+    uint32_t present; /* bit i: there is a child i */
+    uint32_t unused[7];
 } fct_oriented_node;
 
 /* Followed by corner indices, 3 x 8 bytes for every octet of triangles, and coordinates, 3 rows of 8 floats

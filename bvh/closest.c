@@ -142,16 +142,15 @@ static void run_search(search *s) {
         s->visits.boxes += 8;
         if (ref & FCT_REF_ORIENTED) {
             const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = near_oriented(node, centered, s->limit2, distance2);
+            met = near_oriented(node, centered, s->limit2, distance2) & node->present;
             child = node->child;
         } else {
             const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = near_axis(node, s->at, s->limit2, distance2);
+            met = near_axis(node, s->at, s->limit2, distance2) & node->present;
             child = node->child;
         }
         for (; met; met &= met - 1) {
             uint32_t i = (uint32_t)__builtin_ctz(met);
-            if (child[i] == FCT_NONE) continue;
             uint64_t waiting = wait_entry(distance2[i], child[i]);
             uint32_t at = height++;
             while (at > base && stack[at - 1] < waiting) stack[at] = stack[at - 1], --at;

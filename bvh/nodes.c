@@ -187,38 +187,37 @@ static void choose_kinds(void *user, size_t begin, size_t end, size_t chunk, uin
     for (size_t i = begin; i < end; ++i) choose_kind(job, &job->wide[i]);
 }
 
-static uint32_t child_ref(const node_job *job, uint32_t top_node, uint32_t wide_ref) {
-    const fct_top_node *node = &job->top->nodes[top_node];
-    if (node->left != FCT_NONE) return wide_ref;
-    return FCT_REF_LEAF | job->leaves->offsets[job->top->order[node->begin]];
-}
-
+/* Empty slots repeat child 0; the node's `present` leaves them out. */
 static void pack_axis(const node_job *job, const wide_node *wide, fct_axis_node *out) {
     for (uint32_t i = 0; i < 8; ++i) {
-        out->unused[i] = 0;
+        const float *b = job->top->nodes[wide->top[i < wide->count ? i : 0]].bounds;
         for (int k = 0; k < 3; ++k) {
-            const float *b = job->top->nodes[wide->top[i < wide->count ? i : 0]].bounds;
-            out->bounds[k][0][i] = i < wide->count ? nextafterf(b[k] - FCT_AXIS_PAD, -INFINITY) : INFINITY;
-            out->bounds[k][1][i] =
-                i < wide->count ? nextafterf(b[3 + k] + FCT_AXIS_PAD, INFINITY) : -INFINITY;
+            out->bounds[k][0][i] = nextafterf(b[k] - FCT_AXIS_PAD, -INFINITY);
+            out->bounds[k][1][i] = nextafterf(b[3 + k] + FCT_AXIS_PAD, INFINITY);
         }
     }
 }
 
 static void pack_oriented(const node_job *job, const wide_node *wide, fct_oriented_node *out) {
     for (uint32_t i = 0; i < 8; ++i) {
-        out->unused[i] = 0;
-        slabs s = {0};
-        if (i < wide->count) s = best_slabs(job, &job->top->nodes[wide->top[i]]);
+        slabs s = best_slabs(job, &job->top->nodes[wide->top[i < wide->count ? i : 0]]);
         for (int k = 0; k < 3; ++k) {
             double half = (s.upper[k] - s.lower[k]) / 2 + (double)FCT_ORIENTED_PAD;
             v3 row = v3_scale(s.axes[k], 1 / half);
             out->map[k][0][i] = (float)row.x;
             out->map[k][1][i] = (float)row.y;
             out->map[k][2][i] = (float)row.z;
-            /* A missing child maps everything to 4, outside. */
-            out->map[k][3][i] = i < wide->count ? (float)(-(s.upper[k] + s.lower[k]) / (2 * half)) : 4;
+            out->map[k][3][i] = (float)(-(s.upper[k] + s.lower[k]) / (2 * half));
         }
+    }
+}
+
+/* References to leaves; those to nodes follow in link_nodes. */
+static void pack_children(const node_job *job, const wide_node *wide, uint32_t child[8]) {
+    for (uint32_t i = 0; i < 8; ++i) {
+        const fct_top_node *node = &job->top->nodes[wide->top[i < wide->count ? i : 0]];
+        child[i] =
+            node->left == FCT_NONE ? FCT_REF_LEAF | job->leaves->offsets[job->top->order[node->begin]] : 0;
     }
 }
 
@@ -228,16 +227,18 @@ static void pack_nodes(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (size_t i = begin; i < end; ++i) {
         wide_node *wide = &job->wide[i];
         char *at = job->bvh->nodes + (size_t)(wide->ref & ~FCT_REF_ORIENTED) * FCT_REF_UNIT;
-        uint32_t *child;
+        uint32_t present = (1u << wide->count) - 1;
         if (wide->oriented) {
-            pack_oriented(job, wide, (fct_oriented_node *)(void *)at);
-            child = ((fct_oriented_node *)(void *)at)->child;
+            fct_oriented_node *node = (fct_oriented_node *)(void *)at;
+            *node = (fct_oriented_node){.present = present};
+            pack_oriented(job, wide, node);
+            pack_children(job, wide, node->child);
         } else {
-            pack_axis(job, wide, (fct_axis_node *)(void *)at);
-            child = ((fct_axis_node *)(void *)at)->child;
+            fct_axis_node *node = (fct_axis_node *)(void *)at;
+            *node = (fct_axis_node){.present = present};
+            pack_axis(job, wide, node);
+            pack_children(job, wide, node->child);
         }
-        for (uint32_t k = 0; k < 8; ++k)
-            child[k] = k < wide->count ? child_ref(job, wide->top[k], FCT_NONE) : FCT_NONE;
     }
 }
 

@@ -191,11 +191,11 @@ static inline bool traverse(traversal *t, bool any) {
         t->visits.boxes += 8;
         if (ref & FCT_REF_ORIENTED) {
             const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = meet_oriented(node, r, centered, t->hit.t, enter);
+            met = meet_oriented(node, r, centered, t->hit.t, enter) & node->present;
             child = node->child;
         } else {
             const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = meet_axis(node, r, t->hit.t, enter);
+            met = meet_axis(node, r, t->hit.t, enter) & node->present;
             child = node->child;
         }
         height = push_children(stack, height, met, enter, child);
