@@ -23,7 +23,8 @@ void fct_tree_destroy(fct_tree *tree) {
     fct_release(env, tree->materials);
     fct_release(env, tree->positions);
     fct_release(env, tree->colors);
-    for (uint32_t i = 0; tree->names && i < tree->view.material_count; ++i) fct_release(env, tree->names[i]);
+    bool own_names = tree->names && !tree->file.data;
+    for (uint32_t i = 0; own_names && i < tree->view.material_count; ++i) fct_release(env, tree->names[i]);
     fct_release(env, tree->names);
     fct_release(env, tree->source);
     fct_file_close(env, &tree->file);

@@ -19,7 +19,7 @@ extern "C" {
 
 typedef struct fct_tree fct_tree;
 
-/* One cluster; 136 bytes, as in the file. All in the mesh's own coordinates. */
+/* One cluster; 132 bytes, as in the file. All in the mesh's own coordinates. */
 typedef struct fct_cluster {
     float area;           /* sum A_k */
     float area_vector[3]; /* S = sum A_k n_k */

@@ -1,0 +1,132 @@
+/* cluster/structure.c: can this tree be walked safely?
+ *
+ * Every inner node's children have larger ids and their ranges are the two parts of its own; roots tile the
+ * faces. From that follows that each node is reached exactly once: ranges of different subtrees are disjoint,
+ * and F - R inner nodes above F leaves are exactly as many as there are. Chunks note the first thing wrong;
+ * the first chunk that has one is reported, whatever the threads. O(F).
+ */
+#include <string.h>
+
+#include "base/parallel.h"
+#include "cluster/file.h"
+
+enum { GRAIN = 1 << 14 };
+
+typedef struct fault {
+    const char *what; /* NULL: nothing wrong */
+    uint32_t id;
+} fault;
+
+typedef struct checker {
+    const fct_tree_view *view;
+    fault *faults;
+    uint32_t *seen; /* bits */
+} checker;
+
+static const char *node_fault(const fct_tree_view *view, uint32_t i) {
+    const fct_cluster *c = &view->clusters[i];
+    uint32_t nodes = view->node_count, faces = view->face_count, place = c->first;
+    if (c->count < 2 || c->count > faces || c->first > faces - c->count) return "range outside the faces";
+    if (!(c->cost <= (i ? view->clusters[i - 1].cost : INFINITY))) return "cost above that of a later merge";
+    for (int k = 0; k < 2; ++k) {
+        uint32_t child = c->child[k];
+        if (child <= i || child >= nodes + faces) return "child out of order";
+        uint32_t first = child < nodes ? view->clusters[child].first : child - nodes;
+        if (first != place) return "child's range is not part of its own";
+        uint32_t count = child < nodes ? view->clusters[child].count : 1;
+        if (count > faces - place) return "child's range is not part of its own";
+        place += count;
+    }
+    return place == c->first + c->count ? NULL : "children do not fill its range";
+}
+
+static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    checker *check = user;
+    for (size_t i = begin; i < end && !check->faults[chunk].what; ++i)
+        check->faults[chunk] = (fault){node_fault(check->view, (uint32_t)i), (uint32_t)i};
+}
+
+static void check_triangles(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    checker *check = user;
+    const fct_tree_view *view = check->view;
+    for (size_t f = begin; f < end && !check->faults[chunk].what; ++f) {
+        const uint32_t *t = view->triangles + 3 * f;
+        if (t[0] >= view->vertex_count || t[1] >= view->vertex_count || t[2] >= view->vertex_count)
+            check->faults[chunk] = (fault){"vertex out of range", (uint32_t)f};
+        else if (view->materials && view->materials[f] >= view->material_count)
+            check->faults[chunk] = (fault){"material out of range", (uint32_t)f};
+    }
+}
+
+static fct_result run(const fct_env *env, const char *name, const char *kind, size_t count, checker *check,
+                      fct_chunk_body *body) {
+    size_t chunks = fct_chunk_count(count, GRAIN);
+    memset(check->faults, 0, chunks * sizeof *check->faults);
+    fct_parallel_for(env, count, GRAIN, body, check);
+    for (size_t i = 0; i < chunks; ++i)
+        if (check->faults[i].what)
+            return fct_fail(env, FCT_ERROR_DATA, "%s: %s %u: %s", name, kind, check->faults[i].id,
+                            check->faults[i].what);
+    return FCT_OK;
+}
+
+static fct_result check_permutation(const fct_env *env, const char *name, const char *kind,
+                                    const uint32_t *ids, uint32_t count, uint32_t *seen) {
+    memset(seen, 0, ((size_t)count / 32 + 1) * sizeof *seen);
+    for (uint32_t i = 0; i < count; ++i) {
+        if (ids[i] >= count || seen[ids[i] / 32] >> ids[i] % 32 & 1)
+            return fct_fail(env, FCT_ERROR_DATA, "%s: %s at place %u has the input id %u, which is %s", name,
+                            kind, i, ids[i], ids[i] >= count ? "out of range" : "there twice");
+        seen[ids[i] / 32] |= 1u << ids[i] % 32;
+    }
+    return FCT_OK;
+}
+
+static fct_result check_roots(const fct_env *env, const char *name, const fct_tree_view *view) {
+    uint32_t place = 0;
+    for (uint32_t r = 0; r < view->root_count; ++r) {
+        uint32_t root = view->roots[r];
+        if (root >= view->node_count + view->face_count || (r && root <= view->roots[r - 1]))
+            return fct_fail(env, FCT_ERROR_DATA, "%s: root %u is out of order", name, r);
+        bool leaf = root >= view->node_count;
+        uint32_t first = leaf ? root - view->node_count : view->clusters[root].first;
+        if (first != place)
+            return fct_fail(env, FCT_ERROR_DATA, "%s: root %u does not begin where the one before it ends",
+                            name, r);
+        place += leaf ? 1 : view->clusters[root].count;
+    }
+    if (place == view->face_count) return FCT_OK;
+    return fct_fail(env, FCT_ERROR_DATA, "%s: the roots hold %u of %u faces", name, place, view->face_count);
+}
+
+static fct_result check_all(const fct_env *env, const char *name, fct_tree *tree, checker *check) {
+    const fct_tree_view *view = &tree->view;
+    fct_result result = run(env, name, "node", view->node_count, check, check_nodes);
+    if (result == FCT_OK) result = check_roots(env, name, view);
+    if (result == FCT_OK) result = run(env, name, "face at place", view->face_count, check, check_triangles);
+    if (result == FCT_OK)
+        result = check_permutation(env, name, "the face", view->face_ids, view->face_count, check->seen);
+    if (result == FCT_OK)
+        result =
+            check_permutation(env, name, "the vertex", view->vertex_ids, view->vertex_count, check->seen);
+    if (result == FCT_OK) result = fct_tree_measure_depth(tree);
+    if (result == FCT_OK && view->face_count > 1 && view->depth > 3 * log2(view->face_count))
+        result = fct_fail(env, FCT_ERROR_DATA, "%s: the tree is %u deep, more than 3 log2 of its %u faces",
+                          name, view->depth, view->face_count);
+    return result;
+}
+
+fct_result fct_tree_check_structure(const fct_env *env, const char *name, fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
+    size_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count;
+    checker check = {.view = view};
+    check.faults = fct_allocate(env, fct_chunk_count(most, GRAIN), sizeof *check.faults);
+    check.seen = fct_allocate(env, most / 32 + 1, sizeof *check.seen);
+    fct_result result = check.faults && check.seen ? check_all(env, name, tree, &check)
+                                                   : fct_fail_memory(env, "checking a hierarchy");
+    fct_release(env, check.faults);
+    fct_release(env, check.seen);
+    return result;
+}

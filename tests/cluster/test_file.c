@@ -1,0 +1,209 @@
+/* The hierarchy file: what is saved comes back, every cut and every flipped byte is an error or harmless, and
+ * a failed write leaves the old file. */
+#include "check_tree.h"
+
+#include <unistd.h>
+
+#include "base/file.h"
+#include "cluster/file.h"
+
+static const char *const path = "test_file.fct";
+
+static fct_tree *build_small(const fct_env *env, uint32_t n, fct_mesh *mesh) {
+    *mesh = make_sphere(env, n);
+    mesh->materials = fct_allocate(env, mesh->face_count, sizeof *mesh->materials);
+    mesh->colors = fct_allocate(env, mesh->vertex_count, 3 * sizeof *mesh->colors);
+    mesh->material_names = fct_allocate_zero(env, 2, sizeof *mesh->material_names);
+    mesh->material_count = 2;
+    for (int i = 0; i < 2; ++i) {
+        mesh->material_names[i] = fct_allocate(env, 8, 1);
+        snprintf(mesh->material_names[i], 8, "name %d", i);
+    }
+    for (uint32_t f = 0; f < mesh->face_count; ++f) mesh->materials[f] = f % 7 == 0;
+    for (uint32_t v = 0; v < 3 * mesh->vertex_count; ++v) mesh->colors[v] = (float)v;
+    fct_tree_def def = fct_tree_def_default();
+    def.source = "a sphere";
+    def.source_hash = 42;
+    fct_tree *tree = NULL;
+    assert_int_equal(fct_tree_build(env, mesh, &def, NULL, &tree), FCT_OK);
+    return tree;
+}
+
+static void same_trees(const fct_tree *a, const fct_tree *b) {
+    fct_tree_view p = fct_tree_get(a), q = fct_tree_get(b);
+    assert_int_equal(p.face_count, q.face_count);
+    assert_int_equal(p.vertex_count, q.vertex_count);
+    assert_int_equal(p.node_count, q.node_count);
+    assert_int_equal(p.root_count, q.root_count);
+    assert_int_equal(p.depth, q.depth);
+    assert_true(p.mean_depth == q.mean_depth);
+    assert_memory_equal(p.clusters, q.clusters, p.node_count * sizeof *p.clusters);
+    assert_memory_equal(p.roots, q.roots, 4 * p.root_count);
+    assert_memory_equal(p.face_ids, q.face_ids, 4 * p.face_count);
+    assert_memory_equal(p.vertex_ids, q.vertex_ids, 4 * p.vertex_count);
+    assert_memory_equal(p.triangles, q.triangles, 12 * p.face_count);
+    assert_memory_equal(p.positions, q.positions, 12 * p.vertex_count);
+    assert_memory_equal(p.colors, q.colors, 12 * p.vertex_count);
+    assert_memory_equal(p.materials, q.materials, 4 * p.face_count);
+    assert_int_equal(p.material_count, q.material_count);
+    for (uint32_t i = 0; i < p.material_count; ++i)
+        assert_string_equal(p.material_names[i], q.material_names[i]);
+    assert_string_equal(p.source, q.source);
+    assert_true(p.source_hash == q.source_hash);
+    assert_memory_equal(&p.def, &q.def, offsetof(fct_tree_def, source));
+}
+
+static void comes_back(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 8, &mesh), *back;
+    check_tree(tree, &mesh);
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    assert_int_equal(fct_tree_open(&env, path, &back), FCT_OK);
+    same_trees(tree, back);
+    assert_int_equal(fct_tree_verify(&env, tree), FCT_OK);
+    assert_int_equal(fct_tree_verify(&env, back), FCT_OK);
+    fct_mesh copy;
+    assert_int_equal(fct_tree_mesh(&env, back, &copy), FCT_OK);
+    assert_memory_equal(copy.triangles, mesh.triangles, 12 * mesh.face_count);
+    assert_memory_equal(copy.positions, mesh.positions, 12 * mesh.vertex_count);
+    assert_memory_equal(copy.colors, mesh.colors, 12 * mesh.vertex_count);
+    assert_memory_equal(copy.materials, mesh.materials, 4 * mesh.face_count);
+    assert_string_equal(copy.material_names[1], "name 1");
+    fct_mesh_release(&env, &copy);
+    fct_tree_destroy(back);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+    unlink(path);
+}
+
+static void one_face_comes_back(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    uint32_t triangle[3] = {0, 1, 2};
+    fct_mesh mesh = {.vertex_count = 3, .face_count = 1, .positions = positions, .triangles = triangle};
+    fct_tree_def def = fct_tree_def_default();
+    fct_tree *tree, *back;
+    assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
+    check_tree(tree, &mesh);
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    assert_int_equal(fct_tree_open(&env, path, &back), FCT_OK);
+    check_tree(back, &mesh);
+    assert_int_equal(fct_tree_get(back).roots[0], 0);
+    fct_tree_destroy(back);
+    fct_tree_destroy(tree);
+    unlink(path);
+}
+
+/* Walks everything a query could walk. */
+static void walk(const fct_tree *tree) {
+    fct_tree_view view = fct_tree_get(tree);
+    uint32_t *nodes = malloc(4 * (size_t)view.face_count), *labels = malloc(4 * (size_t)view.face_count);
+    for (uint32_t count = 0; count <= view.face_count; count += 1 + view.face_count / 5) {
+        uint32_t written = fct_tree_partition(tree, count, nodes);
+        assert_in_range(written, view.root_count, view.face_count);
+        fct_tree_labels(tree, nodes, written, labels);
+    }
+    fct_cluster leaf;
+    for (uint32_t p = 0; p < view.face_count; ++p) fct_tree_cluster(tree, view.node_count + p, &leaf);
+    for (uint32_t i = 0; i < view.material_count && view.material_names; ++i)
+        assert_true(strlen(view.material_names[i]) < 1000);
+    free(nodes);
+    free(labels);
+}
+
+static void damage_is_found(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 3, &mesh), *back;
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    fct_file file;
+    assert_int_equal(fct_file_open(&env, path, &file), FCT_OK);
+    unsigned char *bytes = malloc(file.size + 64);
+    memcpy(bytes, file.data, file.size);
+    size_t size = file.size;
+    fct_file_close(&env, &file);
+    for (size_t cut = 0; cut < size; ++cut) {
+        assert_int_equal(fct_tree_parse(&env, "cut", bytes, cut, &back), FCT_ERROR_DATA);
+        assert_null(back);
+    }
+    assert_int_equal(fct_tree_parse(&env, "long", bytes, size + 64, &back), FCT_ERROR_DATA);
+    uint32_t refused = 0, found = 0;
+    for (size_t i = 0; i < size; ++i) {
+        unsigned char old = bytes[i];
+        bytes[i] = (unsigned char)(old ^ (i % 3 ? 0x81 : 0xFF));
+        if (fct_tree_parse(&env, "flipped", bytes, size, &back) == FCT_OK) {
+            walk(back);
+            fct_result result = fct_tree_verify(&env, back);
+            assert_true(result == FCT_ERROR_DATA || i > 448); /* padding carries nothing */
+            found += result == FCT_ERROR_DATA;
+            fct_tree_destroy(back);
+        } else {
+            ++refused;
+        }
+        bytes[i] = old;
+    }
+    assert_true(refused > 448 && refused + found > size - 11 * 64);
+    free(bytes);
+    unlink(path);
+    assert_int_equal(quiet.alive, 0);
+}
+
+static void errors_are_told(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_tree *tree = NULL;
+    assert_int_equal(fct_tree_open(&env, "there-is-no-such-file.fct", &tree), FCT_ERROR_INPUT);
+    assert_null(tree);
+    assert_non_null(strstr(r.text, "there-is-no-such-file.fct"));
+    assert_int_equal(fct_tree_parse(&env, "ply", "ply\nformat ascii 1.0", 20, &tree), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "no hierarchy file"));
+    fct_mesh mesh;
+    tree = build_small(&env, 2, &mesh);
+    assert_int_equal(fct_tree_save(&env, tree, "/nowhere/at/all.fct"), FCT_ERROR_OUTPUT);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+}
+
+static void survives_no_memory(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    env.thread_count = 1;
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 3, &mesh), *back;
+    long before = r.alive;
+    for (r.fail_at = 1;; ++r.fail_at) {
+        r.allocations = 0;
+        fct_result result = fct_tree_save(&env, tree, path);
+        if (result == FCT_OK) result = fct_tree_open(&env, path, &back);
+        if (result == FCT_OK) {
+            result = fct_tree_verify(&env, back);
+            fct_tree_destroy(back);
+        }
+        assert_int_equal(r.alive, before);
+        if (result == FCT_OK) break;
+        assert_int_equal(result, FCT_ERROR_MEMORY);
+    }
+    assert_true(r.fail_at > 5);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+    unlink(path);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(comes_back), cmocka_unit_test(one_face_comes_back),
+                                       cmocka_unit_test(damage_is_found), cmocka_unit_test(errors_are_told),
+                                       cmocka_unit_test(survives_no_memory)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
