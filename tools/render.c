@@ -205,7 +205,7 @@ static int choose_frame(tool *t, const render_options *o, const drawing *d, draw
 
 /* Light grey behind surfaces, near black behind lit ones. */
 static picture_background default_background(const drawing *d) {
-    picture_background light = {{.60F, .64F, .69F}, {.86F, .87F, .88F}, false};
+    picture_background light = {{.42F, .46F, .51F}, {.76F, .77F, .78F}, false};
     picture_background dark = {{.008F, .009F, .011F}, {.022F, .023F, .026F}, false};
     return d->shading == DRAWING_LIGHT ? dark : light;
 }

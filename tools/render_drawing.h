@@ -18,7 +18,7 @@ typedef struct drawing {
     fct_mesh mesh;    /* world space */
     float *paint;     /* face_count x 3: what the faces reflect, or NULL */
     float *glow;      /* face_count x 3: what they give off, or NULL */
-    uint32_t *labels; /* face_count: cluster of each face, or NULL */
+    uint32_t *labels; /* face_count: cluster of each face, ascending, or NULL */
     uint8_t *lines;   /* face_count: bit i draws the side opposite corner i; or NULL */
     float *normals;   /* face_count x 3 x 3: a unit normal per corner, or NULL: flat */
     drawing_shading shading;
@@ -44,10 +44,11 @@ int drawing_load(tool *t, const drawing_source *source, drawing *out);
 void drawing_release(tool *t, drawing *d);
 
 /* --- render_shade.c --- */
-/* Normals and lines that the shading needs. `crease`: cosine of the angle above which an edge is sharp. */
+/* Normals, lines and clusters' colours that the shading needs. `crease`: cosine of the angle above which an
+ * edge is sharp. */
 int drawing_prepare(tool *t, drawing *d, double crease, bool wireframe);
 void drawing_shade(void *user, const raster_point *point, float rgb[3]);
-/* The i-th of any number of distinct colours that go well together; linear. */
+/* The i-th of a dozen colours that go well together, and again; linear. */
 void drawing_color(uint32_t i, float rgb[3]);
 
 /* --- render_camera.c --- */

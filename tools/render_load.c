@@ -228,19 +228,18 @@ static int make_cuts(tool *t, loader *l, uint32_t count) {
     return TOOL_DONE;
 }
 
-static int paint_clusters(tool *t, const loader *l, drawing *out) {
+/* Ascending through the faces of all parts; the colours come with the lines between them. */
+static int label_clusters(tool *t, const loader *l, drawing *out) {
     out->labels = tool_allocate(t, out->mesh.face_count, sizeof *out->labels);
     out->paint = tool_allocate(t, out->mesh.face_count, 3 * sizeof *out->paint);
     if (!out->labels || !out->paint) return TOOL_MEMORY;
-    for (uint32_t i = 0; i < l->cut_count; ++i) {
-        const cut *c = l->cuts + i;
-        size_t first = (size_t)l->parts[c->part].first_face + c->first;
-        float color[3];
-        drawing_color((uint32_t)first, color);
-        for (size_t f = first; f < first + c->count; ++f) {
-            out->labels[f] = i;
-            memcpy(out->paint + 3 * f, color, sizeof color);
-        }
+    memset(out->labels, 0, out->mesh.face_count * sizeof *out->labels);
+    /* A cluster's number is how many begin before it. */
+    for (uint32_t i = 0; i < l->cut_count; ++i)
+        ++out->labels[(size_t)l->parts[l->cuts[i].part].first_face + l->cuts[i].first];
+    for (uint32_t f = 0, number = 0; f < out->mesh.face_count; ++f) {
+        number += out->labels[f];
+        out->labels[f] = number - 1;
     }
     return TOOL_DONE;
 }
@@ -295,7 +294,7 @@ static int draw_parts(tool *t, const drawing_source *source, loader *l, drawing 
     if (code == TOOL_DONE && source->subject == DRAWING_BOXES) return draw_boxes(t, l, out);
     if (code == TOOL_DONE) code = lay_out(t, l, out);
     if (code == TOOL_DONE && source->subject == DRAWING_SURFACE) code = paint_materials(t, l, out);
-    if (code == TOOL_DONE && source->subject == DRAWING_CLUSTERS) code = paint_clusters(t, l, out);
+    if (code == TOOL_DONE && source->subject == DRAWING_CLUSTERS) code = label_clusters(t, l, out);
     return code;
 }
 

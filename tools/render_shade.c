@@ -89,28 +89,94 @@ static int make_normals(tool *t, drawing *d, const fans *around, double crease) 
     return code;
 }
 
-/* Whether another face with the side (a, b) belongs to another cluster. */
-static bool is_border(const drawing *d, const fans *around, uint32_t face, uint32_t a, uint32_t b) {
+/* Calls visit(user, label) for each face of another cluster that has the side (a, b) too. */
+typedef void visit_label(void *user, uint32_t label);
+
+static void visit_across(const drawing *d, const fans *around, uint32_t face, int side, visit_label *visit,
+                         void *user) {
+    const uint32_t *v = d->mesh.triangles + 3 * (size_t)face;
+    uint32_t a = v[(side + 1) % 3], b = v[(side + 2) % 3];
     uint32_t few = around->first[a + 1] - around->first[a] < around->first[b + 1] - around->first[b] ? a : b;
     uint32_t other = few == a ? b : a;
     for (uint32_t i = around->first[few]; i < around->first[few + 1]; ++i) {
         uint32_t f = around->faces[i];
         const uint32_t *t = d->mesh.triangles + 3 * (size_t)f;
-        if (d->labels[f] != d->labels[face] && (t[0] == other || t[1] == other || t[2] == other)) return true;
+        if (d->labels[f] != d->labels[face] && (t[0] == other || t[1] == other || t[2] == other))
+            visit(user, d->labels[f]);
     }
-    return false;
+}
+
+static void note_border(void *user, uint32_t label) {
+    (void)label;
+    *(bool *)user = true;
 }
 
 static int make_lines(tool *t, drawing *d, const fans *around, bool all) {
     d->lines = tool_allocate(t, d->mesh.face_count, 1);
     if (!d->lines) return TOOL_MEMORY;
     for (uint32_t f = 0; f < d->mesh.face_count; ++f) {
-        const uint32_t *v = d->mesh.triangles + 3 * (size_t)f;
         unsigned bits = all ? 7 : 0;
-        for (int i = 0; i < 3 && !all; ++i)
-            if (is_border(d, around, f, v[(i + 1) % 3], v[(i + 2) % 3])) bits |= 1U << i;
+        for (int i = 0; i < 3 && !all; ++i) {
+            bool border = false;
+            visit_across(d, around, f, i, note_border, &border);
+            bits |= (unsigned)border << i;
+        }
         d->lines[f] = (uint8_t)bits;
     }
+    return TOOL_DONE;
+}
+
+/* OKLCH to linear sRGB (Ottosson 2020): equal steps look equal, whatever the hue. */
+static void from_oklch(double lightness, double chroma, double hue, float rgb[3]) {
+    double a = chroma * cos(hue), b = chroma * sin(hue);
+    double l = lightness + .3963377774 * a + .2158037573 * b,
+           m = lightness - .1055613458 * a - .0638541728 * b,
+           s = lightness - .0894841775 * a - 1.2914855480 * b;
+    l = l * l * l, m = m * m * m, s = s * s * s;
+    rgb[0] = (float)fmax(0, 4.0767416621 * l - 3.3077115913 * m + .2309699292 * s);
+    rgb[1] = (float)fmax(0, -1.2684380046 * l + 2.6097574011 * m - .3413193965 * s);
+    rgb[2] = (float)fmax(0, -.0041960863 * l - .7034186147 * m + 1.7076147010 * s);
+}
+
+/* Twelve hues; neighbouring ones differ in lightness too. */
+enum { PALETTE = 12 };
+
+void drawing_color(uint32_t i, float rgb[3]) {
+    const double turn = 2 * 3.14159265358979323846;
+    uint32_t hue = i % PALETTE * 5 % PALETTE;
+    from_oklch(hue % 2 ? .68 : .80, hue % 2 ? .12 : .10, (hue + .4) / PALETTE * turn, rgb);
+}
+
+typedef struct coloring {
+    uint8_t *colors; /* of each label; PALETTE: none yet */
+    unsigned used[PALETTE];
+} coloring;
+
+static void note_color(void *user, uint32_t label) {
+    coloring *c = user;
+    if (c->colors[label] < PALETTE) ++c->used[c->colors[label]];
+}
+
+/* Gives each cluster, in order, the colour that its borders with coloured clusters have least of. The faces
+ * of a cluster follow one another. */
+static int paint_labels(tool *t, drawing *d, const fans *around) {
+    uint32_t faces = d->mesh.face_count, labels = faces ? d->labels[faces - 1] + 1 : 0;
+    coloring c = {.colors = tool_allocate(t, labels, 1)};
+    if (!c.colors) return TOOL_MEMORY;
+    memset(c.colors, PALETTE, labels);
+    for (uint32_t begin = 0, end; begin < faces; begin = end) {
+        uint32_t label = d->labels[begin], best = label % PALETTE;
+        memset(c.used, 0, sizeof c.used);
+        for (end = begin; end < faces && d->labels[end] == label; ++end)
+            for (int side = 0; side < 3; ++side) visit_across(d, around, end, side, note_color, &c);
+        for (uint32_t k = 1; k < PALETTE; ++k)
+            if (c.used[(label + k) % PALETTE] < c.used[best]) best = (label + k) % PALETTE;
+        c.colors[label] = (uint8_t)best;
+        float rgb[3];
+        drawing_color(best, rgb);
+        for (size_t f = begin; f < end; ++f) memcpy(d->paint + 3 * f, rgb, sizeof rgb);
+    }
+    tool_release(t, c.colors);
     return TOOL_DONE;
 }
 
@@ -126,40 +192,22 @@ int drawing_prepare(tool *t, drawing *d, double crease, bool wireframe) {
         tool_release(t, d->lines);
         d->lines = NULL;
     }
+    if (code == TOOL_DONE && d->labels) code = paint_labels(t, d, &around);
     if (code == TOOL_DONE && borders) code = make_lines(t, d, &around, wireframe);
     free_fans(t, &around);
     return code;
 }
 
-/* OKLCH to linear sRGB (Ottosson 2020): equal steps look equal, whatever the hue. */
-static void from_oklch(double lightness, double chroma, double hue, float rgb[3]) {
-    double a = chroma * cos(hue), b = chroma * sin(hue);
-    double l = lightness + .3963377774 * a + .2158037573 * b,
-           m = lightness - .1055613458 * a - .0638541728 * b,
-           s = lightness - .0894841775 * a - 1.2914855480 * b;
-    l = l * l * l, m = m * m * m, s = s * s * s;
-    rgb[0] = (float)fmax(0, 4.0767416621 * l - 3.3077115913 * m + .2309699292 * s);
-    rgb[1] = (float)fmax(0, -1.2684380046 * l + 2.6097574011 * m - .3413193965 * s);
-    rgb[2] = (float)fmax(0, -.0041960863 * l - .7034186147 * m + 1.7076147010 * s);
-}
-
-void drawing_color(uint32_t i, float rgb[3]) {
-    const double turn = 2 * 3.14159265358979323846, golden = .61803398874989484820;
-    double hue = fmod(i * golden, 1) * turn;
-    double step = fmod(i * golden * golden * 5, 1);
-    from_oklch(.70 + .16 * (step - .4), .115, hue, rgb);
-}
-
-/* Light that falls on a unit normal; the sky is cool, the key warm, the floor gives a little back. */
+/* Light that falls on a unit normal; the sky is cool, the key warm, the ground gives a little back. */
 static void studio(const drawing *d, const float n[3], const float to_eye[3], float rgb[3], float *gloss) {
-    static const float sky[3] = {.43F, .47F, .54F}, floor_[3] = {.20F, .17F, .15F},
-                       key[3] = {.78F, .73F, .66F}, fill[3] = {.14F, .17F, .22F};
+    static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.135F, .115F, .10F},
+                       key[3] = {.92F, .85F, .75F}, fill[3] = {.07F, .09F, .13F};
     float up = .5F + .5F * dot(n, d->light[2]), k = fmaxf(dot(n, d->light[0]), 0),
           f = fmaxf(dot(n, d->light[1]), 0);
     float rim = 1 - fmaxf(dot(n, to_eye), 0);
     rim = .12F * rim * rim * rim * up;
     for (int i = 0; i < 3; ++i)
-        rgb[i] = floor_[i] + (sky[i] - floor_[i]) * up + key[i] * k + fill[i] * f + rim;
+        rgb[i] = ground[i] + (sky[i] - ground[i]) * up + key[i] * k + fill[i] * f + rim;
     float half[3];
     for (int i = 0; i < 3; ++i) half[i] = d->light[0][i] + to_eye[i];
     normalize(half);
@@ -182,7 +230,7 @@ static void find_normal(const drawing *d, const raster_point *point, float n[3])
 
 static void find_paint(const drawing *d, const raster_point *point, float rgb[3]) {
     const uint32_t *v = d->mesh.triangles + 3 * (size_t)point->face;
-    static const float plaster[3] = {.76F, .73F, .69F};
+    static const float plaster[3] = {.62F, .59F, .55F};
     const float *face = d->paint              ? d->paint + 3 * (size_t)point->face
                         : d->mesh.face_colors ? d->mesh.face_colors + 3 * (size_t)point->face
                                               : plaster;
