@@ -1,7 +1,10 @@
 /* tools/tool_main.c: one subcommand from its arguments to its exit code. argp reads the options and is kept
  * silent, so that what it cannot parse is told in one line here. */
+#define _GNU_SOURCE
 #include "tools/tool.h"
 
+#include <ctype.h>
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,6 +29,7 @@ typedef struct arguments {
     const tool_command *command;
     void *options;
     int action; /* 'h', KEY_USAGE, KEY_MAN, or 0 to run */
+    int next;   /* the word after the one that could not be parsed */
 } arguments;
 
 static bool takes_output(const tool_command *command) {
@@ -91,6 +95,9 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
         return parse_positional(a, text, state);
     case ARGP_KEY_END:
         return check_arguments(a, state);
+    case ARGP_KEY_ERROR:
+        a->next = state->next;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -178,17 +185,20 @@ static char *help_text(const tool_command *command) {
     size_t size = strlen(command->summary) + strlen(text) + 4;
     char *doc = malloc(size);
     if (doc) snprintf(doc, size, "%s\n\v%s", command->summary, text);
+    if (doc) doc[0] = (char)toupper((unsigned char)doc[0]);
     return doc;
 }
 
 static int act(const tool_command *command, const struct argp *argp, int action) {
     char name[64];
     snprintf(name, sizeof name, "facetree %s", command->name);
+    setenv("ARGP_HELP_FMT", "no-dup-args-note", 0);
     if (action == KEY_MAN)
         tool_print_man(command, common_options);
     else
         argp_help(argp, stdout,
-                  action == 'h' ? ARGP_HELP_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC : ARGP_HELP_USAGE, name);
+                  action == 'h' ? ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC : ARGP_HELP_USAGE,
+                  name);
     return fflush(stdout) || ferror(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 
@@ -204,7 +214,7 @@ static int run(tool *t, const tool_command *command, void *options) {
 
 int tool_main(const tool_command *command, int argc, char **argv, void *options) {
     tool t = {.name = command->name, .start = tool_seconds()};
-    arguments a = {&t, command, options, 0};
+    arguments a = {.tool = &t, .command = command, .options = options};
     const struct argp own = {.options = command->options, .parser = command->parse};
     const struct argp_child children[] = {{&own, 0, NULL, 0}, {0}};
     char *doc = help_text(command);
@@ -220,9 +230,8 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
                               .args_doc = command->synopsis,
                               .doc = doc,
                               .children = children};
-    int next = 0;
-    error_t error = argp_parse(&argp, argc, argv, ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, &next, &a);
-    if (error && error != ECANCELED) say_bad_option(command, next, argc, argv);
+    error_t error = argp_parse(&argp, argc, argv, ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &a);
+    if (error && error != ECANCELED) say_bad_option(command, a.next, argc, argv);
     code = error ? TOOL_USAGE : a.action ? act(command, &argp, a.action) : run(&t, command, options);
 done:
     free(doc);
