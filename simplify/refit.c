@@ -17,7 +17,7 @@
 /* Distances below this, in the unit cube, are rounding of the input's floats. */
 #define NOISE 1e-7
 
-enum { SAMPLES_AT_ONCE = 1 << 16 };
+enum { SAMPLES_AT_ONCE = 1 << 16, MAX_STEPS = 4 };
 
 /* Where a sample came to lie: a face of the result, and barycentrics of its second and third corner. */
 typedef struct landing {
@@ -122,6 +122,37 @@ static v3 sample_position(const fct_simplifier *s, const uint32_t *corners, uint
     return count == 1 ? sum : v3_scale(sum, 1. / 3);
 }
 
+/* Goes on from a foot on the rim of the rings searched to the rings of that side's ends, while it gets
+ * nearer. */
+static void walk(const fct_simplifier *s, const uint32_t *points, uint32_t count, v3 p, foot *best,
+                 landing *out) {
+    uint32_t searched[3 + 2 * MAX_STEPS], number = count;
+    memcpy(searched, points, count * sizeof *points);
+    for (uint32_t step = 0; step < MAX_STEPS && out->face != FCT_NONE; ++step) {
+        const uint32_t *t = s->triangles + 3 * (size_t)out->face;
+        double b[3] = {1 - best->u - best->v, best->u, best->v};
+        uint32_t fresh = number, face = out->face;
+        bool inside = true, met[3];
+        for (uint32_t k = 0; k < 3; ++k) {
+            met[k] = false;
+            for (uint32_t j = 0; j < number; ++j) met[k] |= searched[j] == t[k];
+            if (met[k] && b[k] > 1e-6) return;
+            inside &= b[k] > 1e-6;
+        }
+        if (inside) return;
+        for (uint32_t k = 0; k < 3; ++k)
+            if (!met[k] && b[k] > 1e-6) searched[fresh++] = t[k];
+        for (; number < fresh; ++number) {
+            uint32_t wedge = FCT_NONE;
+            for (uint32_t k = 0; k < 3 && s->corner_wedges; ++k)
+                if (s->triangles[3 * (size_t)face + k] == searched[number])
+                    wedge = s->wedge_parents[s->corner_wedges[3 * (size_t)face + k]];
+            search_ring(s, searched[number], wedge, p, best, out);
+        }
+        if (out->face == face) return;
+    }
+}
+
 static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     refit *r = user;
@@ -138,6 +169,7 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
             if ((k > 0 && points[k] == points[0]) || (k > 1 && points[k] == points[1])) continue;
             search_ring(s, points[k], s->corner_wedges ? s->wedge_parents[input] : FCT_NONE, p, &best, out);
         }
+        walk(s, points, count, p, &best, out);
         out->u = (float)best.u, out->v = (float)best.v;
     }
 }

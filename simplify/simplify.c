@@ -90,15 +90,18 @@ static void normalize_normals(fct_mesh *out) {
 }
 
 static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
-    if (!mesh->material_names) return FCT_OK;
+    if (!mesh->material_names) {
+        out->material_count = mesh->material_count;
+        return FCT_OK;
+    }
     out->material_names = fct_allocate_zero(env, mesh->material_count, sizeof *out->material_names);
     if (!out->material_names) return fct_fail_memory(env, "material names");
-    out->material_count = mesh->material_count;
     for (uint32_t i = 0; i < mesh->material_count; ++i) {
         size_t length = strlen(mesh->material_names[i]) + 1;
         out->material_names[i] = fct_allocate(env, length, 1);
         if (!out->material_names[i]) return fct_fail_memory(env, "material names");
         memcpy(out->material_names[i], mesh->material_names[i], length);
+        out->material_count = i + 1;
     }
     return FCT_OK;
 }
