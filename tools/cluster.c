@@ -117,10 +117,7 @@ static int cluster_file(tool *t, const fct_tree_def *options, const char *input,
     t->items = mesh.face_count;
     t->unit = "faces";
     code = tool_result(t, fct_tree_build(&t->env, &mesh, &def, &stats, &tree));
-    if (code != TOOL_DONE) {
-        tool_fail(t, code, "%s", input);
-        goto done;
-    }
+    if (tool_context(t, code, input) != TOOL_DONE) goto done;
     double before = tool_seconds();
     code = tool_result(t, fct_tree_save(&t->env, tree, output));
     double end = tool_seconds();

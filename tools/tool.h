@@ -101,6 +101,8 @@ void tool_env_open(tool *t);
 int tool_env_close(tool *t, int code);
 /* Records an error ("file: place: what was expected, what was found") and returns `code`. */
 int tool_fail(tool *t, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* Names the file an error is about, where its text does not; returns `code`. */
+int tool_context(tool *t, int code, const char *path);
 /* The exit code of a library call; TOOL_DONE for FCT_OK. The library's message was recorded by the hook. */
 int tool_result(tool *t, fct_result result);
 /* A line for people: on stdout, on stderr where stdout carries data, nowhere with --quiet or --json. */

@@ -1,8 +1,8 @@
 /* tools/tool_env.c: the environment of a command: memory under a limit, the bar, messages, interruption, and
  * the outcome as an exit code with one line on stderr.
  *
- * --max-memory counts what the library allocates; the process's data limit, somewhat above it, catches what
- * wrapped C++ libraries allocate behind its back.
+ * --max-memory counts the program itself and what the library allocates (not files that are mapped); the
+ * process's data limit, somewhat above it, catches what wrapped C++ libraries allocate behind its back.
  */
 #define _GNU_SOURCE
 #include "tools/tool.h"
@@ -75,15 +75,20 @@ void tool_release(tool *t, void *memory) {
     if (memory) limited_release(t, memory);
 }
 
-/* VmHWM is of this program alone; getrusage's figure would include what was there before exec. */
-size_t tool_peak_bytes(void) {
-    size_t peak = 0;
-    FILE *file = fopen("/proc/self/status", "r");
+static size_t status_bytes(const char *format) {
+    size_t kilobytes = 0;
+    FILE *file = fopen("/proc/self/status", "re");
     char line[256];
     while (file && fgets(line, sizeof line, file))
-        if (sscanf(line, "VmHWM: %zu", &peak) == 1) break;
+        if (sscanf(line, format, &kilobytes) == 1) break;
     if (file) fclose(file);
-    if (peak) return peak * 1024;
+    return kilobytes * 1024;
+}
+
+/* VmHWM is of this program alone; getrusage's figure would include what was there before exec. */
+size_t tool_peak_bytes(void) {
+    size_t peak = status_bytes("VmHWM: %zu");
+    if (peak) return peak;
     struct rusage usage;
     return getrusage(RUSAGE_SELF, &usage) ? 0 : (size_t)usage.ru_maxrss * 1024;
 }
@@ -96,7 +101,7 @@ static void clear_bar(tool *t) {
 }
 
 static void format_rate(const tool *t, double done, double elapsed, char *text, size_t size) {
-    if (!(elapsed > 0)) {
+    if (elapsed < 0.05) {
         *text = 0;
         return;
     }
@@ -167,6 +172,14 @@ int tool_fail(tool *t, int code, const char *format, ...) {
     return code;
 }
 
+int tool_context(tool *t, int code, const char *path) {
+    if (code == TOOL_DONE || strstr(t->error, path)) return code;
+    char text[sizeof t->error];
+    snprintf(text, sizeof text, "%s", t->error);
+    t->error[0] = 0;
+    return tool_fail(t, code, "%s: %s", path, text);
+}
+
 /* Errors are kept for the end: the library may recover, and a failed call may be told in two steps. */
 static void take_message(void *user, fct_severity severity, const char *text) {
     tool *t = user;
@@ -218,7 +231,8 @@ int tool_json(tool *t, json_t *object) {
     if (!object) return t->json ? tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output") : TOOL_DONE;
     if (t->json) {
         clear_bar(t);
-        if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) || fputc('\n', stdout) == EOF)
+        if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) ||
+            fputc('\n', stdout) == EOF)
             code = tool_fail(t, TOOL_OUTPUT, "standard output cannot be written");
     }
     json_decref(object);
@@ -233,7 +247,10 @@ void tool_env_open(tool *t) {
     t->env.progress = show_progress;
     t->env.message = take_message;
     t->env.memory_user = t->env.progress_user = t->env.message_user = t;
-    if (t->max_memory) limit_data(t);
+    if (t->max_memory) {
+        t->memory_now = status_bytes("VmRSS: %zu"); /* the program itself counts, too */
+        limit_data(t);
+    }
     /* The first signal lets the command clean up, the second ends it. */
     struct sigaction action = {.sa_handler = interrupt, .sa_flags = SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);

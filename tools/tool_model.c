@@ -22,7 +22,7 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
     else
         code = tool_result(t, fct_tree_build(&t->env, &mesh, def ? def : &usual, NULL, tree));
     fct_mesh_release(&t->env, &mesh);
-    return code;
+    return tool_context(t, code, path);
 }
 
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
