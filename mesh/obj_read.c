@@ -15,7 +15,7 @@
 #include "mesh/text.h"
 
 typedef struct counts {
-    size_t vertices, texcoords, normals, faces, corners, widest;
+    size_t vertices, texcoords, normals, faces, corners;
 } counts;
 
 typedef struct reader {
@@ -75,16 +75,19 @@ static void count_face(fct_text *t, counts *c) {
 /* Both passes have to cut the text at the same places: what is counted here is the size of the arrays. */
 static void count_statements(fct_text t, counts *c) {
     while (fct_text_skip_lines(&t, '#')) {
-        char first = *t.p, second = t.p + 1 < t.end ? t.p[1] : '\n';
+        const char *p = t.p;
+        size_t left = (size_t)(t.end - p);
+        char first = *p, second = left > 1 ? p[1] : '\n', third = left > 2 ? p[2] : '\n';
         if (first == 'v') {
             c->vertices += fct_text_is_blank(second);
-            c->texcoords += second == 't';
-            c->normals += second == 'n';
+            c->texcoords += second == 't' && fct_text_is_blank(third);
+            c->normals += second == 'n' && fct_text_is_blank(third);
         } else if (first == 'f' && fct_text_is_blank(second)) {
             ++t.p;
             count_face(&t, c);
         }
-        if (first != 'u' || t.end - t.p < 6 || memcmp(t.p, "usemtl", 6))
+        bool name = left > 6 && !memcmp(p, "usemtl", 6) && fct_text_is_blank(p[6]);
+        if (!name)
             while (!at_line_end(&t)) skip_word(&t);
         fct_text_next_line(&t);
     }
