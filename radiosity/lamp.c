@@ -130,8 +130,9 @@ static void add_minor(query *q, const double light[3], double sum, double irradi
     for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * (all[k] > 0 ? seen[k] / all[k] : grey);
 }
 
-static void gather(query *q, double irradiance[3]) {
-    double minor = 0, minor_light[3] = {0, 0, 0};
+/* Returns the light that would arrive, over the channels, if all were visible. */
+static double gather(query *q, double irradiance[3]) {
+    double minor = 0, open = 0, minor_light[3] = {0, 0, 0};
     fct_cut cut;
     for (int k = 0; k < 3; ++k) irradiance[k] = 0;
     for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate(q, q->lamps->lamps + i);
@@ -145,12 +146,14 @@ static void gather(query *q, double irradiance[3]) {
         if (!major) minor += share;
         double light = cut.light < 1 ? cut.light : 1;
         if (light <= 0) continue;
+        open += light * lamp->strength;
         if (q->base_rays && major) light *= visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);
         double *to = q->base_rays && !major ? minor_light : irradiance;
         for (int k = 0; k < 3; ++k) to[k] += light * lamp->emission[k];
     }
     if (minor_light[0] + minor_light[1] + minor_light[2] > 0)
         add_minor(q, minor_light, minor, irradiance, &cut);
+    return open;
 }
 
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
@@ -159,9 +162,9 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
     gather(&q, irradiance);
 }
 
-void fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
-                      const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                      double irradiance[3], uint64_t *rays) {
+double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
+                        const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
+                        double irradiance[3], uint64_t *rays) {
     query q = {.lamps = lamps,
                .scene = scene,
                .point = point,
@@ -169,8 +172,9 @@ void fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const doub
                .seed = item_seed,
                .base_rays = base_rays};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)(point[k] + offset * normal[k]);
-    gather(&q, irradiance);
+    double open = gather(&q, irradiance);
     if (rays) *rays += q.rays;
+    return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
 }
 
 uint32_t fct_lamps_count(const fct_lamps *lamps) {
@@ -218,11 +222,12 @@ fct_result fct_lamps_create(const fct_env *env, const fct_scene *scene, fct_lamp
     *out = NULL;
     fct_lamps *lamps = fct_allocate_zero(env, 1, sizeof *lamps);
     double *areas = fct_allocate(env, view.instance_count, sizeof *areas);
+    if (lamps) lamps->env = env;
     if (!lamps || !areas) {
         result = fct_fail_memory(env, "lamps");
         goto done;
     }
-    lamps->env = env, lamps->instance_count = view.instance_count;
+    lamps->instance_count = view.instance_count;
     lamps->sampled = fct_allocate_zero(env, view.instance_count, sizeof *lamps->sampled);
     lamps->lamps = fct_allocate(env, view.instance_count, sizeof *lamps->lamps);
     if (!lamps->sampled || !lamps->lamps) {

@@ -29,9 +29,11 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
 /* The same with shadows. Rays start at point + offset * normal; for each lamp base_rays (4 is good) are sent,
  * 16 where they disagree, up to 64 where what is uncertain is a large part of the light; lamps that together
  * matter little share their rays. item_seed names the receiver: equal seeds give equal rays. *rays (may be
- * NULL) grows by the rays sent. base_rays 0: as fct_lamps_unoccluded. Any number of threads at once. */
-void fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
-                      const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                      double irradiance[3], uint64_t *rays);
+ * NULL) grows by the rays sent. base_rays 0: as fct_lamps_unoccluded. Any number of threads at once. Returns
+ * the visible fraction, over all lamps by power; 0 where no lamp shines, hidden or not. Four rays that agree
+ * by chance stop the search: send 16 where the fraction differs from a neighbour's. */
+double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
+                        const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
+                        double irradiance[3], uint64_t *rays);
 
 #endif

@@ -15,7 +15,10 @@
 
 #include <string.h>
 
-#define RELATIVE_ERROR .004
+#define RELATIVE_ERROR .012
+#define FAR_ERROR      .004
+#define BEND_ERROR     .6
+#define PLATE_VARIANCE .29 /* of the squared half side: 1/3 for a rectangle, 1/4 for an ellipse */
 #define SHARE_ERROR    3e-4
 #define STACK_SIZE     256
 #define TABLE_CLUSTERS 4096
@@ -24,6 +27,7 @@
 /* What a node sends: an estimate, an upper bound of it, and the error to be expected. */
 typedef struct outlook {
     double light, upper, error;
+    bool whole; /* the node faces the receiver and lies above its horizon wholly */
 } outlook;
 
 static v3 direct_vector(const double m[12], v3 p) {
@@ -81,12 +85,12 @@ static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, co
     v3 middle = v3_sub(v3_load(c->box_center), rec->x), d = v3_sub(v3_load(c->centroid), rec->x);
     double half2 = v3_norm2(v3_load(c->box_half)), shift2 = v3_norm2(v3_sub(d, middle));
     double radius = sqrt(half2) + sqrt(shift2), r2 = v3_norm2(d), height = v3_dot(d, rec->n);
-    if (height <= -radius) return (outlook){0, 0, 0};
+    if (height <= -radius) return (outlook){0};
     double r = sqrt(r2), floor2 = r2 > radius * radius ? r2 : radius * radius;
     double spread = radius < r ? radius / r : 1, cosx = r > 0 ? height / r : 0;
     v3 w = r > 0 ? v3_scale(d, 1 / r) : rec->n;
     int side = cluster_side(c, w, spread);
-    if (side < 0 && !lamp->two_sided) return (outlook){0, 0, 0};
+    if (side < 0 && !lamp->two_sided) return (outlook){0};
     double toward = -v3_dot(v3_load(c->area_vector), w), kernel = 1 / (FCT_PI * floor2);
     double cross =
         sqrt((double)c->area * fmax(0, sym3_form((double[6]){c->moment[0], c->moment[1], c->moment[2],
@@ -100,11 +104,32 @@ static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, co
     double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
     if (side && cosx >= spread && spread < .5) {
         double light = fabs(toward) * cosx * kernel, cosy = fmax(.05, fabs(toward) / c->area);
-        double rms2 = half2 / 3 + shift2;
-        return (outlook){light, widest * top, light * rms2 / r2 * (1 / fmax(.05, cosx) + 1 / cosy)};
+        double rms = sqrt(half2 / 3 + shift2) / r, bend = fmin(c->cone_angle, 1);
+        double error = rms * rms * (1 / fmax(.05, cosx) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
+        return (outlook){light, widest * top, light * error, true};
     }
     double light = (.5 * (lower + upper)) * clipped_mean(cosx, spread) * kernel;
-    return (outlook){light, widest * top, widest * top - (side ? lower * bottom : 0)};
+    return (outlook){light, widest * top, widest * top - (side ? lower * bottom : 0), false};
+}
+
+/* The mean of (n.y) (s.y) / |y|^4 over a surface about y = d over its value at d, to second order, less 1.
+ * The covariance is given as three axes: sum_k axis_k axis_k^T. */
+static double kernel_correction(v3 d, v3 n, v3 s, const v3 axes[3]) {
+    double a = v3_dot(n, d), b = v3_dot(s, d), r2 = v3_norm2(d), sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        double na = v3_dot(n, axes[k]), sa = v3_dot(s, axes[k]), da = v3_dot(d, axes[k]) / r2;
+        sum += na * sa / (a * b) - 4 * da * (sa / b + na / a) - 2 * v3_norm2(axes[k]) / r2 + 12 * da * da;
+    }
+    return sum;
+}
+
+/* The same for a cluster taken as a flat plate that fills its box. */
+static double cluster_correction(const fct_receiver *rec, const fct_cluster *c) {
+    fct_box box;
+    v3 axes[3];
+    fct_cluster_box(c, &box);
+    for (int k = 0; k < 3; ++k) axes[k] = v3_scale(v3_load(box.axes[k]), box.half[k] * sqrt(PLATE_VARIANCE));
+    return kernel_correction(v3_sub(v3_load(c->centroid), rec->x), rec->n, v3_load(c->area_vector), axes);
 }
 
 /* A triangle: exact, or the far formula. Corners relative to x. */
@@ -118,8 +143,11 @@ static double triangle_light(const fct_lamp *lamp, const fct_receiver *rec, cons
            r2 = v3_norm2(d);
     double r = sqrt(r2), cosx = v3_dot(d, rec->n) / r, cosy = fabs(height) / (length * r);
     double low = fmin(v3_dot(p[0], rec->n), fmin(v3_dot(p[1], rec->n), v3_dot(p[2], rec->n)));
-    if (low > 0 && size2 / 36 * (cosx + cosy) < RELATIVE_ERROR * r2 * cosx * cosy)
-        return .5 * length * cosx * cosy / (FCT_PI * r2);
+    if (low > 0 && size2 / 36 * (cosx + cosy) < RELATIVE_ERROR * r2 * cosx * cosy) {
+        v3 axes[3] = {v3_scale(v3_sub(p[1], p[0]), 1. / 6), v3_scale(v3_sub(p[2], p[0]), 1. / 6),
+                      v3_scale(e, 1. / 6)};
+        return .5 * length * cosx * cosy / (FCT_PI * r2) * (1 + kernel_correction(d, rec->n, cross, axes));
+    }
     *near = size2 > r2;
     return fct_triangle_irradiance(p, rec->n);
 }
@@ -174,6 +202,7 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
         if (o.upper <= 0) continue;
         bool full = depth + 2 > STACK_SIZE || cut->count + depth + 1 > FCT_CUT_SIZE;
         if (full || o.error <= share || o.error <= RELATIVE_ERROR * o.light) {
+            if (o.whole) o.light *= 1 + fmin(fmax(cluster_correction(rec, c), -.1), .1);
             fits = cut_add(cut, node, 1, o.light) && !full && fits;
         } else {
             stack[depth++] = c->child[1];
@@ -209,7 +238,7 @@ static bool far_light(const fct_lamp *lamp, const fct_receiver *rec, double *lig
     if (height <= -lamp->radius) return true;
     if (!lamp->table || height < lamp->radius) return false;
     double r = sqrt(r2), cosx = height / r;
-    if (lamp->rms2 * (1 + 1 / cosx) > RELATIVE_ERROR * r2) return false;
+    if (lamp->rms2 * (1 + 1 / cosx) > FAR_ERROR * r2) return false;
     *light = table_light(lamp->table, v3_scale(d, -1 / r)) * cosx / (FCT_PI * r2);
     return true;
 }

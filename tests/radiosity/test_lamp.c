@@ -1,0 +1,395 @@
+/* Direct light of lamps: closed forms, brute force over triangles, shadows, and odd places to stand. */
+#include "place.h"
+#include "radiosity/lamp.h"
+#include "radiosity/polygon.h"
+
+typedef struct fixture {
+    fct_env env;
+    fct_scene *scene;
+    fct_lamps *lamps;
+} fixture;
+
+static fct_env plain; /* outlives every scene */
+
+static fixture begin(void) {
+    plain = fct_env_default();
+    fixture f = {.env = plain};
+    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &f.scene), FCT_OK);
+    return f;
+}
+
+/* A far square that is most of the scene's area, so that no lamp counts as too large. */
+static void add_ground(fixture *f) {
+    uint32_t grey = place_material(f->scene, .5, 0, false);
+    place_sheet(&f->env, f->scene, grey, 1, v3_make(-50, -50, -60), v3_make(100, 0, 0), v3_make(0, 100, 0));
+}
+
+static void light_up(fixture *f) {
+    assert_int_equal(fct_scene_commit(f->scene), FCT_OK);
+    assert_int_equal(fct_lamps_create(&plain, f->scene, &f->lamps), FCT_OK);
+}
+
+static void end(fixture *f) {
+    fct_lamps_destroy(f->lamps);
+    fct_scene_destroy(f->scene);
+}
+
+static double open_light(const fixture *f, v3 p, v3 n) {
+    double point[3] = {p.x, p.y, p.z}, normal[3] = {n.x, n.y, n.z}, e[3];
+    fct_lamps_unoccluded(f->lamps, point, normal, e);
+    assert_true(e[0] == e[1] && e[1] == e[2] && isfinite(e[0]) && e[0] >= 0);
+    return e[0];
+}
+
+static double lit(const fixture *f, v3 p, v3 n, double offset, uint64_t seed, uint64_t *rays) {
+    double point[3] = {p.x, p.y, p.z}, normal[3] = {n.x, n.y, n.z}, e[3];
+    fct_lamps_direct(f->lamps, f->scene, point, normal, offset, seed, 4, e, rays);
+    assert_true(isfinite(e[0]) && e[0] >= 0);
+    return e[0];
+}
+
+static void assert_near(double value, double expected, double tolerance) {
+    if (!(fabs(value - expected) <= tolerance * fabs(expected)))
+        fail_msg("%.9g, expected %.9g within %g", value, expected, tolerance);
+}
+
+static const v3 up = {0, 0, 1}, down = {0, 0, -1};
+
+/* Mean over a k x k grid of the unit square at height 0, facing up. */
+static double square_mean(const fixture *f, int k) {
+    double sum = 0;
+    for (int i = 0; i < k * k; ++i) sum += open_light(f, v3_make((i % k + .5) / k, (i / k + .5) / k, 0), up);
+    return sum / (k * k);
+}
+
+static void parallel_squares(void **state) {
+    (void)state;
+    for (uint32_t n = 1; n <= 16; n *= 16) {
+        fixture f = begin();
+        add_ground(&f);
+        place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), n, v3_make(0, 0, 1),
+                    v3_make(0, 1, 0), v3_make(1, 0, 0));
+        light_up(&f);
+        assert_near(square_mean(&f, 40), .199824896, n == 1 ? 2e-4 : 2e-3);
+        end(&f);
+    }
+}
+
+static void perpendicular_squares(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), 1, v3_make(0, 0, 0), v3_make(0, 1, 0),
+                v3_make(0, 0, 1));
+    light_up(&f);
+    assert_near(square_mean(&f, 100), .200043776, 2e-3);
+    end(&f);
+}
+
+static void equal_disks(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    fct_mesh disk = make_disk(&f.env, 256, v3_make(0, 0, 1), 1, false);
+    place_mesh(f.scene, &disk, place_material(f.scene, 0, 1, false), NULL);
+    fct_mesh_release(&f.env, &disk);
+    light_up(&f);
+    double sum = 0;
+    for (int i = 0; i < 200; ++i) sum += open_light(&f, v3_make(sqrt((i + .5) / 200), 0, 0), up) / 200;
+    assert_near(sum, .381966011, 2e-3);
+    end(&f);
+}
+
+static void disk_with_blocker(void **state) {
+    (void)state;
+    for (int blocked = 0; blocked < 2; ++blocked) {
+        fixture f = begin();
+        add_ground(&f);
+        fct_mesh disk = make_disk(&f.env, 256, v3_make(0, 0, 2), 1, false);
+        place_mesh(f.scene, &disk, place_material(f.scene, 0, 1, false), NULL);
+        fct_mesh_release(&f.env, &disk);
+        disk = make_disk(&f.env, 256, v3_make(0, 0, 1), .3, true);
+        if (blocked) place_mesh(f.scene, &disk, place_material(f.scene, 0, 0, false), NULL);
+        fct_mesh_release(&f.env, &disk);
+        light_up(&f);
+        assert_near(open_light(&f, v3_make(0, 0, 0), up), .2, 1e-3);
+        double sum = 0, square = 0;
+        for (uint64_t seed = 0; seed < 400; ++seed) {
+            double point[3] = {0, 0, 0}, normal[3] = {0, 0, 1}, light[3], e;
+            double fraction = fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 16, light, NULL);
+            e = light[0];
+            assert_near(fraction, e / .2, 1e-3);
+            sum += e / 400, square += e * e / 400;
+        }
+        assert_near(sum, blocked ? .117431 : .2, blocked ? .01 : 1e-3);
+        /* 64 stratified rays: far below the .061 sqrt(64 independent ones) would give. */
+        assert_true(sqrt(square - sum * sum) < .03 * sum);
+        end(&f);
+    }
+}
+
+static void blocked_squares(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    uint32_t black = place_material(f.scene, 0, 0, false);
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), 1, v3_make(0, 0, 1), v3_make(0, 1, 0),
+                v3_make(1, 0, 0));
+    place_sheet(&f.env, f.scene, black, 1, v3_make(.25, .25, .5), v3_make(.5, 0, 0), v3_make(0, .5, 0));
+    light_up(&f);
+    double sum = 0;
+    int k = 40;
+    for (int i = 0; i < k * k; ++i)
+        sum += lit(&f, v3_make((i % k + .5) / k, (i / k + .5) / k, 0), up, 1e-5, (uint64_t)i, NULL);
+    assert_near(sum / (k * k), .099506, .01);
+    end(&f);
+}
+
+/* All triangles one by one. */
+static double brute_light(const fct_mesh *mesh, bool two_sided, v3 x, v3 n) {
+    double sum = 0;
+    for (size_t t = 0; t < mesh->face_count; ++t) {
+        v3 p[3];
+        for (int k = 0; k < 3; ++k)
+            p[k] = v3_sub(v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * t + (size_t)k]), x);
+        v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+        if (v3_dot(cross, p[0]) < 0 || two_sided) sum += fct_triangle_irradiance(p, n);
+    }
+    return sum;
+}
+
+/* Dense lamps at all distances and angles against every triangle. Where part of the lamp is below the horizon
+ * or the receiver is grazed, the error is measured against what a receiver that faces the lamp gets. */
+static void dense_lamps(void **state) {
+    (void)state;
+    const double distances[] = {1.3, 1.6, 2.5, 5, 12, 40};
+    for (int shape = 0; shape < 3; ++shape) {
+        fixture f = begin();
+        add_ground(&f);
+        fct_mesh mesh = make_bumpy(&f.env, 40, shape ? .15 : 0);
+        place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, shape == 2), NULL);
+        light_up(&f);
+        double worst = 0;
+        for (int i = 0; i < 120; ++i) {
+            double u[4];
+            fct_plane_point((uint32_t)i, 5, u), fct_plane_point((uint32_t)i, 77, u + 2);
+            v3 away = fct_cosine_direction(i & 1 ? up : down, u[0], u[1]);
+            v3 x = v3_scale(away, distances[i % 6]), n = fct_cosine_direction(v3_scale(away, -1), u[2], u[3]);
+            double facing = brute_light(&mesh, shape == 2, x, v3_scale(away, -1));
+            double error =
+                fabs(open_light(&f, x, n) - fmin(1, brute_light(&mesh, shape == 2, x, n))) / facing;
+            worst = fmax(worst, error);
+        }
+        if (worst > .005) fail_msg("shape %d is off by %g", shape, worst);
+        fct_mesh_release(&f.env, &mesh);
+        end(&f);
+    }
+}
+
+/* The same lamp under every kind of transform sends what its world-space twin sends. */
+static void transformed_lamps(void **state) {
+    (void)state;
+    const float transforms[3][12] = {
+        {0, -2, 0, 1, 2, 0, 0, 3, 0, 0, 2, 0},   /* turned and scaled */
+        {0, 2, 0, 1, 2, 0, 0, 3, 0, 0, 2, 0},    /* mirrored too */
+        {-1, 0, 0, 1, 0, 3, .5F, 3, 0, 0, 2, 0}, /* sheared, mirrored */
+    };
+    for (int i = 0; i < 3; ++i) {
+        fixture f = begin();
+        add_ground(&f);
+        const float *m = transforms[i];
+        fct_mesh mesh = make_sphere(&f.env, 20);
+        place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, false), m);
+        light_up(&f);
+        for (size_t v = 0; v < mesh.vertex_count; ++v) {
+            float *p = mesh.positions + 3 * v, w[3];
+            for (int k = 0; k < 3; ++k)
+                w[k] = m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3];
+            memcpy(p, w, sizeof w);
+        }
+        for (size_t t = 0; t < mesh.face_count && i > 0; ++t) {
+            uint32_t *c = mesh.triangles + 3 * t, swap = c[1];
+            c[1] = c[2], c[2] = swap;
+        }
+        for (int k = 0; k < 20; ++k) {
+            v3 x = v3_make(8 * cos(k), 8 * sin(k), k - 10), n = v3_unit(v3_sub(v3_make(1, 3, 0), x));
+            double expected = brute_light(&mesh, false, x, n);
+            assert_near(open_light(&f, x, n), expected, .005);
+            assert_near(lit(&f, x, n, 1e-5, (uint64_t)k, NULL), expected, .05);
+        }
+        fct_mesh_release(&f.env, &mesh);
+        end(&f);
+    }
+}
+
+/* A lamp 0.1 mm under a ceiling, and one 0.1 mm off and facing it. */
+static void lamp_close_to_a_wall(void **state) {
+    (void)state;
+    for (int facing = 0; facing < 2; ++facing) {
+        fixture f = begin();
+        uint32_t grey = place_material(f.scene, .5, 0, false), glow = place_material(f.scene, 0, 1, false);
+        place_sheet(&f.env, f.scene, grey, 1, v3_make(-5, -5, 3), v3_make(0, 10, 0), v3_make(10, 0, 0));
+        v3 u = v3_make(1, 0, 0), v = v3_make(0, 1, 0);
+        place_sheet(&f.env, f.scene, glow, 4, v3_make(0, 0, 2.9999), facing ? u : v, facing ? v : u);
+        place_sheet(&f.env, f.scene, grey, 1, v3_make(-5, -5, 0), v3_make(10, 0, 0), v3_make(0, 10, 0));
+        light_up(&f);
+        for (int i = 0; i < 200; ++i) {
+            v3 x = v3_make(-1 + 3 * fct_uniform(fct_hash2(1, (uint64_t)i)),
+                           -1 + 3 * fct_uniform(fct_hash2(2, (uint64_t)i)), 3);
+            double e = lit(&f, x, down, 2e-5, (uint64_t)i, NULL);
+            bool inside = x.x > .01 && x.x < .99 && x.y > .01 && x.y < .99;
+            bool outside = x.x < -.01 || x.x > 1.01 || x.y < -.01 || x.y > 1.01;
+            if (!facing) assert_true(e == 0);
+            if (facing && inside) assert_near(e, 1, .01);
+            if (facing && outside) assert_true(e < 1e-3);
+            v3 floor = v3_make(x.x, x.y, 0);
+            if (!facing) assert_near(lit(&f, floor, up, 1e-5, 3, NULL), open_light(&f, floor, up), 1e-9);
+            if (facing) assert_true(lit(&f, floor, up, 1e-5, 3, NULL) == 0);
+        }
+        end(&f);
+    }
+}
+
+/* Receivers on a convex lamp get nothing from it, even along smooth normals. */
+static void receiver_on_the_lamp(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    fct_mesh mesh = make_sphere(&f.env, 12);
+    float away[12] = {1, 0, 0, 7, 0, 1, 0, 3, 0, 0, 1, 2};
+    place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, false), away);
+    light_up(&f);
+    for (size_t v = 0; v < mesh.vertex_count; ++v) {
+        v3 n = v3_load(mesh.positions + 3 * v);
+        assert_true(open_light(&f, v3_add(n, v3_make(7, 3, 2)), n) < 1e-5);
+    }
+    fct_mesh_release(&f.env, &mesh);
+    end(&f);
+}
+
+/* A row of coloured lamps, half of them behind a wall: the estimate's mean is the sum of the open ones. */
+static void many_lamps_share_rays(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    uint32_t glow[2];
+    for (int k = 0; k < 2; ++k) {
+        fct_material m = {.emission = {1, (float)k, 0}};
+        assert_int_equal(fct_scene_add_material(f.scene, &m, glow + k), FCT_OK);
+    }
+    for (int i = 0; i < 300; ++i)
+        place_sheet(&f.env, f.scene, glow[i & 1], 1, v3_make(i - 150, -.05, 5), v3_make(0, .1, 0),
+                    v3_make(.1, 0, 0));
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 0, false), 1, v3_make(0, -20, 1),
+                v3_make(400, 0, 0), v3_make(0, 40, 0));
+    light_up(&f);
+    assert_int_equal(fct_lamps_count(f.lamps), 300);
+    double expected[3] = {0, 0, 0}, sum[3] = {0, 0, 0}, point[3] = {.45, 0, 0}, normal[3] = {0, 0, 1};
+    for (int i = 0; i < 300; ++i) {
+        double x = i - 150 + .05 - point[0], seen = x * .2 + point[0] < 0;
+        double e = seen * .01 * 25 / (FCT_PI * (x * x + 25) * (x * x + 25));
+        expected[0] += e, expected[1] += i & 1 ? e : 0;
+    }
+    uint64_t rays = 0;
+    for (uint64_t seed = 0; seed < 300; ++seed) {
+        double e[3];
+        fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 4, e, &rays);
+        for (int k = 0; k < 3; ++k) sum[k] += e[k] / 300;
+    }
+    assert_near(sum[0], expected[0], .02);
+    assert_near(sum[1], expected[1], .03);
+    assert_true(sum[2] == 0);
+    assert_true(rays / 300 < 300);
+    end(&f);
+}
+
+static void sides_and_large_emitters(void **state) {
+    (void)state;
+    for (int two = 0; two < 2; ++two) {
+        fixture f = begin();
+        uint32_t glow = place_material(f.scene, 0, 1, two), dark = place_material(f.scene, .5, 0, false);
+        place_sheet(&f.env, f.scene, glow, 2, v3_make(0, 0, 1), v3_make(1, 0, 0), v3_make(0, 1, 0));
+        place_sheet(&f.env, f.scene, glow, 1, v3_make(-5, -5, 9), v3_make(0, 10, 0), v3_make(10, 0, 0));
+        place_sheet(&f.env, f.scene, dark, 1, v3_make(-5, -5, 0), v3_make(10, 0, 0), v3_make(0, 10, 0));
+        light_up(&f);
+        assert_true(fct_lamps_sampled(f.lamps, 0));
+        assert_false(fct_lamps_sampled(f.lamps, 1));
+        assert_false(fct_lamps_sampled(f.lamps, 2));
+        assert_false(fct_lamps_sampled(f.lamps, 3));
+        double below = open_light(&f, v3_make(.5, .5, 0), up),
+               above = open_light(&f, v3_make(.5, .5, 2), down);
+        assert_near(above, .2394, .01);
+        if (two)
+            assert_near(below, above, 1e-6);
+        else
+            assert_true(below == 0);
+        end(&f);
+    }
+}
+
+static void equal_seeds_equal_light(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), 3, v3_make(0, 0, 1), v3_make(0, 1, 0),
+                v3_make(1, 0, 0));
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 0, false), 1, v3_make(.3, .3, .5),
+                v3_make(1, 0, 0), v3_make(0, 1, 0));
+    light_up(&f);
+    uint64_t rays = 0, again = 0;
+    int different = 0;
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+        double a = lit(&f, v3_make(.1, .2, 0), up, 1e-5, seed, &rays);
+        double b = lit(&f, v3_make(.1, .2, 0), up, 1e-5, seed, &again);
+        assert_true(a == b);
+        different += a != lit(&f, v3_make(.1, .2, 0), up, 1e-5, seed + 1, NULL);
+    }
+    assert_true(rays == again && rays >= 80 && different > 10);
+    end(&f);
+}
+
+/* Every allocation may fail; nothing leaks. */
+static void memory_runs_out(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    fct_mesh mesh = make_sphere(&f.env, 6);
+    float squeezed[12] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 3, 0};
+    uint32_t glow = place_material(f.scene, 0, 1, false);
+    place_mesh(f.scene, &mesh, glow, NULL);
+    place_mesh(f.scene, &mesh, glow, squeezed);
+    fct_mesh_release(&f.env, &mesh);
+    assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+    fct_result result = FCT_ERROR_MEMORY;
+    long n = 1;
+    for (; result != FCT_OK; ++n) {
+        recorder r = {.fail_at = n};
+        fct_env env = recorder_env(&r);
+        fct_lamps *lamps;
+        result = fct_lamps_create(&env, f.scene, &lamps);
+        assert_true(result == FCT_OK || (result == FCT_ERROR_MEMORY && !lamps && r.messages));
+        fct_lamps_destroy(lamps);
+        assert_int_equal(r.alive, 0);
+    }
+    assert_true(n > 8);
+    fct_scene_destroy(f.scene);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parallel_squares),
+        cmocka_unit_test(perpendicular_squares),
+        cmocka_unit_test(equal_disks),
+        cmocka_unit_test(disk_with_blocker),
+        cmocka_unit_test(blocked_squares),
+        cmocka_unit_test(dense_lamps),
+        cmocka_unit_test(transformed_lamps),
+        cmocka_unit_test(lamp_close_to_a_wall),
+        cmocka_unit_test(receiver_on_the_lamp),
+        cmocka_unit_test(many_lamps_share_rays),
+        cmocka_unit_test(sides_and_large_emitters),
+        cmocka_unit_test(equal_seeds_equal_light),
+        cmocka_unit_test(memory_runs_out),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
