@@ -112,7 +112,7 @@ static void fit(const fct_mesh *mesh, const double center[3], double extent, ras
 }
 
 static void set_light(drawing *d, const raster_camera *camera) {
-    static const double towards[3][3] = {{-.75, .7, -.42}, {.9, -.1, -.4}, {0, 1, -.1}};
+    static const double towards[3][3] = {{-.66, .7, -.55}, {.9, -.1, -.4}, {0, 1, -.1}};
     for (int i = 0; i < 3; ++i) {
         double world[3] = {0, 0, 0};
         for (int j = 0; j < 3; ++j)
