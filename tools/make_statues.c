@@ -15,9 +15,18 @@ typedef struct ellipsoid {
     double blend;
 } ellipsoid;
 
-typedef struct relief {
+/* The same, ready to be evaluated. */
+typedef struct blob {
+    double center[3], inverse[3], cosine, sine, least, largest, blend;
+} blob;
+
+enum { MAX_BLOBS = 24 };
+
+typedef struct sculpture {
     uint64_t seed;
-} relief;
+    blob blobs[MAX_BLOBS];
+    int blob_count;
+} sculpture;
 
 /* Polynomial smooth minimum: within k of one another two surfaces flow together. */
 static double unite(double a, double b, double k) {
@@ -29,20 +38,32 @@ static double meet(double a, double b, double k) {
     return -unite(-a, -b, k);
 }
 
-static double ellipsoid_value(const ellipsoid *e, make_point p) {
-    double x = p.x - e->x, y = p.y - e->y, z = p.z - e->z;
-    if (e->tilt != 0) {
-        double c = cos(e->tilt), s = sin(e->tilt), turned = c * x + s * y;
-        y = c * y - s * x, x = turned;
+static void add_blobs(sculpture *s, const ellipsoid *list, int count) {
+    for (int k = 0; k < count; ++k) {
+        const ellipsoid *e = list + k;
+        s->blobs[s->blob_count++] = (blob){{e->x, e->y, e->z},
+                                           {1 / e->rx, 1 / e->ry, 1 / e->rz},
+                                           cos(e->tilt),
+                                           sin(e->tilt),
+                                           fmin(e->rx, fmin(e->ry, e->rz)),
+                                           fmax(e->rx, fmax(e->ry, e->rz)),
+                                           e->blend};
     }
-    double least = fmin(e->rx, fmin(e->ry, e->rz));
-    x /= e->rx, y /= e->ry, z /= e->rz;
-    return (sqrt(x * x + y * y + z * z) - 1) * least;
 }
 
-static double unite_all(const ellipsoid *list, int count, make_point p) {
-    double f = ellipsoid_value(list, p);
-    for (int k = 1; k < count; ++k) f = unite(f, ellipsoid_value(list + k, p), list[k].blend);
+/* (|p / r| - 1) min r; `far` where that is sure to be more. */
+static double blob_value(const blob *e, make_point p, double far) {
+    double x = p.x - e->center[0], y = p.y - e->center[1], z = p.z - e->center[2];
+    double reach = e->largest * (far + e->least);
+    if (reach > 0 && (x * x + y * y + z * z) * e->least * e->least > reach * reach) return far;
+    double turned = e->cosine * x + e->sine * y;
+    y = (e->cosine * y - e->sine * x) * e->inverse[1], x = turned * e->inverse[0], z *= e->inverse[2];
+    return (sqrt(x * x + y * y + z * z) - 1) * e->least;
+}
+
+static double unite_blobs(const blob *list, int count, make_point p) {
+    double f = blob_value(list, p, INFINITY);
+    for (int k = 1; k < count; ++k) f = unite(f, blob_value(list + k, p, f + list[k].blend), list[k].blend);
     return f;
 }
 
@@ -62,66 +83,69 @@ static double stone(make_point p, uint64_t seed, double amount) {
                      .16 * make_noise(make_p(p.x * 110, p.y * 40, p.z * 110), seed + 2));
 }
 
+static const ellipsoid torso[] = {
+    {0, .40, 0, .155, .105, .115, 0, 0},
+    {-.1, .2, .02, .088, .24, .1, -.05, .045},
+    {.1, .19, -.015, .088, .24, .1, .08, .045},
+    {.01, .52, 0, .118, .13, .088, 0, .08},
+    {0, .665, -.005, .148, .155, .102, -.08, .07},
+    {-.07, .70, .068, .068, .055, .05, .1, .045},
+    {.07, .71, .068, .068, .055, .05, -.1, .045},
+    {-.175, .785, -.01, .075, .062, .07, 0, .055},
+    {.175, .765, -.01, .075, .062, .07, 0, .055},
+    {-.235, .69, -.03, .048, .14, .052, -.18, .045},
+    {.225, .71, .02, .05, .1, .054, .3, .045},
+    {.005, .865, .005, .045, .12, .048, -.06, .05},
+    {-.075, .355, -.07, .085, .085, .068, 0, .035},
+    {.075, .345, -.07, .085, .085, .068, 0, .035},
+};
+
 static double torso_value(const void *user, make_point p) {
-    static const ellipsoid body[] = {
-        {0, .38, 0, .165, .11, .12, 0, 0},
-        {-.095, .18, .015, .1, .24, .11, -.06, .06},
-        {.095, .17, -.01, .098, .24, .108, .08, .06},
-        {.01, .5, 0, .128, .14, .095, 0, .08},
-        {0, .66, -.005, .16, .165, .11, -.08, .07},
-        {-.075, .70, .07, .075, .062, .055, .1, .05},
-        {.075, .71, .07, .075, .062, .055, -.1, .05},
-        {-.19, .79, -.01, .085, .075, .08, 0, .06},
-        {.19, .77, -.01, .085, .075, .08, 0, .06},
-        {-.265, .69, -.03, .055, .14, .06, -.22, .05},
-        {.25, .71, .02, .055, .1, .06, .35, .05},
-        {0, .87, .005, .06, .11, .062, .05, .05},
-        {-.075, .33, -.075, .09, .095, .075, 0, .04},
-        {.075, .33, -.075, .09, .095, .075, 0, .04},
-    };
-    const relief *r = user;
+    const sculpture *r = user;
     double twist = .7 * (p.y - .4), c = cos(twist), s = sin(twist);
     make_point q = make_p(c * p.x + s * p.z - .03 * sin(5 * p.y), p.y, c * p.z - s * p.x);
-    double f = unite_all(body, sizeof body / sizeof *body, q);
-    f = meet(f, p.y - .955, .02);
+    double f = unite_blobs(r->blobs, r->blob_count, q);
+    f = meet(f, p.y - .945, .015);
     f = unite(f, drum(p, .25, -.06, .07, .03), .03);
-    return meet(f - stone(p, r->seed, .0035), -p.y, .01);
+    if (fabs(f) < .02) f -= stone(p, r->seed, .0028);
+    return meet(f, -p.y, .01);
 }
 
 /* Two strands in every half-plane about the axis: a trefoil. Each is a twisted rope. */
 static double knot_value(const void *user, make_point p) {
-    const relief *r = user;
+    const sculpture *r = user;
     double x = p.x, y = p.y - .56, z = p.z, ring = .285, wind = .115, tube = .082;
     double rho = fmax(sqrt(x * x + y * y), .05), phi = atan2(y, x) + TURN / 4, best = 1;
     for (int strand = 0; strand < 2; ++strand) {
         double theta = 1.5 * phi + .5 * TURN * strand, u = rho - ring - wind * cos(theta),
                v = z - wind * sin(theta), around = atan2(v, u), distance = sqrt(u * u + v * v);
-        double rope = .0075 * cos(7 * around + 15 * phi + 3.5 * TURN * strand);
-        double rings = .002 * cos(150 * phi);
+        double rope = .0075 * cos(7 * around + 15 * phi);
+        double rings = .0013 * cos(108 * phi);
         double fade = distance < tube ? distance / tube : 1;
         best = unite(best, distance - tube - fade * fade * (rope + rings), .012);
     }
-    best = .8 * best - .0012 * make_noise(scaled(p, 70), r->seed);
+    best *= .8;
+    if (fabs(best) < .01) best -= .0012 * make_noise(scaled(p, 70), r->seed);
     best = unite(best, drum(p, .17, -.06, .09, .03), .05);
     return meet(best, -p.y, .01);
 }
 
 static double gyroid_value(const void *user, make_point p) {
-    const relief *r = user;
+    const sculpture *r = user;
     double k = TURN / .34, y = p.y - .52, radius = sqrt(p.x * p.x + y * y + p.z * p.z);
     double a = k * p.x + .4, b = k * y + .9, c = k * p.z;
     double g = sin(a) * cos(b) + sin(b) * cos(c) + sin(c) * cos(a);
     double wall = sqrt(g * g + .01) / (1.5 * k) - (.022 + .012 * make_noise(scaled(p, 3), r->seed + 5));
     double f = meet(wall, radius - .44, .02);
     f = unite(f, radius - .16, .04);
-    f = f - .0012 * make_noise(scaled(p, 60), r->seed);
+    if (fabs(f) < .01) f -= .0012 * make_noise(scaled(p, 60), r->seed);
     f = unite(f, drum(p, .16, -.06, .13, .03), .05);
     return meet(f, -p.y, .01);
 }
 
 /* Whorls of a cone that grow by `growth` a turn, ribbed; the mouth is where the largest ends. */
 static double shell_value(const void *user, make_point p) {
-    const relief *r = user;
+    const sculpture *r = user;
     const double growth = 1.32, rate = log(growth) / TURN, largest = .235, top = 1.03, slope = 2.85;
     double rho = sqrt(p.x * p.x + p.z * p.z), phi = atan2(p.z, p.x), f = 1;
     double end = log(largest) / rate,
@@ -139,53 +163,60 @@ static double shell_value(const void *user, make_point p) {
     double mouth = sqrt(dx * dx + dy * dy + dz * dz);
     f = fmin(f, mouth - .61 * largest);
     f = meet(f, .47 * largest - sqrt(pow(dx + .05, 2) + dy * dy + pow(dz - .09, 2)), .03);
-    f = .75 * f - .0018 * make_noise(scaled(p, 55), r->seed);
-    f = unite(f, drum(p, .21, -.06, .1, .04), .06);
+    f *= .75;
+    if (fabs(f) < .01) f -= .0018 * make_noise(scaled(p, 55), r->seed);
+    f = unite(f, unite(drum(p, .21, -.06, .08, .03), drum(p, .075, 0, .34, .02), .08), .05);
     return meet(f, -p.y, .01);
 }
 
+enum { HEAD = 16 };
+static const ellipsoid bust[] = {{0, .765, -.02, .118, .14, .15, 0, 0},        /* skull */
+                                 {0, .66, .045, .082, .105, .09, 0, .05},      /* face and jaw */
+                                 {0, .585, .085, .04, .035, .038, 0, .035},    /* chin */
+                                 {0, .775, .09, .082, .035, .04, 0, .03},      /* brow */
+                                 {-.055, .69, .085, .034, .035, .034, 0, .03}, /* cheeks */
+                                 {.055, .69, .085, .034, .035, .034, 0, .03},
+                                 {0, .715, .145, .017, .05, .022, 0, .022}, /* nose */
+                                 {0, .69, .158, .023, .017, .02, 0, .016},
+                                 {0, .637, .118, .033, .0095, .02, 0, .012}, /* lips */
+                                 {0, .618, .115, .027, .01, .02, 0, .012},
+                                 {-.118, .7, -.015, .016, .042, .03, .1, .012}, /* ears */
+                                 {.118, .7, -.015, .016, .042, .03, -.1, .012},
+                                 {0, .5, -.02, .07, .17, .075, 0, .05}, /* neck */
+                                 {-.14, .33, -.02, .16, .1, .1, -.2, .07},
+                                 {.14, .33, -.02, .16, .1, .1, .2, .07},
+                                 {0, .25, .02, .19, .17, .12, 0, .08},
+                                 /* HEAD: sockets, eyes */
+                                 {-.042, .735, .128, .027, .017, .03, 0, 0},
+                                 {.042, .735, .128, .027, .017, .03, 0, 0},
+                                 {-.042, .735, .102, .022, .019, .02, 0, 0},
+                                 {.042, .735, .102, .022, .019, .02, 0, 0}};
+
 static double bust_value(const void *user, make_point p) {
-    static const ellipsoid head[] = {
-        {0, .765, -.02, .118, .14, .15, 0, 0},        /* skull */
-        {0, .66, .045, .082, .105, .09, 0, .05},      /* face and jaw */
-        {0, .585, .085, .04, .035, .038, 0, .035},    /* chin */
-        {0, .775, .09, .082, .035, .04, 0, .03},      /* brow */
-        {-.055, .69, .085, .034, .035, .034, 0, .03}, /* cheeks */
-        {.055, .69, .085, .034, .035, .034, 0, .03},
-        {0, .715, .145, .017, .05, .022, 0, .022}, /* nose */
-        {0, .69, .158, .023, .017, .02, 0, .016},
-        {0, .637, .118, .033, .0095, .02, 0, .012}, /* lips */
-        {0, .618, .115, .027, .01, .02, 0, .012},
-        {-.118, .7, -.015, .016, .042, .03, .1, .012}, /* ears */
-        {.118, .7, -.015, .016, .042, .03, -.1, .012},
-        {0, .5, -.02, .07, .17, .075, 0, .05}, /* neck */
-        {-.14, .33, -.02, .16, .1, .1, -.2, .07},
-        {.14, .33, -.02, .16, .1, .1, .2, .07},
-        {0, .25, .02, .19, .17, .12, 0, .08},
-    };
-    static const ellipsoid sockets[] = {{-.042, .735, .128, .027, .017, .03, 0, 0},
-                                        {.042, .735, .128, .027, .017, .03, 0, 0}};
-    static const ellipsoid eyes[] = {{-.042, .735, .102, .022, .019, .02, 0, 0},
-                                     {.042, .735, .102, .022, .019, .02, 0, 0}};
-    const relief *r = user;
+    const sculpture *r = user;
     double turn = .35 * fmax(0, fmin(1, (p.y - .4) * 5)), c = cos(turn), s = sin(turn);
     make_point q = make_p(c * p.x - s * p.z, p.y, c * p.z + s * p.x);
-    double f = unite_all(head, sizeof head / sizeof *head, q);
-    for (int k = 0; k < 2; ++k) f = meet(f, -ellipsoid_value(sockets + k, q), .022);
-    for (int k = 0; k < 2; ++k) f = unite(f, ellipsoid_value(eyes + k, q), .006);
+    double f = unite_blobs(r->blobs, HEAD, q);
+    for (int k = 0; k < 2; ++k) f = meet(f, -blob_value(r->blobs + HEAD + k, q, .022 - f), .022);
+    for (int k = 0; k < 2; ++k) f = unite(f, blob_value(r->blobs + HEAD + 2 + k, q, f + .006), .006);
     /* hair where the skull is, away from the face */
     double hair = fmax(0, fmin(1, (q.y - .69 - .75 * fmax(0, q.z)) * 14)) * (q.z < .11 ? 1 : 0);
-    double curl = sin(58 * q.y + 6 * make_noise(scaled(q, 11), r->seed) + 26 * q.z) *
-                  cos(46 * q.x + 5 * make_noise(scaled(q, 9), r->seed + 3));
-    f -= hair * (.011 + .0075 * curl);
+    if (hair > 0 && fabs(f) < .04) {
+        double curl = sin(58 * q.y + 6 * make_noise(scaled(q, 11), r->seed) + 26 * q.z) *
+                      cos(46 * q.x + 5 * make_noise(scaled(q, 9), r->seed + 3));
+        f -= hair * (.011 + .0075 * curl);
+    }
     f = meet(f, .155 - p.y, .03);
     f = unite(f, drum(p, .1, .03, .2, .02), .03);
     f = unite(f, drum(p, .15, -.06, .05, .02), .03);
-    return meet(f - stone(p, r->seed, .0012), -p.y, .01);
+    if (fabs(f) < .01) f -= stone(p, r->seed, .0012);
+    return meet(f, -p.y, .01);
 }
 
 int make_statue_mesh(make_mesh *m, make_statue statue, uint32_t triangles, uint64_t seed) {
-    const relief r = {.seed = seed};
+    sculpture r = {.seed = seed};
+    if (statue == MAKE_TORSO) add_blobs(&r, torso, sizeof torso / sizeof *torso);
+    if (statue == MAKE_BUST) add_blobs(&r, bust, sizeof bust / sizeof *bust);
     const make_field fields[MAKE_STATUES] = {
         {torso_value, &r, 1.6, {-.40, 0, -.32}, {.40, 1.0, .32}},
         {knot_value, &r, 2.4, {-.52, 0, -.24}, {.52, 1.1, .24}},

@@ -118,17 +118,23 @@ static bool find_blocks(lattice *l) {
     return true;
 }
 
+/* Signs of the 4^3 corners from (x, y, z) of a block on, by one value where the slope lets that do. */
+static void take_eighth(lattice *l, int b, int x0, int y0, int z0) {
+    const int *at = l->places[b];
+    double x = at[0] * B + x0, y = at[1] * B + y0, z = at[2] * B + z0;
+    double f = value_at(l, lattice_point(l, x + 1.5, y + 1.5, z + 1.5));
+    bool all = fabs(f) > l->field->slope * 1.5 * 1.7320509 * l->step;
+    for (int k = 0; k < 64; ++k) {
+        int dx = k & 3, dy = k >> 2 & 3, dz = k >> 4;
+        bool inside = all ? f < 0 : value_at(l, lattice_point(l, x + dx, y + dy, z + dz)) < 0;
+        l->bits[b][z0 + dz] |= (uint64_t)inside << ((y0 + dy) * B + x0 + dx);
+    }
+}
+
 static void take_signs(lattice *l) {
+    memset(l->bits, 0, (size_t)l->active * sizeof *l->bits);
     for (int b = 0; b < l->active; ++b)
-        for (int z = 0; z < B; ++z) {
-            uint64_t word = 0;
-            for (int k = 0; k < B * B; ++k) {
-                const int *at = l->places[b];
-                make_point p = lattice_point(l, at[0] * B + k % B, at[1] * B + k / B, at[2] * B + z);
-                word |= (uint64_t)(value_at(l, p) < 0) << k;
-            }
-            l->bits[b][z] = word;
-        }
+        for (int k = 0; k < 8; ++k) take_eighth(l, b, k % 2 * 4, k / 2 % 2 * 4, k / 4 * 4);
 }
 
 /* Number of the block next to block b, or its state. */
