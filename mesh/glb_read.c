@@ -30,7 +30,7 @@ typedef struct reader {
     const fct_env *env;
     const char *name;
     fct_soup *soup;
-    bool has_colors, has_normals, has_texcoords, has_materials;
+    bool has_colors, has_normals, has_texcoords, has_materials, needs_unnamed;
     size_t without_color, without_texcoord, lines;
     uint64_t limit; /* on vertices and on corners */
     visit *stack;
@@ -73,6 +73,7 @@ static fct_result survey(reader *r) {
         r->has_colors |= p.color >= 0 || p.radiosity >= 0;
         r->has_texcoords |= p.texcoord >= 0;
         r->has_normals &= p.normal >= 0;
+        r->needs_unnamed |= p.material < 0;
         if (p.material < 0) continue;
         json_t *material;
         result = fct_glb_item(&r->glb, "materials", p.material, &material);
@@ -89,8 +90,8 @@ static fct_result name_materials(reader *r) {
     r->unnamed = (uint32_t)count;
     r->soup->material_names = fct_allocate_zero(r->env, count + 1, sizeof(char *));
     if (!r->soup->material_names) return fct_fail_memory(r->env, "material names");
-    r->soup->material_count = (uint32_t)(count + 1);
-    for (size_t i = 0; i <= count; ++i) {
+    r->soup->material_count = (uint32_t)(count + r->needs_unnamed);
+    for (size_t i = 0; i < r->soup->material_count; ++i) {
         json_t *name = json_object_get(json_array_get(json_object_get(r->glb.root, "materials"), i), "name");
         char number[32];
         snprintf(number, sizeof number, "material_%zu", i);

@@ -12,7 +12,7 @@ typedef struct format {
 
 static const format *find_format(const char *ending) {
     static const format formats[] = {{"ply", fct_read_ply}, {"obj", fct_read_obj}, {"off", fct_read_off},
-                                     {"stl", fct_read_stl}, {"glb", fct_read_glb}};
+                                     {"stl", fct_read_stl}, {"glb", fct_read_glb}, {"om", fct_read_om}};
     for (size_t i = 0; i < sizeof formats / sizeof *formats; ++i)
         if (!strcasecmp(formats[i].ending, ending)) return formats + i;
     return NULL;

@@ -15,7 +15,7 @@ static writer *find_writer(const char *ending) {
         const char *ending;
         writer *write;
     } formats[] = {{"ply", fct_write_ply}, {"obj", fct_write_obj}, {"off", fct_write_off},
-                   {"stl", fct_write_stl}, {"glb", fct_write_glb}};
+                   {"stl", fct_write_stl}, {"glb", fct_write_glb}, {"om", fct_write_om}};
     for (size_t i = 0; i < sizeof formats / sizeof *formats; ++i)
         if (!strcasecmp(formats[i].ending, ending)) return formats[i].write;
     return NULL;
