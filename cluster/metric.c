@@ -17,6 +17,14 @@
 #define PI_F 3.14159265f
 #define TINY 1e-30f
 
+/* fmaxf and fminf are calls here, for they must look out for NaN. */
+static inline float greater(float a, float b) {
+    return a > b ? a : b;
+}
+static inline float lesser(float a, float b) {
+    return a < b ? a : b;
+}
+
 /* Sums of a union about its own centroid. */
 typedef struct joint {
     float covariance[6], centroid[3], weight, vector[3], area, perimeter;
@@ -58,14 +66,14 @@ void fct_metric_face(const fct_metric *metric, const float *positions, const uin
 }
 
 static inline float irregularity(float perimeter, float area) {
-    float g = perimeter * perimeter / (4 * PI_F * fmaxf(area, TINY));
-    return fminf(g, 1e30f);
+    float g = perimeter * perimeter / (4 * PI_F * greater(area, TINY));
+    return lesser(g, 1e30f);
 }
 
 /* (8.17) */
 static inline float shape_error(float worst, float joined) {
-    float error = 1 - worst / (2 * fmaxf(joined, TINY));
-    return worst > 0 ? fmaxf(error, -1000) : 0.5f;
+    float error = 1 - worst / (2 * greater(joined, TINY));
+    return worst > 0 ? greater(error, -1000) : 0.5f;
 }
 
 static inline void join(const fct_record *a, const fct_record *b, float shared, joint *u) {
@@ -84,7 +92,7 @@ static inline void join(const fct_record *a, const fct_record *b, float shared, 
     u->covariance[5] = a->covariance[5] + b->covariance[5] + k * d[2] * d[2];
     u->weight = weight;
     u->area = a->area + b->area;
-    u->perimeter = fmaxf(a->perimeter + b->perimeter - 2 * shared, 0);
+    u->perimeter = greater(a->perimeter + b->perimeter - 2 * shared, 0);
 }
 
 static inline float form(const float c[6], const float n[3]) {
@@ -96,14 +104,14 @@ static inline float form(const float c[6], const float n[3]) {
  * normal, which is as good as an eigen solve here and a tenth of its time. */
 static inline float least_spread(const joint *u) {
     float trace = u->covariance[0] + u->covariance[3] + u->covariance[5];
-    float invert = 1 / fmaxf(trace, TINY), c[6];
+    float invert = 1 / greater(trace, TINY), c[6];
     for (int i = 0; i < 6; ++i) c[i] = u->covariance[i] * invert;
     float adjugate[6] = {c[3] * c[5] - c[4] * c[4], c[2] * c[4] - c[1] * c[5], c[1] * c[4] - c[2] * c[3],
                          c[0] * c[5] - c[2] * c[2], c[1] * c[2] - c[0] * c[4], c[0] * c[3] - c[1] * c[1]};
-    float largest = fmaxf(fmaxf(fabsf(u->vector[0]), fabsf(u->vector[1])), fabsf(u->vector[2]));
+    float largest = greater(greater(fabsf(u->vector[0]), fabsf(u->vector[1])), fabsf(u->vector[2]));
     bool cancelled = largest <= 1e-4f * u->area;
     bool x = adjugate[0] >= adjugate[3] && adjugate[0] >= adjugate[5], y = !x && adjugate[3] >= adjugate[5];
-    float normalize = 1 / fmaxf(largest, TINY);
+    float normalize = 1 / greater(largest, TINY);
     float s[3] = {cancelled ? (x ? 1.f : 0.f) : u->vector[0] * normalize,
                   cancelled ? (y ? 1.f : 0.f) : u->vector[1] * normalize,
                   cancelled ? (x || y ? 0.f : 1.f) : u->vector[2] * normalize};
@@ -111,8 +119,8 @@ static inline float least_spread(const joint *u) {
                   adjugate[1] * s[0] + adjugate[3] * s[1] + adjugate[4] * s[2],
                   adjugate[2] * s[0] + adjugate[4] * s[1] + adjugate[5] * s[2]};
     float nn = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], ss = s[0] * s[0] + s[1] * s[1] + s[2] * s[2];
-    float start = form(c, s) / fmaxf(ss, TINY), stepped = nn > TINY ? form(c, n) / nn : start;
-    return trace * fmaxf(fminf(start, stepped), 0);
+    float start = form(c, s) / greater(ss, TINY), stepped = nn > TINY ? form(c, n) / nn : start;
+    return trace * greater(lesser(start, stepped), 0);
 }
 
 static inline float total_fit(const fct_metric *metric, const joint *u) {
@@ -127,19 +135,19 @@ static inline float length3(const float v[3]) {
 /* 2 (|a| + |b| - |a + b|). Near-parallel vectors go by their cross product, for the difference has no digits
  * left on fine meshes. */
 static inline float direction_growth(const float a[3], const float b[3]) {
-    float scale = fmaxf(length3(a), length3(b)), invert = 1 / fmaxf(scale, TINY);
+    float scale = greater(length3(a), length3(b)), invert = 1 / greater(scale, TINY);
     float p[3] = {a[0] * invert, a[1] * invert, a[2] * invert};
     float q[3] = {b[0] * invert, b[1] * invert, b[2] * invert};
     float s[3] = {p[0] + q[0], p[1] + q[1], p[2] + q[2]};
     float cross[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
     float lp = length3(p), lq = length3(q), ls = length3(s), dot = p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     float cc = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
-    float near = cc / fmaxf(lp * lq + dot, TINY), far = lp * lq - dot;
-    return scale * 4 * (dot > 0 ? near : far) / fmaxf(lp + lq + ls, TINY);
+    float near = cc / greater(lp * lq + dot, TINY), far = lp * lq - dot;
+    return scale * 4 * (dot > 0 ? near : far) / greater(lp + lq + ls, TINY);
 }
 
 static inline float union_shape(const fct_record *a, const fct_record *b, const joint *u) {
-    float worst = fmaxf(irregularity(a->perimeter, a->area), irregularity(b->perimeter, b->area));
+    float worst = greater(irregularity(a->perimeter, a->area), irregularity(b->perimeter, b->area));
     return shape_error(worst, irregularity(u->perimeter, u->area));
 }
 
@@ -165,7 +173,7 @@ float fct_metric_cost(const fct_metric *metric, const fct_record *a, const fct_r
     join(a, b, shared, &u);
     float shape = union_shape(a, b, &u);
     if (metric->cost == FCT_COST_MEAN) return mean_cost(metric, &u, shape, da, db);
-    float fit = fmaxf(total_fit(metric, &u) - a->fit - b->fit, 0);
+    float fit = greater(total_fit(metric, &u) - a->fit - b->fit, 0);
     return metric->fit_weight * fit + metric->direction_weight * direction_growth(a->vector, b->vector) +
            metric->shape_weight * u.area * shape;
 }

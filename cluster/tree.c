@@ -64,10 +64,8 @@ void fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out) {
     }
     uint32_t place = node - view->node_count;
     memset(out, 0, sizeof *out);
-    fct_cluster_describe(view, place, 1, out);
+    fct_cluster_describe_face(view, place, out);
     out->child[0] = out->child[1] = FCT_NONE;
-    out->first = place;
-    out->count = 1;
 }
 
 fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out) {

@@ -28,8 +28,8 @@ fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_d
 /* Fills area, moments, cone, plane and box of all inner nodes. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe(fct_tree *tree);
 
-/* The attributes of the cluster made of the places [first, first + count), but for cost and links. */
-void fct_cluster_describe(const fct_tree_view *view, uint32_t first, uint32_t count, fct_cluster *out);
+/* The attributes of the leaf at a place, but for cost and links. */
+void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out);
 
 /* Depths from the children links; view->depth and view->mean_depth. Errors: MEMORY. */
 fct_result fct_tree_measure_depth(fct_tree *tree);
