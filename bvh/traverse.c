@@ -74,25 +74,83 @@ static inline void shear_vertices(const fct_leaf *leaf, const fct_prepared_ray *
     }
 }
 
-/* Settles one triangle that the eight-wide test could not refuse. x, y, z: corners a, b, c. */
+/* Weights and sheared z of a triangle's corners. */
+typedef struct weights {
+    double w[3], z[3];
+} weights;
+
+/* Weights of the point of the triangle's rim that is nearest to the ray, which is at the origin of x, y. */
+static void rim_weights(const double x[3], const double y[3], double w[3]) {
+    double nearest2 = INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        int j = (i + 1) % 3;
+        double ex = x[j] - x[i], ey = y[j] - y[i], length2 = ex * ex + ey * ey;
+        double s = length2 > 0 ? -(x[i] * ex + y[i] * ey) / length2 : 0;
+        s = s < 0 ? 0 : s > 1 ? 1 : s;
+        double qx = x[i] + s * ex, qy = y[i] + s * ey, distance2 = qx * qx + qy * qy;
+        if (distance2 >= nearest2) continue;
+        nearest2 = distance2;
+        w[i] = 1 - s, w[j] = s, w[(i + 2) % 3] = 0;
+    }
+}
+
+/* The weights again, in double all the way. The float test has found that the ray meets the triangle as
+ * floats see it; on a triangle seen almost edge-on they say poorly where. Signs that differ mean that the ray
+ * passes the rim by less than float rounding: the hit is then on the rim. */
+static void refine(const fct_leaf *leaf, uint32_t number, const fct_prepared_ray *r, weights *out) {
+    const float *rows = fct_leaf_vertices(leaf);
+    const uint8_t *corners = fct_leaf_corners(leaf) + 24 * (number / 8) + number % 8;
+    uint32_t stride = 8u * leaf->vertex_octets;
+    double sz = 1 / (double)r->direction[r->axis[2]], sx = (double)r->direction[r->axis[0]] * sz,
+           sy = (double)r->direction[r->axis[1]] * sz, x[3], y[3], z[3], w[3];
+    for (int c = 0; c < 3; ++c) {
+        const float *at = rows + corners[8 * c];
+        double along = (double)at[r->axis[2] * stride] - (double)r->origin[r->axis[2]];
+        x[c] = (double)at[r->axis[0] * stride] - (double)r->origin[r->axis[0]] - sx * along;
+        y[c] = (double)at[r->axis[1] * stride] - (double)r->origin[r->axis[1]] - sy * along;
+        z[c] = sz * along;
+    }
+    for (int c = 0; c < 3; ++c) {
+        int i = (c + 1) % 3, j = (c + 2) % 3;
+        w[c] = x[j] * y[i] - y[j] * x[i];
+    }
+    bool negative = w[0] < 0 || w[1] < 0 || w[2]<0, positive = w[0]> 0 || w[1] > 0 || w[2] > 0;
+    if (negative == positive) rim_weights(x, y, w);
+    for (int c = 0; c < 3; ++c) out->w[c] = w[c], out->z[c] = z[c];
+}
+
+/* Whether the triangle is seen so flat that rounding moves the hit along it by much more than across. */
+static inline bool seen_flat(const float x[3], const float y[3], const float z[3], double det) {
+    float dx = fmaxf(x[0], fmaxf(x[1], x[2])) - fminf(x[0], fminf(x[1], x[2]));
+    float dy = fmaxf(y[0], fmaxf(y[1], y[2])) - fminf(y[0], fminf(y[1], y[2]));
+    float dz = fmaxf(z[0], fmaxf(z[1], z[2])) - fminf(z[0], fminf(z[1], z[2]));
+    double wide = (double)fmaxf(dx, dy);
+    return 4 * fabs(det) < wide * fmax((double)dz, wide);
+}
+
+/* Settles one triangle that the eight-wide test could not refuse. x, y, z: its corners. */
 static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, const float x[3],
                           const float y[3], const float z[3]) {
     float u = x[2] * y[1] - y[2] * x[1], v = x[0] * y[2] - y[0] * x[2], w = x[1] * y[0] - y[1] * x[0];
-    double du = (double)u, dv = (double)v, dw = (double)w;
+    weights s = {{(double)u, (double)v, (double)w}, {(double)z[0], (double)z[1], (double)z[2]}};
     if (u == 0 || v == 0 || w == 0) {
-        du = (double)x[2] * (double)y[1] - (double)y[2] * (double)x[1];
-        dv = (double)x[0] * (double)y[2] - (double)y[0] * (double)x[2];
-        dw = (double)x[1] * (double)y[0] - (double)y[1] * (double)x[0];
+        s.w[0] = (double)x[2] * (double)y[1] - (double)y[2] * (double)x[1];
+        s.w[1] = (double)x[0] * (double)y[2] - (double)y[0] * (double)x[2];
+        s.w[2] = (double)x[1] * (double)y[0] - (double)y[1] * (double)x[0];
     }
-    if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
-    double det = du + dv + dw;
+    if ((s.w[0] < 0 || s.w[1] < 0 || s.w[2] < 0) && (s.w[0] > 0 || s.w[1] > 0 || s.w[2] > 0)) return false;
+    double det = s.w[0] + s.w[1] + s.w[2];
     if (det == 0) return false;
-    float at = (float)((du * (double)z[0] + dv * (double)z[1] + dw * (double)z[2]) / det);
+    if (seen_flat(x, y, z, det)) {
+        refine(leaf, number, t->ray, &s);
+        det = s.w[0] + s.w[1] + s.w[2];
+    }
+    float at = (float)((s.w[0] * s.z[0] + s.w[1] * s.z[1] + s.w[2] * s.z[2]) / det);
     if (!(at >= t->ray->t_min && at <= t->hit.t)) return false;
     uint32_t place = leaf->first + number;
     const uint32_t *ids = t->bvh->view.face_ids;
     if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
-    t->hit = (fct_raw_hit){.t = at, .u = (float)(dv / det), .v = (float)(dw / det), .place = place};
+    t->hit = (fct_raw_hit){.t = at, .u = (float)(s.w[1] / det), .v = (float)(s.w[2] / det), .place = place};
     return true;
 }
 
