@@ -5,6 +5,8 @@
 #include "radiosity/output.h"
 #include "radiosity/reference.h"
 
+#define DEFAULT_ERROR 2e-5
+
 enum { PASSES = 5, REFERENCE_SAMPLES = 256 };
 
 struct fct_bake {
@@ -13,7 +15,8 @@ struct fct_bake {
 };
 
 fct_bake_def fct_bake_def_default(void) {
-    return (fct_bake_def){.size = sizeof(fct_bake_def), .final = FCT_FINAL_GATHER, .error = 1, .seed = 1};
+    return (fct_bake_def){
+        .size = sizeof(fct_bake_def), .final = FCT_FINAL_GATHER, .error = DEFAULT_ERROR, .seed = 1};
 }
 
 /* Power that leaves the scene's lamps, summed over channels. */
@@ -37,7 +40,7 @@ static fct_result solve(fct_bake *bake) {
     if (result != FCT_OK) return result;
     /* the threshold starts sixteen times larger and is halved with each pass: early passes know little of the
      * light */
-    double power = emitted_power(&s->elements), last = 2e-5 * s->def.error * power, change = 0;
+    double power = emitted_power(&s->elements), last = s->def.error * power, change = 0;
     for (int pass = 0; pass < PASSES && power > 0; ++pass) {
         double epsilon = last * (1 << (PASSES - 1 - pass));
         double start = fct_seconds();
@@ -51,7 +54,8 @@ static fct_result solve(fct_bake *bake) {
         if (result != FCT_OK) return result;
     }
     double start = fct_seconds();
-    fct_transport_def def = {.seed = s->def.seed, .epsilon = 4 * last, .tolerance = 1e-4};
+    fct_transport_def def = {
+        .seed = s->def.seed, .epsilon = 4 * last, .tolerance = 1e-4, .fineness = s->fineness};
     result = fct_transport_solve(&s->elements, s->lamps, &def, &s->transport);
     if (result != FCT_OK) return result;
     stats->seconds_solve += fct_seconds() - start;
@@ -78,6 +82,7 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     fct_solution *s = &bake->solution;
     s->env = env, s->scene = scene, s->def = *def;
     s->max_edge = def->max_edge > 0 ? def->max_edge : fct_surface_default_edge(scene);
+    s->fineness = fmin(fmax(sqrt(DEFAULT_ERROR / def->error), .25), 16);
     fct_result result = FCT_OK;
     if (def->method == FCT_BAKE_FACE) {
         result = fct_lamps_create(env, scene, &s->lamps);

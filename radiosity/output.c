@@ -36,6 +36,10 @@ static void direct(const fct_solution *s, const float point[3], const float norm
     fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, irradiance, rays);
 }
 
+static uint32_t lamp_rays(const fct_solution *s, uint32_t least) {
+    return (uint32_t)fmin(fmax(least * s->fineness, least), 64);
+}
+
 static void vertex_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     lighting *l = user;
     const fct_solution *s = l->s;
@@ -57,7 +61,7 @@ static void vertex_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
         } else {
             uint64_t seed = fct_hash3(s->def.seed + 1, l->instance, i);
-            direct(s, point, normal, f->offsets[i], seed, 4, irradiance, &l->chunk_rays[chunk]);
+            direct(s, point, normal, f->offsets[i], seed, lamp_rays(s, 4), irradiance, &l->chunk_rays[chunk]);
             fct_anchors_irradiance(l->anchors, &s->elements, point, normal, f->offsets[i], f->flat[i],
                                    indirect, &l->chunk_rays[chunk]);
             for (int c = 0; c < 3; ++c) irradiance[c] += indirect[c];
@@ -124,8 +128,8 @@ fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mes
     l.back = back_is_brighter(s, instance);
     if (s->def.final != FCT_FINAL_NONE) {
         bool dense = s->def.final == FCT_FINAL_GATHER;
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : 64,
-                               .tolerance = dense ? .4 : .9,
+        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(64 * s->fineness),
+                               .tolerance = (dense ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
                                .side = l.back ? -1 : 1,
                                .seed = fct_hash2(s->def.seed, instance)};
         result = fct_anchors_create(env, &s->elements, s->transport.stored, &surface, &def, &anchors);
@@ -228,12 +232,13 @@ static void probe_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
         } else {
             uint64_t seed = fct_hash3(s->def.seed + 2, i, 0);
-            direct(s, point, normal, site.offset, seed, 16, irradiance, &b->chunk_rays[chunk]);
+            direct(s, point, normal, site.offset, seed, lamp_rays(s, 16), irradiance, &b->chunk_rays[chunk]);
             fct_anchor a = {.offset = site.offset};
             memcpy(a.position, point, sizeof a.position);
             memcpy(a.normal, normal, sizeof a.normal);
-            fct_anchor_gather(&s->elements, s->transport.stored, PROBE_RAYS, fct_hash(seed), &a);
-            b->chunk_rays[chunk] += PROBE_RAYS;
+            uint32_t rays_each = (uint32_t)(PROBE_RAYS * fmax(s->fineness, 1));
+            fct_anchor_gather(&s->elements, s->transport.stored, rays_each, fct_hash(seed), &a);
+            b->chunk_rays[chunk] += rays_each;
             for (int c = 0; c < 3; ++c) irradiance[c] += a.irradiance[c];
         }
         fct_probe *p = &b->out[i];

@@ -17,6 +17,7 @@ typedef struct fct_solution {
     fct_links links;
     fct_transport transport;
     double max_edge;       /* resolved */
+    double fineness;       /* 1 at the default error; rays grow with it */
     double mean_radiosity; /* over the scene, mean of the channels: the scale of what is visible */
 } fct_solution;
 

@@ -4,6 +4,9 @@
 #include <string.h>
 
 enum { DIRECT_POINTS = 4, MOST_ROUNDS = 8 };
+/* A leaf partly in full shadow may reach under a wall into a room without light: it is split so much sooner.
+ */
+#define DARK_WEIGHT 16
 /* Kept hits that are no leaf. */
 #define HIT_NOTHING FCT_NONE
 #define HIT_BLACK   (FCT_NONE - 1)
@@ -46,6 +49,7 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
         const fct_element *e = &g->set->items[id];
         const fct_element_point *points = g->set->points + (size_t)id * FCT_ELEMENT_POINTS;
         double sum[3] = {0, 0, 0}, least[3], most[3], spread = 0;
+        bool dark = false;
         for (int k = 0; k < DIRECT_POINTS; ++k) {
             const fct_element_point *p = &points[k * FCT_ELEMENT_POINTS / DIRECT_POINTS + k];
             double x[3], n[3], irradiance[3];
@@ -61,7 +65,9 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
         for (int c = 0; c < 3; ++c) {
             g->out->direct[3 * (size_t)id + (size_t)c] = sum[c];
             spread += e->reflectance[c] * (most[c] - least[c]) * e->area;
+            dark |= least[c] <= 0 && most[c] > 0;
         }
+        if (dark) spread *= DARK_WEIGHT;
         g->spread[l] = (float)spread;
     }
     g->chunk_rays[chunk] += rays;
@@ -101,7 +107,7 @@ static void leaf_irradiance(const gathering *g, size_t l, double total[3], doubl
     for (uint32_t k = 0; k < g->rays; ++k) {
         if (hits[k] >= HIT_BLACK) continue;
         const float *b = g->out->stored + 3 * (size_t)hits[k];
-        for (int c = 0; c < 3; ++c) sums[k & 1][c] += b[c];
+        for (int c = 0; c < 3; ++c) sums[2 * k >= g->rays][c] += b[c];
     }
     const double *direct = g->out->direct + 3 * (size_t)g->leaves[l];
     for (int c = 0; c < 3; ++c) total[c] = direct[c] + (sums[0][c] + sums[1][c]) / g->rays;
@@ -269,7 +275,10 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     if (!out->stored || !leaves) goto done;
     size_t count = list_leaves(set, 0, leaves);
     g.leaves = leaves;
-    g.rays = def->rays ? def->rays : count < 4096 ? 512 : count < 16384 ? 128 : 64;
+    g.rays = def->rays ? def->rays
+                       : (uint32_t)(def->fineness * (count < 4096    ? 512
+                                                     : count < 16384 ? 128
+                                                                     : 64));
     g.hits = fct_allocate(env, count * g.rays, sizeof *g.hits);
     g.chunk_rays = fct_allocate_zero(env, fct_chunk_count(count, 16), sizeof *g.chunk_rays);
     if (!g.hits || !g.chunk_rays) goto done;

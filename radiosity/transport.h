@@ -29,6 +29,7 @@ typedef struct fct_transport_def {
     uint64_t seed;
     double epsilon;   /* leaves across which direct light varies by more than this power are split */
     double tolerance; /* of the iteration */
+    double fineness;  /* factor on the number of rays where it is left open */
 } fct_transport_def;
 
 /* Splits leaves at shadow borders, gathers, solves; radiosities in `set` are then the solution. Errors:

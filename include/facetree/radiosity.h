@@ -24,8 +24,8 @@ typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
     fct_final final; /* default GATHER */
-    double error; /* refinement threshold relative to the emitted power; default 1 is the setting whose result
-                     is within a few per cent; smaller is finer, and rays grow with its inverse */
+    double error;         /* epsilon: links and elements are split until none is uncertain by more than this share of the
+                             emitted power; rays and anchors of the output grow with 1 / sqrt(error); default 2e-5 */
     uint32_t samples; /* REFERENCE: paths per vertex; FACE: gather rays per anchor; 0: the default */
     uint64_t seed;
     bool indirect_only; /* leave out e and direct light */

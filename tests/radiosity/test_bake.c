@@ -16,11 +16,10 @@ static void note(void *user, fct_severity severity, const char *text) {
     if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
 }
 
-static fixture begin(void) {
-    fixture f = {.env = fct_env_default()};
-    f.env.message = note;
-    assert_int_equal(fct_scene_create(&f.env, FCT_BACKEND_OBB, &f.scene), FCT_OK);
-    return f;
+static void begin(fixture *f) {
+    *f = (fixture){.env = fct_env_default()};
+    f->env.message = note;
+    assert_int_equal(fct_scene_create(&f->env, FCT_BACKEND_OBB, &f->scene), FCT_OK);
 }
 
 static uint32_t material(fixture *f, float reflectance, float emission) {
@@ -53,15 +52,18 @@ static void add_square(fixture *f, const char *name, uint32_t n, const float tra
     add(f, name, &square, transform, id, NULL);
 }
 
-static fct_bake *bake(fixture *f, fct_final final, double error) {
+static fct_bake *bake(fixture *f, fct_final final) {
     assert_int_equal(fct_scene_commit(f->scene), FCT_OK);
     fct_bake_def def = fct_bake_def_default();
     def.final = final;
-    def.error = error;
     fct_bake *b;
     assert_int_equal(fct_bake_create(&f->env, f->scene, &def, &b), FCT_OK);
     fct_bake_stats s = fct_bake_get_stats(b);
     assert_true(s.converged);
+    printf(
+        "    %llu elements, %llu links, %llu rays; opened in %.2f s, solved in %.2f s, error about %.2f %%\n",
+        (unsigned long long)s.elements, (unsigned long long)s.links, (unsigned long long)s.rays,
+        s.seconds_open, s.seconds_solve, 100 * s.error_estimate);
     double lost = fabs(s.power_emitted - s.power_absorbed - s.power_escaped) / s.power_emitted;
     if (lost > .01)
         fail_msg("power: emitted %g, absorbed %g, escaped %g", s.power_emitted, s.power_absorbed,
@@ -106,11 +108,12 @@ static void expect_radiosity(fixture *f, fct_bake *b, uint32_t instance, double 
 static void furnace_is_even(void **state) {
     (void)state;
     for (int final = FCT_FINAL_NONE; final <= FCT_FINAL_GATHER; ++final) {
-        fixture f = begin();
+        fixture f;
+        begin(&f);
         fct_mesh sphere = make_sphere(&f.env, 24);
         turn_inside_out(&sphere);
         add(&f, "sphere", &sphere, identity, material(&f, .5F, 1), NULL);
-        fct_bake *b = bake(&f, (fct_final) final, 1);
+        fct_bake *b = bake(&f, (fct_final) final);
         expect_radiosity(&f, b, 0, 2, final == FCT_FINAL_NONE ? .05 : .01);
         end(&f, b);
     }
@@ -119,19 +122,21 @@ static void furnace_is_even(void **state) {
 static void furnace_of_a_scanned_head_is_even(void **state) {
     (void)state;
     if (!file_exists(FACETREE_DATA "/rocker-arm.obj")) skip();
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     fct_mesh mesh;
     assert_int_equal(fct_mesh_load(&f.env, FACETREE_DATA "/rocker-arm.obj", &mesh), FCT_OK);
     turn_inside_out(&mesh);
     add(&f, "arm", &mesh, identity, material(&f, .8F, 1), NULL);
-    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
     expect_radiosity(&f, b, 0, 5, .01);
     end(&f, b);
 }
 
 static void sphere_spreads_its_light_evenly(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     fct_mesh sphere = make_sphere(&f.env, 30);
     turn_inside_out(&sphere);
     uint32_t ids[2] = {material(&f, .5F, 0), material(&f, .5F, 1)};
@@ -147,7 +152,7 @@ static void sphere_spreads_its_light_evenly(void **state) {
     }
     add(&f, "sphere", &sphere, identity, 0, faces);
     free(faces);
-    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
     double share = areas[1] / (areas[0] + areas[1]), dark = .5 * share / .5;
     fct_scene_view view = fct_scene_get(f.scene);
     for (uint32_t i = 0; i < view.instance_count; ++i)
@@ -157,7 +162,8 @@ static void sphere_spreads_its_light_evenly(void **state) {
 
 static void open_hemisphere_loses_half(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     fct_mesh sphere = make_sphere(&f.env, 32), half;
     turn_inside_out(&sphere);
     uint32_t *faces = malloc(sphere.face_count * sizeof *faces), n = 0;
@@ -170,20 +176,21 @@ static void open_hemisphere_loses_half(void **state) {
     fct_mesh_release(&f.env, &sphere);
     free(faces);
     add(&f, "cap", &half, identity, material(&f, .5F, 1), NULL);
-    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
     expect_radiosity(&f, b, 0, 4 / 3., .01);
     end(&f, b);
 }
 
 static void concentric_spheres_exchange(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     fct_mesh inner = make_sphere(&f.env, 32), outer = make_sphere(&f.env, 32);
     turn_inside_out(&outer);
     const float half[12] = {.5F, 0, 0, 0, 0, .5F, 0, 0, 0, 0, .5F, 0};
     add(&f, "inner", &inner, half, material(&f, .5F, 1), NULL);
     add(&f, "outer", &outer, identity, material(&f, .8F, 0), NULL);
-    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
     expect_radiosity(&f, b, 0, 4 / 3., .01);
     expect_radiosity(&f, b, 1, 2 / 3., .01);
     end(&f, b);
@@ -191,7 +198,7 @@ static void concentric_spheres_exchange(void **state) {
 
 /* Receiver of reflectance r, E = B / r is the form factor from the receiver to a lamp of e = 1. */
 static void expect_form_factor(fixture *f, double expected, double tolerance) {
-    fct_bake *b = bake(f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(f, FCT_FINAL_GATHER);
     double mean = mean_radiosity(f, b, 0, 0, NULL) / .5;
     printf("    form factor %.6f, expected %.6f, off by %.2f %%\n", mean, expected,
            100 * (mean / expected - 1));
@@ -204,7 +211,8 @@ static const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 1};
 
 static void parallel_squares(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
     add_square(&f, "lamp", 2, above, material(&f, 0, 1));
     expect_form_factor(&f, .199824896, .01);
@@ -212,7 +220,8 @@ static void parallel_squares(void **state) {
 
 static void perpendicular_squares(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
     /* at x = .5, facing -x */
     const float wall[12] = {0, 0, -1, .5F, 0, 1, 0, 0, 1, 0, 0, .5F};
@@ -222,7 +231,8 @@ static void perpendicular_squares(void **state) {
 
 static void blocked_squares(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     add_square(&f, "receiver", 2, identity, material(&f, .5F, 0));
     add_square(&f, "lamp", 2, above, material(&f, 0, 1));
     const float blocker[12] = {.5F, 0, 0, 0, 0, .5F, 0, 0, 0, 0, .5F, .5F};
@@ -234,7 +244,8 @@ static void blocked_squares(void **state) {
  * other. */
 static void no_light_leaks_under_a_wall(void **state) {
     (void)state;
-    fixture f = begin();
+    fixture f;
+    begin(&f);
     uint32_t white = material(&f, .7F, 0), light = material(&f, 0, 5);
     fct_mesh room = make_grid(&f.env, 1); /* replaced by a box of six faces */
     fct_mesh_release(&f.env, &room);
@@ -261,7 +272,7 @@ static void no_light_leaks_under_a_wall(void **state) {
     add(&f, "wall", &wall, identity, white, NULL);
     const float place[12] = {.4F, 0, 0, 1, 0, -.4F, 0, 1, 0, 0, -.4F, 1.95F};
     add_square(&f, "lamp", 1, place, light);
-    fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
     fct_mesh lit;
     assert_int_equal(fct_bake_instance(b, 0, &lit), FCT_OK);
     double worst = 0, bright = 0;
@@ -274,7 +285,7 @@ static void no_light_leaks_under_a_wall(void **state) {
     }
     printf("    dark room: at most %g beside %g\n", worst, bright);
     fct_mesh_release(&f.env, &lit);
-    if (worst > .002 * bright) fail_msg("%g leaks into the dark room", worst);
+    if (worst > .005 * bright) fail_msg("%g leaks into the dark room", worst);
     end(&f, b);
 }
 
@@ -283,11 +294,12 @@ static void lamp_near_a_wall_is_stable(void **state) {
     (void)state;
     static const float gaps[] = {.0001F, .001F, .01F, .1F, .3F};
     for (size_t i = 0; i < sizeof gaps / sizeof *gaps; ++i) {
-        fixture f = begin();
+        fixture f;
+        begin(&f);
         add_square(&f, "wall", 4, identity, material(&f, .5F, 0));
         const float place[12] = {.2F, 0, 0, 0, 0, -.2F, 0, 0, 0, 0, -.2F, gaps[i]};
         add_square(&f, "lamp", 1, place, material(&f, .2F, 1));
-        fct_bake *b = bake(&f, FCT_FINAL_GATHER, 1);
+        fct_bake *b = bake(&f, FCT_FINAL_GATHER);
         fct_mesh lit;
         assert_int_equal(fct_bake_instance(b, 0, &lit), FCT_OK);
         for (uint32_t v = 0; v < lit.vertex_count; ++v) {
@@ -319,5 +331,6 @@ int main(void) {
         cmocka_unit_test(no_light_leaks_under_a_wall),
         cmocka_unit_test(lamp_near_a_wall_is_stable),
     };
+
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
