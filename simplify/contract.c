@@ -12,18 +12,21 @@
 #define MIN_TURN_COSINE .1
 
 static void drop_edge(fct_simplifier *s, uint32_t e) {
-    s->edge_states[e] = EDGE_DEAD;
+    s->edges[e].state = EDGE_DEAD;
 }
 
-static void refuse_edge(fct_simplifier *s, uint32_t e) {
-    s->edge_states[e] = EDGE_REFUSED;
+/* Puts an edge aside until something changes around it. */
+static void refuse_edge(fct_simplifier *s, uint32_t e, const uint32_t ends[2], uint8_t state) {
+    s->edges[e].state = state;
+    s->refused[ends[0]] = s->refused[ends[1]] = 1;
 }
 
 static void requeue_edge(fct_simplifier *s, uint32_t side) {
-    uint32_t e = find_root(s->edge_parents, s->side_edges[side]);
-    if (s->edge_states[e] != EDGE_REFUSED && s->edge_states[e] != EDGE_OVER_BOUND) return;
-    s->edge_states[e] = EDGE_QUEUED;
-    s->edge_ends_only[e] = 0;
+    uint32_t e = edge_root(s->edges, s->side_edges[side]);
+    fct_edge *edge = &s->edges[e];
+    if (edge->state != EDGE_REFUSED && edge->state != EDGE_OVER_BOUND) return;
+    edge->state = EDGE_QUEUED;
+    edge->ends_only = false;
     queue_push(&s->queue, e, s->queue.current);
 }
 
@@ -84,14 +87,15 @@ static void drop_corner(fct_simplifier *s, uint32_t c) {
 
 /* The sides from the face's apex to the two ends of the contracted edge become one edge. */
 static void join_twins(fct_simplifier *s, uint32_t side_a, uint32_t side_b) {
-    uint32_t ea = find_root(s->edge_parents, s->side_edges[side_a]);
-    uint32_t eb = find_root(s->edge_parents, s->side_edges[side_b]);
+    uint32_t ea = edge_root(s->edges, s->side_edges[side_a]);
+    uint32_t eb = edge_root(s->edges, s->side_edges[side_b]);
     if (ea == eb) return;
-    bool queued_a = s->edge_states[ea] == EDGE_QUEUED, queued_b = s->edge_states[eb] == EDGE_QUEUED;
-    bool keep_b = queued_b && (!queued_a || s->queue.bucket_of[eb] > s->queue.bucket_of[ea]);
+    const fct_edge *a = &s->edges[ea], *b = &s->edges[eb];
+    bool queued_a = a->state == EDGE_QUEUED, queued_b = b->state == EDGE_QUEUED;
+    bool keep_b = queued_b && (!queued_a || b->bucket > a->bucket);
     uint32_t keep = keep_b ? eb : ea, drop = keep_b ? ea : eb;
     drop_edge(s, drop);
-    s->edge_parents[drop] = keep;
+    s->edges[drop].parent = keep;
 }
 
 /* Face of corner c at b, which also has a corner at a. */
@@ -193,25 +197,70 @@ static void apply(fct_simplifier *s, uint32_t ends[2], const fct_candidate *cand
     at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
 }
 
+/* Edges of the faces around a point that were put aside come back; `refused` tells where there may be any. */
 static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         if (corner_dead(s, ring[i])) continue;
         uint32_t f = ring[i] - ring[i] % 3;
-        for (uint32_t k = 0; k < 3; ++k) requeue_edge(s, f + k);
+        for (uint32_t k = 0; k < 3; ++k)
+            if (s->refused[s->triangles[f + k]] && s->refused[s->triangles[f + (k + 1) % 3]])
+                requeue_edge(s, f + k);
     }
+}
+
+/* Whether moving b into a, for good or bad, keeps faces from turning over, and topology where asked. */
+static bool allowed(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b, v3 at) {
+    if (s->def->keep_topology && !fct_simplify_link_holds(s, a, b, count_a, count_b)) return false;
+    return !s->def->check_foldover ||
+           !(fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), at) ||
+             fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), at));
+}
+
+/* Gathers both rings (b's alone where a is a hub) and contracts if that is allowed. */
+static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], const fct_candidate *candidate) {
+    fct_edge *edge = &s->edges[e];
+    uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
+    uint32_t a = ends[keep], b = ends[1 - keep];
+    bool hub = s->valences[a] > SIMPLIFY_HUB, two_hubs = s->valences[b] > SIMPLIFY_HUB;
+    uint32_t count_a = hub ? 0 : fct_simplify_gather(s, a, s->ring_a);
+    uint32_t count_b = fct_simplify_gather(s, b, s->ring_b), shared = 0;
+    for (uint32_t i = 0; i < count_b; ++i)
+        shared +=
+            s->triangles[corner_next(s->ring_b[i])] == a || s->triangles[corner_previous(s->ring_b[i])] == a;
+    bool fine = shared > 0 && allowed(s, a, b, count_a, count_b, candidate->at);
+    if (!fine) {
+        /* An edge without faces is none any more; two hubs are looked at once only, for the time it takes. */
+        if (shared == 0 || two_hubs)
+            drop_edge(s, e);
+        else if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
+            refuse_edge(s, e, ends, EDGE_REFUSED);
+        else {
+            edge->ends_only = true;
+            queue_push(&s->queue, e, s->queue.current);
+        }
+        return false;
+    }
+    drop_edge(s, e);
+    apply(s, ends, candidate, keep, count_b);
+    s->refused[a] |= s->refused[b];
+    if (s->refused[a]) {
+        requeue_around(s, s->ring_a, count_a);
+        requeue_around(s, s->ring_b, count_b);
+    }
+    return true;
 }
 
 /* Looks at the edge that came up: contracts it, sends it back, refuses or drops it. True when contracted. */
 static bool process_edge(fct_simplifier *s, uint32_t e) {
     uint32_t ends[2];
-    for (int k = 0; k < 2; ++k) ends[k] = find_root(s->point_parents, s->edge_ends[2 * (size_t)e + k]);
+    for (int k = 0; k < 2; ++k) ends[k] = find_root(s->point_parents, s->edges[e].ends[k]);
     if (ends[0] == ends[1]) {
         drop_edge(s, e);
         return false;
     }
     fct_candidate candidate;
-    if (!fct_place(s, ends[0], ends[1], s->edge_ends_only[e], &candidate)) {
-        refuse_edge(s, e);
+    if (!fct_place(s, ends[0], ends[1], s->edges[e].ends_only, &candidate)) {
+        refuse_edge(s, e, ends, EDGE_REFUSED);
         return false;
     }
     uint32_t bucket = queue_bucket(candidate.key);
@@ -219,44 +268,13 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
         queue_push(&s->queue, e, bucket);
         return false;
     }
-    double bound = s->def->max_error / s->extent, error2 = 0;
-    if (candidate.error > 0) error2 = candidate.error / candidate.area;
+    double bound = s->def->max_error / s->extent;
+    double error2 = candidate.error > 0 ? candidate.error / candidate.area : 0;
     if (error2 > bound * bound) {
-        s->edge_states[e] = EDGE_OVER_BOUND;
+        refuse_edge(s, e, ends, EDGE_OVER_BOUND);
         return false;
     }
-    uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
-    uint32_t a = ends[keep], b = ends[1 - keep];
-    bool hub = s->valences[a] > SIMPLIFY_HUB;
-    uint32_t count_a = hub ? 0 : fct_simplify_gather(s, a, s->ring_a),
-             count_b = fct_simplify_gather(s, b, s->ring_b);
-    uint32_t shared = 0;
-    for (uint32_t i = 0; i < count_b; ++i)
-        shared +=
-            s->triangles[corner_next(s->ring_b[i])] == a || s->triangles[corner_previous(s->ring_b[i])] == a;
-    if (shared == 0) {
-        drop_edge(s, e);
-        return false;
-    }
-    if (s->def->keep_topology && !fct_simplify_link_holds(s, a, b, count_a, count_b)) {
-        refuse_edge(s, e);
-        return false;
-    }
-    if (s->def->check_foldover &&
-        (fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), candidate.at) ||
-         fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), candidate.at))) {
-        if (s->edge_ends_only[e] || s->def->placement > FCT_PLACE_SEGMENT)
-            refuse_edge(s, e);
-        else {
-            s->edge_ends_only[e] = 1;
-            queue_push(&s->queue, e, s->queue.current);
-        }
-        return false;
-    }
-    drop_edge(s, e);
-    apply(s, ends, &candidate, keep, count_b);
-    requeue_around(s, s->ring_a, count_a);
-    requeue_around(s, s->ring_b, count_b);
+    if (!try_contraction(s, e, ends, &candidate)) return false;
     s->max_error2 = fmax(s->max_error2, error2);
     return true;
 }
@@ -266,8 +284,8 @@ static void first_buckets(void *user, size_t begin, size_t end, size_t chunk, ui
     fct_simplifier *s = user;
     for (size_t e = begin; e < end; ++e) {
         fct_candidate candidate;
-        bool placed = fct_place(s, s->edge_ends[2 * e], s->edge_ends[2 * e + 1], false, &candidate);
-        s->queue.bucket_of[e] = (uint16_t)(placed ? queue_bucket(candidate.key) : 0);
+        bool placed = fct_place(s, s->edges[e].ends[0], s->edges[e].ends[1], false, &candidate);
+        s->edges[e].bucket = (uint16_t)(placed ? queue_bucket(candidate.key) : 0);
     }
 }
 
@@ -275,15 +293,14 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     uint32_t before = s->live_faces, contractions = 0;
     *stop = FCT_STOP_FACES;
     if (before <= s->def->target_faces) return FCT_OK;
-    fct_result result = queue_create(s->env, s->edge_count, &s->queue);
-    if (result == FCT_OK)
-        result = fct_parallel_for_progress(s->env, "costs", s->edge_count, 4096, first_buckets, s);
+    fct_result result = fct_parallel_for_progress(s->env, "costs", s->edge_count, 4096, first_buckets, s);
     if (result != FCT_OK) return result;
-    for (uint32_t e = s->edge_count; e-- > 0;) queue_push(&s->queue, e, s->queue.bucket_of[e]);
+    queue_clear(&s->queue, s->edges);
+    for (uint32_t e = s->edge_count; e-- > 0;) queue_push(&s->queue, e, s->edges[e].bucket);
     while (s->live_faces > s->def->target_faces) {
         uint32_t e = queue_pop(&s->queue);
         if (e == FCT_NONE) break;
-        if (s->edge_states[e] != EDGE_QUEUED) continue;
+        if (s->edges[e].state != EDGE_QUEUED) continue;
         if (!process_edge(s, e) || ++contractions % 4096) continue;
         double goal = (double)before - s->def->target_faces;
         result = fct_progress(s->env, "contract", (before - s->live_faces) / goal);
@@ -292,6 +309,6 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     if (s->live_faces <= s->def->target_faces) return FCT_OK;
     *stop = FCT_STOP_EXHAUSTED;
     for (uint32_t e = 0; e < s->edge_count; ++e)
-        if (s->edge_states[e] == EDGE_OVER_BOUND) *stop = FCT_STOP_ERROR;
+        if (s->edges[e].state == EDGE_OVER_BOUND) *stop = FCT_STOP_ERROR;
     return FCT_OK;
 }

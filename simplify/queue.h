@@ -12,9 +12,19 @@
 
 enum { QUEUE_BUCKETS = 2048 };
 
+enum { EDGE_QUEUED, EDGE_REFUSED, EDGE_OVER_BOUND, EDGE_DEAD };
+
+typedef struct fct_edge {
+    uint32_t ends[2]; /* points when the edge was made; resolve */
+    uint32_t parent;  /* the twin that took its place, itself while alive */
+    uint32_t next;    /* in its bucket */
+    uint16_t bucket;
+    uint8_t state;
+    bool ends_only; /* the minimiser turned a face over: place at an end or the middle */
+} fct_edge;
+
 typedef struct fct_queue {
-    uint32_t *next; /* by edge */
-    uint16_t *bucket_of;
+    fct_edge *edges;
     uint32_t first[QUEUE_BUCKETS];
     uint32_t current; /* no bucket below holds an edge */
 } fct_queue;
@@ -28,9 +38,9 @@ static inline uint32_t queue_bucket(double cost) {
 }
 
 static inline void queue_push(fct_queue *q, uint32_t edge, uint32_t bucket) {
-    q->next[edge] = q->first[bucket];
+    q->edges[edge].next = q->first[bucket];
     q->first[bucket] = edge;
-    q->bucket_of[edge] = (uint16_t)bucket;
+    q->edges[edge].bucket = (uint16_t)bucket;
     if (bucket < q->current) q->current = bucket;
 }
 
@@ -39,21 +49,14 @@ static inline uint32_t queue_pop(fct_queue *q) {
     while (q->current < QUEUE_BUCKETS && q->first[q->current] == FCT_NONE) ++q->current;
     if (q->current == QUEUE_BUCKETS) return FCT_NONE;
     uint32_t edge = q->first[q->current];
-    q->first[q->current] = q->next[edge];
+    q->first[q->current] = q->edges[edge].next;
     return edge;
 }
 
-static inline fct_result queue_create(const fct_env *env, uint32_t edge_count, fct_queue *q) {
-    q->next = fct_allocate(env, edge_count, sizeof *q->next);
-    q->bucket_of = fct_allocate(env, edge_count, sizeof *q->bucket_of);
+static inline void queue_clear(fct_queue *q, fct_edge *edges) {
+    q->edges = edges;
     for (uint32_t i = 0; i < QUEUE_BUCKETS; ++i) q->first[i] = FCT_NONE;
     q->current = QUEUE_BUCKETS;
-    return q->next && q->bucket_of ? FCT_OK : fct_fail_memory(env, "the queue of contractions");
-}
-
-static inline void queue_release(const fct_env *env, fct_queue *q) {
-    fct_release(env, q->next);
-    fct_release(env, q->bucket_of);
 }
 
 #endif

@@ -41,14 +41,12 @@ static fct_result check(const fct_env *env, const fct_mesh *mesh, const fct_simp
 }
 
 static void release(fct_simplifier *s) {
-    void *arrays[] = {
-        s->point_of,       s->positions,     s->sources,       s->point_parents, s->first_corners,
-        s->last_corners,   s->valences,      s->first_wedges,  s->triangles,     s->next_corners,
-        s->side_edges,     s->corner_wedges, s->edge_ends,     s->edge_parents,  s->edge_states,
-        s->edge_ends_only, s->edge_flags,    s->quadrics,      s->attributes,    s->wedge_parents,
-        s->next_wedges,    s->wedge_uses,    s->wedge_classes, s->class_parents, s->link_marks};
+    void *arrays[] = {s->point_of,      s->positions,     s->sources,      s->point_parents, s->first_corners,
+                      s->last_corners,  s->valences,      s->first_wedges, s->triangles,     s->next_corners,
+                      s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,    s->quadrics,
+                      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,    s->wedge_classes,
+                      s->class_parents, s->link_marks,    s->ring_b,       s->refused};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
-    queue_release(s->env, &s->queue);
 }
 
 /* Numbers what becomes a vertex, by a key per live corner, in order of first use. */
@@ -152,7 +150,12 @@ static fct_result prepare(fct_simplifier *s) {
     fct_result result = fct_simplify_topology(s);
     if (result == FCT_OK) result = fct_simplify_attributes(s);
     if (result == FCT_OK) result = fct_simplify_quadrics(s);
-    if (result != FCT_OK || !s->def->keep_topology) return result;
+    if (result != FCT_OK) return result;
+    size_t ring = s->face_count > SIMPLIFY_HUB ? s->face_count : SIMPLIFY_HUB;
+    s->ring_b = fct_allocate(s->env, ring, sizeof *s->ring_b);
+    s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
+    if (!s->ring_b || !s->refused) return fct_fail_memory(s->env, "rings");
+    if (!s->def->keep_topology) return FCT_OK;
     s->link_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->link_marks);
     return s->link_marks ? FCT_OK : fct_fail_memory(s->env, "marks of points");
 }

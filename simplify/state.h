@@ -23,7 +23,6 @@ enum {
     SIMPLIFY_HUB = 512,        /* a point of more faces than this stays where it is */
 };
 
-enum { EDGE_QUEUED, EDGE_REFUSED, EDGE_OVER_BOUND, EDGE_DEAD };
 enum { EDGE_BOUNDARY = 1, EDGE_BORDER = 2 };
 
 /* One float of an attribute: value * factor is its coordinate beside the position. */
@@ -58,12 +57,8 @@ typedef struct fct_simplifier {
     uint32_t *side_edges;
     uint32_t *corner_wedges; /* NULL without attributes; resolve with fct_wedge_find */
 
-    /* By edge. */
-    uint32_t *edge_ends;    /* x 2 points */
-    uint32_t *edge_parents; /* twin that took its place */
-    uint8_t *edge_states;
-    uint8_t *edge_ends_only; /* the minimiser turned a face over: place at an end or the middle */
-    uint8_t *edge_flags;     /* until the quadrics are made */
+    fct_edge *edges;
+    uint8_t *edge_flags; /* by edge, until the quadrics are made */
 
     /* By wedge. The first `steering` of `channels` are dimensions of the quadrics. */
     uint32_t steering, channel_count, quadric_size;
@@ -76,8 +71,10 @@ typedef struct fct_simplifier {
     uint32_t class_count;
 
     fct_queue queue;
-    uint32_t ring_a[SIMPLIFY_HUB], ring_b[SIMPLIFY_HUB]; /* corners around the ends of the edge at hand */
-    uint32_t *link_marks;                                /* by point, with keep_topology */
+    uint32_t ring_a[SIMPLIFY_HUB]; /* corners around the ends of the edge at hand */
+    uint32_t *ring_b;              /* x face_count */
+    uint8_t *refused;              /* by point: an edge there may be refused */
+    uint32_t *link_marks;          /* by point, with keep_topology */
     uint32_t link_epoch;
     double max_error2; /* largest squared error of a contraction made */
 } fct_simplifier;
@@ -88,6 +85,13 @@ static inline uint32_t find_root(uint32_t *parents, uint32_t i) {
         i = parents[i];
     }
     return i;
+}
+static inline uint32_t edge_root(fct_edge *edges, uint32_t e) {
+    while (edges[e].parent != e) {
+        edges[e].parent = edges[edges[e].parent].parent;
+        e = edges[e].parent;
+    }
+    return e;
 }
 static inline uint32_t corner_next(uint32_t c) {
     return c % 3 == 2 ? c - 2 : c + 1;

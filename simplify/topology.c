@@ -225,7 +225,7 @@ static void add_side(fct_simplifier *s, edge_builder *b, uint32_t a, uint32_t ot
         b->slots[other] = e;
         b->apexes[e] = apex;
         b->faces[e] = f;
-        s->edge_ends[2 * (size_t)e] = a, s->edge_ends[2 * (size_t)e + 1] = other;
+        s->edges[e] = (fct_edge){.ends = {a, other}, .parent = e};
         s->edge_flags[e] = EDGE_BOUNDARY;
     }
     uint32_t e = b->slots[other];
@@ -241,10 +241,10 @@ static fct_result make_edges(fct_simplifier *s) {
     b.slots = fct_allocate(s->env, s->point_count, sizeof *b.slots);
     b.apexes = fct_allocate(s->env, corners, sizeof *b.apexes);
     b.faces = fct_allocate(s->env, corners, sizeof *b.faces);
-    s->edge_ends = fct_allocate(s->env, corners, 2 * sizeof *s->edge_ends);
+    s->edges = fct_allocate(s->env, corners, sizeof *s->edges);
     s->edge_flags = fct_allocate_zero(s->env, corners, sizeof *s->edge_flags);
     fct_result result = FCT_OK;
-    if (!b.marks || !b.slots || !b.apexes || !b.faces || !s->edge_ends || !s->edge_flags) {
+    if (!b.marks || !b.slots || !b.apexes || !b.faces || !s->edges || !s->edge_flags) {
         result = fct_fail_memory(s->env, "the edges of a mesh");
         goto done;
     }
@@ -256,13 +256,6 @@ static fct_result make_edges(fct_simplifier *s) {
             if (y > a) add_side(s, &b, a, y, c);
             if (z > a) add_side(s, &b, a, z, previous);
         }
-    s->edge_parents = fct_allocate(s->env, s->edge_count, sizeof *s->edge_parents);
-    s->edge_states = fct_allocate_zero(s->env, s->edge_count, sizeof *s->edge_states);
-    s->edge_ends_only = fct_allocate_zero(s->env, s->edge_count, sizeof *s->edge_ends_only);
-    if (!s->edge_parents || !s->edge_states || !s->edge_ends_only)
-        result = fct_fail_memory(s->env, "the edges of a mesh");
-    else
-        for (uint32_t e = 0; e < s->edge_count; ++e) s->edge_parents[e] = e;
 done:
     fct_release(s->env, b.marks);
     fct_release(s->env, b.slots);
