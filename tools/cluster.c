@@ -294,16 +294,21 @@ static json_t *sum_reports(const jobs *all, double seconds) {
 
 static int cluster_many(tool *t, const fct_tree_def *def) {
     jobs all = {0};
-    int code = tool_check_folder(t, t->output), failed = 0, worst = TOOL_DONE;
+    int code = TOOL_DONE, failed = 0, worst = TOOL_DONE;
     for (int i = 0; i < t->input_count && code == TOOL_DONE; ++i)
         code = tool_is_folder(t->inputs[i]) ? add_folder(t, &all, t->inputs[i])
                                             : add_job(t, &all, NULL, t->inputs[i]);
+    if (code == TOOL_DONE) code = tool_check_folder(t, t->output);
     if (code != TOOL_DONE) goto done;
     if (!t->threads) t->threads = (uint32_t)sysconf(_SC_NPROCESSORS_ONLN);
     code = run_jobs(t, def, &all, t->threads < (uint32_t)all.count ? t->threads : (uint32_t)all.count);
     for (int i = all.count - 1; i >= 0; --i)
         if (all.list[i].code != TOOL_DONE) ++failed, worst = all.list[i].code;
-    if (code == TOOL_DONE && failed) code = tool_fail(t, worst, "%d of %d files failed", failed, all.count);
+    /* Each failure has been told by its process. */
+    if (code == TOOL_DONE && failed) {
+        code = tool_fail(t, worst, "%d of %d files failed", failed, all.count);
+        t->error_told = failed == 1;
+    }
     if (code == TOOL_DONE) code = tool_json(t, sum_reports(&all, tool_seconds() - t->start));
 done:
     for (int i = 0; i < all.count; ++i) {

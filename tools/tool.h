@@ -45,6 +45,7 @@ typedef struct tool {
     size_t memory_now, memory_peak;
     bool memory_refused, cancelled;
     char error[1536];
+    bool error_told; /* there is nothing to add */
     char phase[64];
     double phase_start, drawn;
     bool bar_visible, bar_off;

@@ -260,7 +260,7 @@ void tool_env_open(tool *t) {
 
 int tool_env_close(tool *t, int code) {
     clear_bar(t);
-    if (code == TOOL_DONE || code == TOOL_NO) return code;
+    if (code == TOOL_DONE || code == TOOL_NO || t->error_told) return code;
     if (interrupted) code = TOOL_CANCELLED;
     fprintf(stderr, "facetree %s: %s", t->name, t->error[0] ? t->error : "failed");
     if (code == TOOL_MEMORY && t->max_memory && t->memory_refused)

@@ -129,7 +129,7 @@ done
 grid 24 >flat.off
 accepted flat.off
 for power in -30 30; do
-    sphere 8 | awk -v p=$power 'NF == 3 && NR > 2 { printf "%.9ge%d %.9ge%d %.9ge%d\n", $1, p, $2, p, $3, p; next } { print }' >extent$power.off
+    sphere 8 | awk -v p=$power 'NF == 3 && NR > 2 { printf "%.9g %.9g %.9g\n", $1 * 10 ^ p, $2 * 10 ^ p, $3 * 10 ^ p; next } { print }' >extent$power.off
     accepted extent$power.off
 done
 { sphere 6; } >twice.off # every face a second time, turned over

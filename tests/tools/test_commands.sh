@@ -45,7 +45,7 @@ says "would both be written to"
 mkdir empty
 expect 66 cluster empty -o both
 echo nonsense >in/bad.off
-expect 65 cluster in -o trees 2>/dev/null || { [ "$code" = 65 ] && failures=$((failures - 1)); } # two lines: the file's and the sum
+expect 65 cluster in -o trees
 check "the bad file is named" grep -q 'in/bad.off' err
 
 # --- partition, boxes ---
@@ -85,19 +85,19 @@ holds "$(value faces) == 72 && $(value vertices) == 48 && $(value boundary_edges
 # --- raycast, closest ---
 cat >rays.txt <<'END'
 # from outside, from inside, past, too short, beginning behind
-0 0 5  0 0 -1
-0 0 0  1 0 0 # a comment
+.1 .2 5  0 0 -1
+0 .1 .2  1 0 0 # a comment
 5 5 5  0 0 1
 
-0 0 5  0 0 -1  0 3
-0 0 5  0 0 -2  2.5 inf
+.1 .2 5  0 0 -1  0 3
+.1 .2 5  0 0 -2  2.5 inf
 END
 expect 0 raycast cube.off --rays rays.txt
 awk '{ print ($1 < 0 ? "miss" : $2) }' out | tr '\n' ' ' >ts
 check "closest hits of a cube" test "$(cat ts)" = "4 1 miss miss 3 "
 cp out obb.txt
 expect 0 raycast cube.off --rays - -o hits.txt --backend embree <rays.txt
-check "both backends agree" test "$(awk '{ print $1 < 0 ? -1 : $2 }' hits.txt)" = "$(awk '{ print $1 < 0 ? -1 : $2 }' obb.txt)"
+check "both backends hit the same faces" test "$(cut -d " " -f 1 hits.txt)" = "$(cut -d " " -f 1 obb.txt)"
 expect 0 raycast cube.off --rays rays.txt --occlusion
 check "occlusion" test "$(tr '\n' ' ' <out)" = "1 1 0 0 1 "
 expect 0 raycast cube.off --rays rays.txt --json

@@ -1,6 +1,6 @@
 # tests/tools/test_threads.sh: the same bytes for every number of threads, and from run to run.
 source "$(dirname "$0")/support.sh"
-sphere 40 | awk 'NF == 3 && NR > 2 { r = 1 + .05 * sin(40 * $1) * sin(31 * $2) * cos(23 * $3); print r * $1, r * $2, r * $3; next } { print }' >bumpy.off
+sphere 24 | awk 'NF == 3 && NR > 2 { r = 1 + .05 * sin(40 * $1) * sin(31 * $2) * cos(23 * $3); print r * $1, r * $2, r * $3; next } { print }' >bumpy.off
 cube 4 | awk 'NF == 4 { print $1, $2, $4, $3; next } { print }' >room.off
 cube 1 >lamp.off
 cat >scene.json <<'END'
