@@ -210,8 +210,9 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
     v3 pa = point_position(s, a), pb = point_position(s, b);
-    bool hub_a = s->valences[a] > SIMPLIFY_HUB, hub_b = s->valences[b] > SIMPLIFY_HUB;
-    if (hub_a && hub_b) (s->valences[a] >= s->valences[b] ? &hub_b : &hub_a)[0] = false;
+    bool larger_b = s->valences[b] > s->valences[a]; /* of two hubs the larger stays */
+    bool hub_a = !larger_b && s->valences[a] > SIMPLIFY_HUB;
+    bool hub_b = larger_b && s->valences[b] > SIMPLIFY_HUB;
     if (!position_quadric(s, a, b, r, &g, sums)) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};

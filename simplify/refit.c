@@ -17,21 +17,34 @@
 /* Distances below this, in the unit cube, are rounding of the input's floats. */
 #define NOISE 1e-7
 
-enum { SAMPLES_AT_ONCE = 1 << 16, MAX_STEPS = 4 };
+enum { GRAIN = 1024, MAX_STEPS = 4 };
 
-/* Where a sample came to lie: a face of the result, and barycentrics of its second and third corner. */
+/* A face of the result, ready for the search. */
+typedef struct target {
+    v3 a, ab, ac, n;        /* first corner, sides from it, unit normal */
+    double aa, bb, cc, det; /* ab.ab, ab.ac, ac.ac, aa cc - bb bb */
+    uint32_t face;
+} target;
+
+/* Where a sample came to lie: barycentrics of the second and third corner. */
 typedef struct landing {
-    uint32_t face;   /* FCT_NONE: nowhere */
+    uint32_t target; /* FCT_NONE: nowhere */
     bool attributes; /* on its own side of a seam, so that its attributes count */
     float u, v;
 } landing;
+
+typedef struct ring_entry {
+    uint32_t corner, target;
+} ring_entry;
 
 typedef struct refit {
     fct_simplifier *s;
     uint32_t *corners;      /* by wedge of the input, which is a sample: a corner of it, or FCT_NONE */
     double *corner_weights; /* by wedge of the input */
-    size_t first;           /* sample number of landings[0]; samples after the wedges are the faces */
-    landing *landings;
+    landing *landings;      /* by sample: the wedges of the input, then its faces */
+    target *targets;        /* the live faces */
+    ring_entry *rings;      /* the corners at each point, point after point */
+    uint32_t *ring_ends;    /* by point: end of its part of rings; it begins valence before */
     double (*systems)[9];   /* by point: xx xy xz yy yz zz, then the right side */
     double *sums, *weights; /* by wedge and channel; by wedge */
 } refit;
@@ -40,44 +53,43 @@ typedef struct foot {
     double u, v, distance2;
 } foot;
 
-/* The nearest point of a + u ab + v ac to p, by the regions of the triangle's corners and sides. */
-static foot nearest_on_triangle(v3 p, v3 a, v3 ab, v3 ac) {
-    v3 ap = v3_sub(p, a);
-    double d1 = v3_dot(ab, ap), d2 = v3_dot(ac, ap);
-    double aa = v3_norm2(ab), cc = v3_norm2(ac), b = v3_dot(ab, ac);
-    double det = aa * cc - b * b, u = cc * d1 - b * d2, v = aa * d2 - b * d1;
-    if (det > 0 && u >= 0 && v >= 0 && u + v <= det)
-        u /= det, v /= det;
+/* The nearest point of the face to p, by the regions of the triangle's corners and sides. */
+static foot nearest_on(const target *t, v3 p) {
+    v3 ap = v3_sub(p, t->a);
+    double d1 = v3_dot(t->ab, ap), d2 = v3_dot(t->ac, ap), aa = t->aa, bb = t->bb, cc = t->cc;
+    double u = cc * d1 - bb * d2, v = aa * d2 - bb * d1;
+    if (t->det > 0 && u >= 0 && v >= 0 && u + v <= t->det)
+        u /= t->det, v /= t->det;
     else {
         double on_ab = aa > 0 ? fmin(fmax(d1 / aa, 0), 1) : 0;
         double on_ac = cc > 0 ? fmin(fmax(d2 / cc, 0), 1) : 0;
-        double bc2 = aa + cc - 2 * b, along = d2 - d1 + aa - b; /* (p - b).(c - b) */
-        double on_bc = bc2 > 0 ? fmin(fmax(along / bc2, 0), 1) : 0;
+        double bc2 = aa + cc - 2 * bb, along = d2 - d1 + aa - bb; /* (p - b).(c - b) */
+        double y = bc2 > 0 ? fmin(fmax(along / bc2, 0), 1) : 0, x = 1 - y;
         double e_ab = on_ab * (on_ab * aa - 2 * d1), e_ac = on_ac * (on_ac * cc - 2 * d2);
-        double x = 1 - on_bc, y = on_bc;
-        double e_bc = x * x * aa + y * y * cc + 2 * x * y * b - 2 * (x * d1 + y * d2);
+        double e_bc = x * x * aa + y * y * cc + 2 * x * y * bb - 2 * (x * d1 + y * d2);
         u = on_ab, v = 0;
         if (e_ac < e_ab) u = 0, v = on_ac;
         if (e_bc < fmin(e_ab, e_ac)) u = x, v = y;
     }
-    v3 rest = v3_sub(ap, v3_add(v3_scale(ab, u), v3_scale(ac, v)));
+    v3 rest = v3_sub(ap, v3_add(v3_scale(t->ab, u), v3_scale(t->ac, v)));
     return (foot){u, v, v3_norm2(rest)};
 }
 
 /* Looks for the nearest face around a point, among those on the wedge's side of a seam if there are any. */
-static void search_ring(const fct_simplifier *s, uint32_t point, uint32_t wedge, v3 p, foot *best,
-                        landing *out) {
+static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, foot *best, landing *out) {
+    const fct_simplifier *s = r->s;
     if (s->valences[point] > SIMPLIFY_HUB) return;
-    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
-        bool same_side = s->corner_wedges && s->wedge_parents[s->corner_wedges[c]] == wedge;
+    uint32_t end = r->ring_ends[point];
+    for (uint32_t i = end - s->valences[point]; i < end; ++i) {
+        const target *t = &r->targets[r->rings[i].target];
+        bool same_side = s->corner_wedges && s->wedge_parents[s->corner_wedges[r->rings[i].corner]] == wedge;
         if (out->attributes && !same_side) continue;
-        const uint32_t *t = s->triangles + (c - c % 3);
-        v3 a = point_position(s, t[0]);
-        foot found =
-            nearest_on_triangle(p, a, v3_sub(point_position(s, t[1]), a), v3_sub(point_position(s, t[2]), a));
+        double height = v3_dot(t->n, v3_sub(p, t->a));
+        if (same_side == out->attributes && height * height >= best->distance2) continue;
+        foot found = nearest_on(t, p);
         if (same_side == out->attributes && found.distance2 >= best->distance2) continue;
         *best = found;
-        out->face = c / 3;
+        out->target = r->rings[i].target;
         out->attributes = same_side;
     }
 }
@@ -124,52 +136,53 @@ static v3 sample_position(const fct_simplifier *s, const uint32_t *corners, uint
 
 /* Goes on from a foot on the rim of the rings searched to the rings of that side's ends, while it gets
  * nearer. */
-static void walk(const fct_simplifier *s, const uint32_t *points, uint32_t count, v3 p, foot *best,
-                 landing *out) {
+static void walk(const refit *r, const uint32_t *points, uint32_t count, v3 p, foot *best, landing *out) {
+    const fct_simplifier *s = r->s;
     uint32_t searched[3 + 2 * MAX_STEPS], number = count;
     memcpy(searched, points, count * sizeof *points);
-    for (uint32_t step = 0; step < MAX_STEPS && out->face != FCT_NONE; ++step) {
-        const uint32_t *t = s->triangles + 3 * (size_t)out->face;
+    for (uint32_t step = 0; step < MAX_STEPS && out->target != FCT_NONE; ++step) {
+        uint32_t from = out->target, first = 3 * r->targets[from].face, fresh = number;
         double b[3] = {1 - best->u - best->v, best->u, best->v};
-        uint32_t fresh = number, face = out->face;
-        bool inside = true, met[3];
         for (uint32_t k = 0; k < 3; ++k) {
-            met[k] = false;
-            for (uint32_t j = 0; j < number; ++j) met[k] |= searched[j] == t[k];
-            if (met[k] && b[k] > 1e-6) return;
-            inside &= b[k] > 1e-6;
+            bool met = false;
+            for (uint32_t j = 0; j < number; ++j) met |= searched[j] == s->triangles[first + k];
+            if (met && b[k] > 1e-6) return;
+            if (!met && b[k] > 1e-6) searched[fresh++] = s->triangles[first + k];
         }
-        if (inside) return;
-        for (uint32_t k = 0; k < 3; ++k)
-            if (!met[k] && b[k] > 1e-6) searched[fresh++] = t[k];
+        if (fresh == number + 3) return; /* inside a face */
         for (; number < fresh; ++number) {
             uint32_t wedge = FCT_NONE;
             for (uint32_t k = 0; k < 3 && s->corner_wedges; ++k)
-                if (s->triangles[3 * (size_t)face + k] == searched[number])
-                    wedge = s->wedge_parents[s->corner_wedges[3 * (size_t)face + k]];
-            search_ring(s, searched[number], wedge, p, best, out);
+                if (s->triangles[first + k] == searched[number])
+                    wedge = s->wedge_parents[s->corner_wedges[first + k]];
+            search_ring(r, searched[number], wedge, p, best, out);
         }
-        if (out->face == face) return;
+        if (out->target == from) return;
     }
 }
 
+/* In the first pass, searches; later, finds the foot on the same face, for points move little. */
 static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     refit *r = user;
     const fct_simplifier *s = r->s;
     for (size_t i = begin; i < end; ++i) {
         landing *out = &r->landings[i];
-        *out = (landing){.face = FCT_NONE};
-        uint32_t corners[3], points[3], count = sample_corners(r, r->first + i, corners);
+        uint32_t corners[3], points[3], count = sample_corners(r, i, corners);
         v3 p = sample_position(s, corners, count);
         foot best = {0, 0, INFINITY};
-        for (uint32_t k = 0; k < count; ++k) {
-            uint32_t input = input_wedge(s, corners[k]);
-            points[k] = s->point_parents[s->point_of[s->mesh->triangles[corners[k]]]];
-            if ((k > 0 && points[k] == points[0]) || (k > 1 && points[k] == points[1])) continue;
-            search_ring(s, points[k], s->corner_wedges ? s->wedge_parents[input] : FCT_NONE, p, &best, out);
+        if (out->target != FCT_NONE)
+            best = nearest_on(&r->targets[out->target], p);
+        else {
+            for (uint32_t k = 0; k < count; ++k) {
+                uint32_t input = input_wedge(s, corners[k]);
+                points[k] = s->point_parents[s->point_of[s->mesh->triangles[corners[k]]]];
+                if ((k > 0 && points[k] == points[0]) || (k > 1 && points[k] == points[1])) continue;
+                search_ring(r, points[k], s->corner_wedges ? s->wedge_parents[input] : FCT_NONE, p, &best,
+                            out);
+            }
+            walk(r, points, count, p, &best, out);
         }
-        walk(s, points, count, p, &best, out);
         out->u = (float)best.u, out->v = (float)best.v;
     }
 }
@@ -184,12 +197,12 @@ static double input_value(const fct_simplifier *s, const fct_channel *channel, u
     return value * channel->factor;
 }
 
-static void add_attributes(refit *r, const uint32_t *corners, uint32_t count, const landing *at,
+static void add_attributes(refit *r, const uint32_t *corners, uint32_t count, uint32_t face,
                            const double b[3], double weight) {
     const fct_simplifier *s = r->s;
     uint32_t n = s->channel_count, wedges[3];
     for (uint32_t k = 0; k < 3; ++k) {
-        wedges[k] = s->wedge_parents[s->corner_wedges[3 * (size_t)at->face + k]];
+        wedges[k] = s->wedge_parents[s->corner_wedges[3 * (size_t)face + k]];
         r->weights[wedges[k]] += weight * b[k];
     }
     for (uint32_t i = 0; i < n; ++i) {
@@ -203,24 +216,22 @@ static void add_attributes(refit *r, const uint32_t *corners, uint32_t count, co
 
 static void add_sample(refit *r, size_t sample, const landing *at) {
     const fct_simplifier *s = r->s;
-    if (at->face == FCT_NONE) return;
+    if (at->target == FCT_NONE) return;
     uint32_t corners[3], count = sample_corners(r, sample, corners);
     double weight = count == 1 ? r->corner_weights[sample] : .75 * input_area(s, corners[0] / 3);
-    const uint32_t *t = s->triangles + 3 * (size_t)at->face;
-    v3 a = point_position(s, t[0]), ab = v3_sub(point_position(s, t[1]), a);
-    v3 ac = v3_sub(point_position(s, t[2]), a);
+    const target *face = &r->targets[at->target];
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
-    v3 rest = v3_sub(sample_position(s, corners, count), a);
-    rest = v3_sub(rest, v3_add(v3_scale(ab, b[1]), v3_scale(ac, b[2])));
+    v3 rest = v3_sub(sample_position(s, corners, count), face->a);
+    rest = v3_sub(rest, v3_add(v3_scale(face->ab, b[1]), v3_scale(face->ac, b[2])));
     double residual = v3_norm(rest);
-    v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : v3_unit(v3_cross(ab, ac));
-    for (int k = 0; k < 3; ++k) {
-        double *system = r->systems[t[k]];
+    v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : face->n;
+    for (size_t k = 0; k < 3; ++k) {
+        double *system = r->systems[s->triangles[3 * (size_t)face->face + k]];
         sym3_add_outer(system, weight * b[k] * b[k], n);
         double g = residual > NOISE ? weight * b[k] * residual : 0;
         system[6] += g * n.x, system[7] += g * n.y, system[8] += g * n.z;
     }
-    if (at->attributes) add_attributes(r, corners, count, at, b, weight);
+    if (at->attributes) add_attributes(r, corners, count, face->face, b, weight);
 }
 
 /* Solves (A + ridge I) d = g by Cramer's rule; the ridge keeps the determinant away from 0. */
@@ -273,14 +284,44 @@ static void move_attributes(refit *r) {
     }
 }
 
-/* Resolves parents, drops dead corners from the rings, and gives each wedge of the input its weight. */
+/* Numbers the live faces and lists them at their points. */
+static void number_targets(refit *r) {
+    fct_simplifier *s = r->s;
+    uint32_t end = 0, live = 0;
+    for (uint32_t p = 0; p < s->point_count; ++p) {
+        r->ring_ends[p] = end;
+        end += s->valences[p];
+    }
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
+        if (corner_dead(s, 3 * f)) continue;
+        for (uint32_t c = 3 * f; c < 3 * f + 3; ++c)
+            r->rings[r->ring_ends[s->triangles[c]]++] = (ring_entry){c, live};
+        r->targets[live++].face = f;
+    }
+}
+
+static void set_targets(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    refit *r = user;
+    for (size_t i = begin; i < end; ++i) {
+        target *t = &r->targets[i];
+        const uint32_t *points = r->s->triangles + 3 * (size_t)t->face;
+        t->a = point_position(r->s, points[0]);
+        t->ab = v3_sub(point_position(r->s, points[1]), t->a);
+        t->ac = v3_sub(point_position(r->s, points[2]), t->a);
+        t->n = v3_unit(v3_cross(t->ab, t->ac));
+        t->aa = v3_norm2(t->ab), t->bb = v3_dot(t->ab, t->ac), t->cc = v3_norm2(t->ac);
+        t->det = t->aa * t->cc - t->bb * t->bb;
+    }
+}
+
+/* Resolves parents, lists the faces, and gives each wedge of the input its weight. */
 static void prepare(refit *r) {
     fct_simplifier *s = r->s;
     for (uint32_t p = 0; p < s->point_count; ++p) s->point_parents[p] = find_root(s->point_parents, p);
     for (uint32_t w = 0; w < s->wedge_count && s->wedge_parents; ++w)
         s->wedge_parents[w] = find_root(s->wedge_parents, w);
-    for (uint32_t p = 0; p < s->point_count; ++p)
-        if (s->valences[p] <= SIMPLIFY_HUB) fct_simplify_gather(s, p, s->ring_a);
+    number_targets(r);
     memset(r->corners, 0xff, s->wedge_count * sizeof *r->corners);
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
         if (input_degenerate(s, f)) continue;
@@ -293,20 +334,16 @@ static void prepare(refit *r) {
     }
 }
 
-static fct_result run_pass(refit *r, uint32_t pass) {
+static fct_result run_pass(refit *r, uint32_t pass, size_t samples) {
     fct_simplifier *s = r->s;
-    size_t samples = (size_t)s->wedge_count + s->mesh->face_count;
     memset(r->systems, 0, s->point_count * sizeof *r->systems);
     memset(r->sums, 0, (size_t)s->wedge_count * s->channel_count * sizeof *r->sums);
     if (s->channel_count) memset(r->weights, 0, s->wedge_count * sizeof *r->weights);
-    for (r->first = 0; r->first < samples; r->first += SAMPLES_AT_ONCE) {
-        size_t count = samples - r->first < SAMPLES_AT_ONCE ? samples - r->first : SAMPLES_AT_ONCE;
-        double done = (pass + (double)r->first / (double)samples) / s->def->refit_passes;
-        fct_result result = fct_progress(s->env, "refit", done);
-        if (result != FCT_OK) return result;
-        fct_parallel_for(s->env, count, 1024, land_samples, r);
-        for (size_t i = 0; i < count; ++i) add_sample(r, r->first + i, &r->landings[i]);
-    }
+    fct_result result = fct_progress(s->env, "refit", (double)pass / s->def->refit_passes);
+    if (result != FCT_OK) return result;
+    fct_parallel_for(s->env, s->live_faces, GRAIN, set_targets, r);
+    fct_parallel_for(s->env, samples, GRAIN, land_samples, r);
+    for (size_t i = 0; i < samples; ++i) add_sample(r, i, &r->landings[i]);
     move_points(r);
     move_attributes(r);
     return FCT_OK;
@@ -314,24 +351,29 @@ static fct_result run_pass(refit *r, uint32_t pass) {
 
 fct_result fct_simplify_refit(fct_simplifier *s) {
     refit r = {.s = s};
+    size_t samples = (size_t)s->wedge_count + s->mesh->face_count;
     r.corners = fct_allocate(s->env, s->wedge_count, sizeof *r.corners);
     r.corner_weights = fct_allocate_zero(s->env, s->wedge_count, sizeof *r.corner_weights);
-    r.landings = fct_allocate(s->env, SAMPLES_AT_ONCE, sizeof *r.landings);
+    r.landings = fct_allocate(s->env, samples, sizeof *r.landings);
+    r.targets = fct_allocate(s->env, s->live_faces, sizeof *r.targets);
+    r.rings = fct_allocate(s->env, s->live_faces, 3 * sizeof *r.rings);
+    r.ring_ends = fct_allocate(s->env, s->point_count, sizeof *r.ring_ends);
     r.systems = fct_allocate(s->env, s->point_count, sizeof *r.systems);
     r.sums = fct_allocate(s->env, (size_t)s->wedge_count * s->channel_count, sizeof *r.sums);
     r.weights = fct_allocate(s->env, s->channel_count ? s->wedge_count : 0, sizeof *r.weights);
+    void *arrays[] = {r.corners,   r.corner_weights, r.landings, r.targets, r.rings,
+                      r.ring_ends, r.systems,        r.sums,     r.weights};
     fct_result result = FCT_OK;
-    if (!r.corners || !r.corner_weights || !r.landings || !r.systems || !r.sums || !r.weights)
-        result = fct_fail_memory(s->env, "the refit");
-    else
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
+        if (!arrays[i]) result = FCT_ERROR_MEMORY;
+    if (result != FCT_OK)
+        fct_fail_memory(s->env, "the refit");
+    else {
         prepare(&r);
+        for (size_t i = 0; i < samples; ++i) r.landings[i] = (landing){.target = FCT_NONE};
+    }
     for (uint32_t pass = 0; pass < s->def->refit_passes && result == FCT_OK; ++pass)
-        result = run_pass(&r, pass);
-    fct_release(s->env, r.corners);
-    fct_release(s->env, r.corner_weights);
-    fct_release(s->env, r.landings);
-    fct_release(s->env, r.systems);
-    fct_release(s->env, r.sums);
-    fct_release(s->env, r.weights);
+        result = run_pass(&r, pass, samples);
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     return result;
 }
