@@ -122,7 +122,9 @@ bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene
     v3 normal = v3_load(best.normal);
     if (!scene->frames[hit->instance].identity) {
         /* unit first: the square of a small triangle's area may not fit the matrix's products */
-        normal = fct_transform_normal(scene->instances[hit->instance].normal_matrix, v3_unit(normal));
+        const fct_instance *placed = scene->instances + hit->instance;
+        normal = fct_transform_normal(placed->normal_matrix, v3_unit(normal));
+        if (placed->mirrored) normal = v3_scale(normal, -1);
     }
     v3_store(hit->normal, v3_unit(normal));
     return true;

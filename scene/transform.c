@@ -1,7 +1,7 @@
 /* scene/transform.c: see transform.h. Everything is computed in double and rounded once.
  *
- * Area vectors: the transformed triangle's cross product is cof(R) times the old one, cof(R) = det(R)
- * R^-T. Under a reflection that points into a closed model, so normal_matrix is |det R| R^-T.
+ * Area vectors: the transformed triangle's cross product is cof(R) times the old one, cof(R) = det(R) R^-T;
+ * under a reflection it points into a closed model.
  */
 #include "scene/transform.h"
 
@@ -44,11 +44,10 @@ fct_transform_kind fct_transform_set(const float m[12], fct_instance *instance, 
     }
     memcpy(instance->to_world, m, sizeof instance->to_world);
     for (int i = 0; i < 12; ++i) instance->to_model[i] = (float)inverse[i];
-    double sign = det < 0 ? -1 : 1;
     for (int j = 0; j < 3; ++j) {
-        instance->normal_matrix[j] = (float)(sign * cofactor[j].x);
-        instance->normal_matrix[3 + j] = (float)(sign * cofactor[j].y);
-        instance->normal_matrix[6 + j] = (float)(sign * cofactor[j].z);
+        instance->normal_matrix[j] = (float)cofactor[j].x;
+        instance->normal_matrix[3 + j] = (float)cofactor[j].y;
+        instance->normal_matrix[6 + j] = (float)cofactor[j].z;
     }
     if (!all_finite(instance->to_model, 12) || !all_finite(instance->normal_matrix, 9))
         return FCT_TRANSFORM_SINGULAR;

@@ -37,16 +37,15 @@ typedef struct fct_instance {
     char name[128]; /* the object's name; parts of one object cut by material share it */
     uint32_t model;
     uint32_t material;
-    uint32_t object;    /* parts of one object share the number */
-    float to_world[12]; /* rows of R|t: world = to_world * (x, y, z, 1) */
-    float to_model[12]; /* its inverse */
-    float
-        normal_matrix[9]; /* rows; takes area vectors to the world: |det R| R^-T, so |normal_matrix S| is the
-                             world's area and what points out of a closed model still does, mirrored or not
-                           */
-    float uniform_scale;  /* the factor when R is a rotation times a factor (reflections too), else 0 */
-    bool mirrored;        /* det R < 0: the winding of transformed corners runs the other way round */
-    fct_bounds bounds;    /* world */
+    uint32_t object;        /* parts of one object share the number */
+    float to_world[12];     /* rows of R|t: world = to_world * (x, y, z, 1) */
+    float to_model[12];     /* its inverse */
+    float normal_matrix[9]; /* rows; takes area vectors to the world: cofactors of R, |normal_matrix S| is the
+                               area. Under a mirrored transform what pointed out of a closed model then points
+                               into it: negate */
+    float uniform_scale;    /* the factor when R is a rotation times a factor (reflections too), else 0 */
+    bool mirrored;          /* det R < 0: the winding of transformed corners runs the other way round */
+    fct_bounds bounds;      /* world */
 } fct_instance;
 
 /* Nodes of a binary hierarchy over the instances: node 0 is the root when there is one; leaf nodes name an
