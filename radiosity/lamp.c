@@ -32,6 +32,7 @@ typedef struct query {
     uint64_t seed;
     uint32_t base_rays;
     double total; /* of the lamps' estimates times strength */
+    double scale; /* the same, with what is known better in place of estimates */
     uint64_t rays;
 } query;
 
@@ -69,10 +70,12 @@ static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receive
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
         if (!mixed || sent >= MAX_RAYS) break;
-        double fraction = all > 0 ? seen / all : .5, error = sqrt(fraction * (1 - fraction) / sent) * power;
+        /* As though one more ray had been seen by half: the spread of few rays is not to be trusted. */
+        double fraction = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
+        double error = sqrt(fraction * (1 - fraction) / sent) * power;
         if (sent < 16)
             goal = 16;
-        else if (all <= 0 || error > .02 * q->total)
+        else if (all <= 0 || error > .02 * q->scale)
             goal = MAX_RAYS;
     }
     return all > 0 ? seen / all : 0;
@@ -136,6 +139,7 @@ static double gather(query *q, double irradiance[3]) {
     fct_cut cut;
     for (int k = 0; k < 3; ++k) irradiance[k] = 0;
     for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate(q, q->lamps->lamps + i);
+    q->scale = q->total;
     for (uint32_t i = 0; i < q->lamps->count; ++i) {
         const fct_lamp *lamp = q->lamps->lamps + i;
         fct_receiver rec = receiver(q, lamp);
@@ -145,6 +149,7 @@ static double gather(query *q, double irradiance[3]) {
         bool major = share > MAJOR_SHARE * q->total;
         if (!major) minor += share;
         double light = cut.light < 1 ? cut.light : 1;
+        q->scale += light * lamp->strength - share;
         if (light <= 0) continue;
         open += light * lamp->strength;
         if (q->base_rays && major) light *= visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);

@@ -15,13 +15,14 @@
 
 #include <string.h>
 
-#define RELATIVE_ERROR .012
-#define FAR_ERROR      .004
-#define BEND_ERROR     .6
+#define RELATIVE_ERROR .02
+#define FAR_ERROR      .02
+#define BEND_ERROR     .2
+#define BOUND_ERROR    .35 /* of the distance between bounds */
 #define PLATE_VARIANCE .29 /* of the squared half side: 1/3 for a rectangle, 1/4 for an ellipse */
-#define SHARE_ERROR    3e-4
+#define SHARE_ERROR    7e-4
 #define STACK_SIZE     256
-#define TABLE_CLUSTERS 4096
+#define TABLE_CLUSTERS 2048
 #define MAX_PART       (1u << 12) /* sub-triangles down to 4^-6 */
 
 /* What a node sends: an estimate, an upper bound of it, and the error to be expected. */
@@ -109,7 +110,7 @@ static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, co
         return (outlook){light, widest * top, light * error, true};
     }
     double light = (.5 * (lower + upper)) * clipped_mean(cosx, spread) * kernel;
-    return (outlook){light, widest * top, widest * top - (side ? lower * bottom : 0), false};
+    return (outlook){light, widest * top, BOUND_ERROR * (widest * top - (side ? lower * bottom : 0)), false};
 }
 
 /* The mean of (n.y) (s.y) / |y|^4 over a surface about y = d over its value at d, to second order, less 1.
@@ -250,10 +251,12 @@ double fct_lamp_estimate(const fct_lamp *lamp, const fct_receiver *rec) {
     double toward = -v3_dot(lamp->vector, d);
     /* A plane's front lights one side of it alone, whatever the distance. */
     if (!lamp->table && !lamp->two_sided && toward <= -2e-3 * radius * lamp->area) return 0;
-    if (r2 < 4 * radius * radius) return 1;
+    if (r2 < .25 * radius * radius) return 1;
+    /* As of a disk of the projected area that faces the receiver: A / (A + pi r^2). */
     double r = sqrt(r2), cosx = fmin(1, (height + radius) / r);
     double area = lamp->table ? table_light(lamp->table, v3_scale(d, -1 / r)) : fabs(toward) / r;
-    return fmin(1, (area + .1 * lamp->area * radius / r) * cosx / (FCT_PI * r2));
+    area += .1 * lamp->area * fmin(1, radius / r);
+    return area * cosx / (area + FCT_PI * r2);
 }
 
 void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
@@ -270,7 +273,7 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
         for (uint32_t i = 0; i < view->root_count; ++i)
             fits = cut_tree(lamp, rec, view->roots[i], share * reference, reference, cut) && fits;
         if (!fits) share *= 4;
-        if (fits && cut->light >= .4 * reference) break;
+        if (fits && cut->light >= .3 * reference) break;
         if (fits) reference = cut->light < .2 * reference ? .2 * reference : cut->light;
     }
 }
@@ -332,10 +335,14 @@ fct_lamp_point fct_cut_point(const fct_lamp *lamp, const fct_receiver *rec, cons
     v3 p[3];
     triangle_corners(&lamp->view, out.place, p);
     part_corners(cut->items[i].part, p);
-    double b[2];
-    fct_triangle_point(u, v, b);
-    v3 e1 = v3_sub(p[1], p[0]), e2 = v3_sub(p[2], p[0]), cross = v3_cross(e1, e2);
-    out.y = v3_mad(v3_mad(p[0], b[0], e1), b[1], e2);
+    /* u has been spent on the choice of the triangle: v, fresh, runs along the triangle, from the corner
+     * across its shortest side. */
+    double b[2], sides[3];
+    for (int k = 0; k < 3; ++k) sides[k] = v3_norm2(v3_sub(p[(k + 2) % 3], p[(k + 1) % 3]));
+    int tip = sides[0] <= sides[1] && sides[0] <= sides[2] ? 0 : sides[1] <= sides[2] ? 1 : 2;
+    v3 e1 = v3_sub(p[(tip + 1) % 3], p[tip]), e2 = v3_sub(p[(tip + 2) % 3], p[tip]), cross = v3_cross(e1, e2);
+    fct_triangle_point(v, u, b);
+    out.y = v3_mad(v3_mad(p[tip], b[0], e1), b[1], e2);
     v3 d = v3_sub(out.y, rec->x);
     double r2 = v3_norm2(d), height = v3_dot(d, rec->n), toward = -v3_dot(cross, d);
     if (lamp->two_sided) toward = fabs(toward);
@@ -355,9 +362,15 @@ fct_receiver fct_lamp_receiver(const fct_lamp *lamp, const double point[3], cons
     return rec;
 }
 
+/* What the table needs of a cluster. */
+typedef struct facet {
+    v3 vector;
+    double area, moment[6];
+} facet;
+
 typedef struct table_work {
     const fct_lamp *lamp;
-    const uint32_t *nodes;
+    const facet *facets;
     uint32_t count;
 } table_work;
 
@@ -374,12 +387,11 @@ static void table_body(void *user, size_t begin, size_t end, size_t chunk, uint3
         d[(axis + 2) % 3] = 2. * j / FCT_LAMP_CELLS - 1;
         v3 w = v3_make(d[0], d[1], d[2]);
         for (uint32_t n = 0; n < work->count; ++n) {
-            fct_cluster c;
-            fct_tree_cluster(work->lamp->tree, work->nodes[n], &c);
-            double toward = v3_dot(v3_load(c.area_vector), w), m[6];
-            for (int q = 0; q < 6; ++q) m[q] = c.moment[q];
-            double cross = sqrt(fmax(0, sym3_form(m, w, w)) * c.area);
-            sum += work->lamp->two_sided ? cross : fmax(0, .5 * (cross + toward));
+            const facet *f = work->facets + n;
+            double toward = v3_dot(f->vector, w), cross = sqrt(fmax(0, sym3_form(f->moment, w, w)) * f->area);
+            double upper = work->lamp->two_sided ? cross : fmax(0, .5 * (cross + toward));
+            double lower = work->lamp->two_sided ? fabs(toward) : fmax(0, toward);
+            sum += .5 * (lower + upper);
         }
         work->lamp->table[k] = sum;
     }
@@ -390,15 +402,23 @@ static fct_result make_table(const fct_env *env, fct_lamp *lamp) {
     uint32_t count = lamp->view.face_count < TABLE_CLUSTERS ? lamp->view.face_count : TABLE_CLUSTERS;
     if (count < lamp->view.root_count) count = lamp->view.root_count;
     uint32_t *nodes = fct_allocate(env, count, sizeof *nodes);
+    facet *facets = fct_allocate(env, count, sizeof *facets);
     lamp->table = fct_allocate(env, FCT_LAMP_TABLE, sizeof *lamp->table);
-    if (!nodes || !lamp->table) {
+    if (!nodes || !facets || !lamp->table) {
         result = fct_fail_memory(env, "a lamp's projected areas");
         goto done;
     }
-    table_work work = {lamp, nodes, fct_tree_partition(lamp->tree, count, nodes)};
+    table_work work = {lamp, facets, fct_tree_partition(lamp->tree, count, nodes)};
+    for (uint32_t i = 0; i < work.count; ++i) {
+        fct_cluster c;
+        fct_tree_cluster(lamp->tree, nodes[i], &c);
+        facets[i] = (facet){.vector = v3_load(c.area_vector), .area = c.area};
+        for (int k = 0; k < 6; ++k) facets[i].moment[k] = c.moment[k];
+    }
     fct_parallel_for(env, FCT_LAMP_TABLE, 8, table_body, &work);
 done:
     fct_release(env, nodes);
+    fct_release(env, facets);
     return result;
 }
 

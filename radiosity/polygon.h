@@ -9,6 +9,17 @@
 
 #include "radiosity/sample.h"
 
+/* atan2(y, x) for y >= 0 to 1e-10: the series about 0 and pi / 4. A third of the library's time. */
+static inline double fct_angle(double y, double x) {
+    double wide = fabs(x), t = y < wide ? y / wide : wide / y, shift = 0;
+    if (t > .41421356237309503) t = (t - 1) / (t + 1), shift = FCT_PI / 4;
+    double q = t * t, sum = 1. / 21;
+    for (int k = 19; k > 0; k -= 2) sum = 1. / k - q * sum;
+    double angle = shift + t * sum;
+    if (y >= wide) angle = FCT_PI / 2 - angle;
+    return x < 0 ? FCT_PI - angle : angle;
+}
+
 /* The part of the triangle with n . p >= 0, corners relative to the point; returns 0, 3 or 4 corners. */
 static inline int fct_triangle_clip(const v3 corners[3], v3 n, v3 out[4]) {
     double height[3];
@@ -33,7 +44,7 @@ static inline double fct_triangle_irradiance(const v3 corners[3], v3 n) {
     for (int i = 0; i < count; ++i) {
         v3 a = p[i], b = p[i + 1 == count ? 0 : i + 1], cross = v3_cross(a, b);
         double length = v3_norm(cross);
-        if (length > 0) sum = v3_mad(sum, atan2(length, v3_dot(a, b)) / length, cross);
+        if (length > 0) sum = v3_mad(sum, fct_angle(length, v3_dot(a, b)) / length, cross);
     }
     double e = fabs(v3_dot(sum, n)) / (2 * FCT_PI);
     return e < 1 ? e : 1;
