@@ -1,0 +1,324 @@
+/* tests/scene/test_rays.c: rays, closest points, bounds and volumes of a scene against brute force over every
+ * transformed triangle. */
+#include "support.h"
+
+#include "facetree/scene.h"
+#include "scene/scene.h"
+#include "scene/transform.h"
+
+enum { OBJECTS = 24 };
+
+static uint64_t state = 1;
+static double uniform(void) {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(state >> 11) * 0x1p-53;
+}
+static double between(double a, double b) {
+    return a + (b - a) * uniform();
+}
+
+static void random_transform(int kind, float out[12]) {
+    double q[4], t[3], s[3], m[12];
+    for (int k = 0; k < 4; ++k) q[k] = between(-1, 1);
+    double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int k = 0; k < 4; ++k) q[k] /= length;
+    for (int k = 0; k < 3; ++k) t[k] = between(-4, 4), s[k] = between(.3, 1.5);
+    if (kind % 4 == 1) s[1] = s[2] = s[0];
+    if (kind % 4 == 2) s[0] = -s[0], s[1] = s[2] = -s[0];
+    if (kind % 4 == 3) s[1] = -s[1];
+    fct_transform_compose(t, q, s, m);
+    for (int k = 0; k < 12; ++k) out[k] = (float)m[k];
+    if (kind == 0) memcpy(out, fct_transform_identity, 12 * sizeof *out);
+    if (kind == 4) out[1] += .4f, out[6] -= .3f; /* sheared */
+}
+
+/* Spheres and grids under transforms of every kind; half of them instances of others. */
+static fct_scene *make_scene(const fct_env *env, fct_backend backend) {
+    fct_scene *scene;
+    fct_material material = {.name = "m", .reflectance = {.5f, .5f, .5f}};
+    uint32_t id;
+    state = 7;
+    assert_int_equal(fct_scene_create(env, backend, &scene), FCT_OK);
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    for (int k = 0; k < OBJECTS; ++k) {
+        float transform[12];
+        char name[16];
+        random_transform(k, transform);
+        snprintf(name, sizeof name, "object %d", k);
+        if (k >= OBJECTS / 2) {
+            assert_int_equal(
+                fct_scene_add_instance(scene, name, (uint32_t)k - OBJECTS / 2, transform, FCT_NONE), FCT_OK);
+            continue;
+        }
+        fct_mesh mesh = k % 3 == 2 ? make_grid(env, 4) : make_sphere(env, 5);
+        assert_int_equal(fct_scene_add_object(scene, name, &mesh, NULL, transform, id, NULL), FCT_OK);
+        fct_mesh_release(env, &mesh);
+    }
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    return scene;
+}
+
+/* Corner c of the face at `place`, in the world, from the public view alone. */
+static v3 corner(const fct_scene_view *view, uint32_t instance, uint32_t place, int c) {
+    const fct_instance *i = view->instances + instance;
+    fct_tree_view tree = fct_tree_get(view->models[i->model].tree);
+    return fct_transform_point(i->to_world, v3_load(tree.positions + 3 * tree.triangles[3 * place + c]));
+}
+
+static uint32_t face_count(const fct_scene_view *view, uint32_t instance) {
+    return fct_tree_get(view->models[view->instances[instance].model].tree).face_count;
+}
+
+/* Signed volumes; `rim` tells how near the hit is to a side of the triangle, in barycentrics. */
+static bool hit_triangle(v3 o, v3 d, v3 a, v3 b, v3 c, double *t, double *rim) {
+    v3 e = v3_sub(b, a), f = v3_sub(c, a), p = v3_cross(d, f), s = v3_sub(o, a), q = v3_cross(s, e);
+    double det = v3_dot(e, p);
+    if (fabs(det) < 1e-14) return false;
+    double u = v3_dot(s, p) / det, v = v3_dot(d, q) / det;
+    *t = v3_dot(f, q) / det;
+    *rim = fmin(u, fmin(v, 1 - u - v));
+    return *rim > -1e-4;
+}
+
+typedef struct brute {
+    double t;
+    bool certain; /* no candidate nearer than t lies on a rim */
+    uint32_t instance;
+    v3 normal;
+} brute;
+
+static brute brute_hit(const fct_scene_view *view, const fct_ray *ray) {
+    brute best = {INFINITY, true, FCT_NONE, {0, 0, 0}};
+    v3 o = v3_load(ray->origin), d = v3_load(ray->direction);
+    double doubtful = INFINITY;
+    for (uint32_t i = 0; i < view->instance_count; ++i)
+        for (uint32_t f = 0; f < face_count(view, i); ++f) {
+            v3 a = corner(view, i, f, 0), b = corner(view, i, f, 1), c = corner(view, i, f, 2);
+            double t, rim;
+            if (!hit_triangle(o, d, a, b, c, &t, &rim) || t < ray->t_min || t > ray->t_max) continue;
+            if (rim < 1e-4) {
+                doubtful = fmin(doubtful, t);
+            } else if (t < best.t) {
+                double sign = view->instances[i].mirrored ? -1 : 1;
+                best.t = t, best.instance = i;
+                best.normal = v3_scale(v3_unit(v3_cross(v3_sub(b, a), v3_sub(c, a))), sign);
+            }
+        }
+    best.certain = doubtful == INFINITY || doubtful > best.t + 1e-4;
+    return best;
+}
+
+static fct_ray random_ray(int k) {
+    fct_ray ray = {.t_min = 0, .t_max = INFINITY};
+    for (int c = 0; c < 3; ++c) {
+        ray.origin[c] = (float)between(-6, 6);
+        ray.direction[c] = (float)(between(-4, 4) - ray.origin[c]);
+    }
+    if (k % 5 == 1) ray.direction[k / 5 % 3] = 0;
+    if (k % 5 == 2) ray.direction[0] = ray.direction[1] = 0;
+    if (k % 7 == 3) ray.t_max = .7f;
+    if (k % 7 == 4) ray.t_min = .4f;
+    return ray;
+}
+
+static void rays_agree_with_brute_force(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    for (int backend = 0; backend < 2; ++backend) {
+        fct_scene *scene = make_scene(&env, backend ? FCT_BACKEND_EMBREE : FCT_BACKEND_OBB);
+        fct_scene_view view = fct_scene_get(scene);
+        int hits = 0, checked = 0, mirrored = 0;
+        for (int k = 0; k < 1500; ++k) {
+            fct_ray ray = random_ray(k);
+            brute expected = brute_hit(&view, &ray);
+            fct_scene_hit hit;
+            bool found = fct_scene_closest_hit(scene, &ray, &hit, NULL);
+            assert_int_equal(found, fct_scene_any_hit(scene, &ray, NULL));
+            if (!expected.certain) continue;
+            ++checked;
+            assert_int_equal(found, expected.instance != FCT_NONE);
+            if (!found) continue;
+            ++hits;
+            mirrored += view.instances[hit.instance].mirrored;
+            assert_true(fabs(hit.t - expected.t) < 1e-4);
+            assert_int_equal(hit.instance, expected.instance);
+            assert_true(v3_norm(v3_sub(v3_load(hit.normal), expected.normal)) < 1e-3);
+            v3 at = v3_mad(v3_load(ray.origin), hit.t, v3_load(ray.direction)), by_uv = {0, 0, 0};
+            double weights[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+            for (int c = 0; c < 3; ++c)
+                by_uv = v3_mad(by_uv, weights[c], corner(&view, hit.instance, hit.place, c));
+            assert_true(v3_norm(v3_sub(at, by_uv)) < 1e-4);
+        }
+        assert_true(checked > 1400 && hits > 300 && mirrored > 50);
+        fct_scene_destroy(scene);
+    }
+}
+
+static void useless_rays_hit_nothing(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene = make_scene(&env, FCT_BACKEND_OBB);
+    fct_scene_hit hit;
+    fct_ray rays[4] = {{{0, 0, 5}, 0, {0, 0, 0}, INFINITY},
+                       {{0, NAN, 5}, 0, {0, 0, -1}, INFINITY},
+                       {{0, 0, 5}, 0, {0, NAN, -1}, INFINITY},
+                       {{0, 0, 5}, 9, {0, 0, -1}, 1}};
+    for (int k = 0; k < 4; ++k) {
+        assert_false(fct_scene_closest_hit(scene, rays + k, &hit, NULL));
+        assert_int_equal(hit.instance, FCT_NONE);
+        assert_false(fct_scene_any_hit(scene, rays + k, NULL));
+    }
+    fct_scene_destroy(scene);
+}
+
+/* The least distance to any triangle, by many points on each: an upper bound close to the truth, and by the
+ * same points a check that the answer is no nearer than it may be. */
+static double brute_distance(const fct_scene_view *view, v3 p) {
+    double best = INFINITY;
+    enum { N = 12 };
+    for (uint32_t i = 0; i < view->instance_count; ++i)
+        for (uint32_t f = 0; f < face_count(view, i); ++f)
+            for (int a = 0; a <= N; ++a)
+                for (int b = 0; b + a <= N; ++b) {
+                    v3 at = v3_scale(corner(view, i, f, 0), (N - a - b) / (double)N);
+                    at = v3_mad(at, a / (double)N, corner(view, i, f, 1));
+                    at = v3_mad(at, b / (double)N, corner(view, i, f, 2));
+                    best = fmin(best, v3_norm(v3_sub(at, p)));
+                }
+    return best;
+}
+
+static void closest_points_agree_with_brute_force(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    for (int backend = 0; backend < 2; ++backend) {
+        fct_scene *scene = make_scene(&env, backend ? FCT_BACKEND_EMBREE : FCT_BACKEND_OBB);
+        fct_scene_view view = fct_scene_get(scene);
+        int stretched = 0;
+        for (int k = 0; k < 24; ++k) {
+            float p[3] = {(float)between(-6, 6), (float)between(-6, 6), (float)between(-6, 6)};
+            uint32_t instance;
+            fct_closest closest;
+            double expected = brute_distance(&view, v3_load(p));
+            assert_true(fct_scene_closest_point(scene, p, INFINITY, &instance, &closest));
+            stretched += view.instances[instance].uniform_scale == 0;
+            assert_true(closest.distance <= expected + 1e-5);
+            assert_true(closest.distance >= expected - .15); /* of the spacing of the points */
+            assert_true(fabs(v3_norm(v3_sub(v3_load(closest.point), v3_load(p))) - closest.distance) < 1e-4);
+            fct_tree_view tree = fct_tree_get(view.models[view.instances[instance].model].tree);
+            uint32_t place = 0;
+            while (tree.face_ids[place] != closest.face) ++place;
+            v3 at = v3_scale(corner(&view, instance, place, 0), 1 - closest.u - closest.v);
+            at = v3_mad(at, closest.u, corner(&view, instance, place, 1));
+            at = v3_mad(at, closest.v, corner(&view, instance, place, 2));
+            assert_true(v3_norm(v3_sub(at, v3_load(closest.point))) < 1e-4);
+            assert_false(fct_scene_closest_point(scene, p, .99f * closest.distance, &instance, &closest));
+            assert_int_equal(instance, FCT_NONE);
+        }
+        assert_true(stretched >= 4);
+        fct_scene_destroy(scene);
+    }
+}
+
+static void instances_say_what_their_transforms_do(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene = make_scene(&env, FCT_BACKEND_OBB);
+    fct_scene_view view = fct_scene_get(scene);
+    assert_int_equal(view.instance_count, OBJECTS);
+    assert_int_equal(view.object_count, OBJECTS);
+    assert_int_equal(view.model_count, OBJECTS / 2);
+    assert_true(view.instances[0].uniform_scale == 1 && view.instances[1].uniform_scale > 0);
+    assert_true(view.instances[2].uniform_scale > 0 && view.instances[2].mirrored);
+    assert_true(view.instances[3].uniform_scale == 0 && view.instances[4].uniform_scale == 0);
+    for (uint32_t i = 0; i < view.instance_count; ++i) {
+        const fct_instance *instance = view.instances + i;
+        v3 p = v3_make(.3, -.7, .2);
+        v3 back = fct_transform_point(instance->to_model, fct_transform_point(instance->to_world, p));
+        assert_true(v3_norm(v3_sub(back, p)) < 1e-5);
+        double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (uint32_t f = 0; f < face_count(&view, i); ++f) {
+            fct_tree_view tree = fct_tree_get(view.models[instance->model].tree);
+            v3 model[3], world[3];
+            for (int c = 0; c < 3; ++c) {
+                model[c] = v3_load(tree.positions + 3 * tree.triangles[3 * f + c]);
+                world[c] = corner(&view, i, f, c);
+                double at[3] = {world[c].x, world[c].y, world[c].z};
+                for (int k = 0; k < 3; ++k)
+                    lower[k] = fmin(lower[k], at[k]), upper[k] = fmax(upper[k], at[k]);
+            }
+            v3 s = v3_cross(v3_sub(model[1], model[0]), v3_sub(model[2], model[0])),
+               w = v3_cross(v3_sub(world[1], world[0]), v3_sub(world[2], world[0]));
+            v3 taken = fct_transform_normal(instance->normal_matrix, s);
+            assert_true(v3_norm(v3_sub(taken, w)) < 1e-4);
+        }
+        for (int k = 0; k < 3; ++k) {
+            double slack = .1 * (upper[k] - lower[k]) + 1e-4;
+            assert_true(instance->bounds.lower[k] <= lower[k] && instance->bounds.upper[k] >= upper[k]);
+            assert_true(instance->bounds.lower[k] > lower[k] - slack &&
+                        instance->bounds.upper[k] < upper[k] + slack);
+        }
+    }
+    fct_scene_destroy(scene);
+}
+
+static bool holds(const fct_bounds *outer, const fct_bounds *inner) {
+    for (int c = 0; c < 3; ++c)
+        if (inner->lower[c] < outer->lower[c] || inner->upper[c] > outer->upper[c]) return false;
+    return true;
+}
+
+/* Every instance in one leaf, boxes inside their parents', children behind parents, depth bounded. */
+static void check_volumes(const fct_volume *volumes, uint32_t count, const fct_bounds *bounds) {
+    uint32_t nodes = 2 * count - 1, leaves = 0;
+    unsigned char *seen = calloc(nodes, 1), *used = calloc(count, 1), *depth = calloc(nodes, 1);
+    seen[0] = 1;
+    for (uint32_t n = 0; n < nodes; ++n) {
+        assert_true(seen[n]);
+        assert_true(depth[n] <= FCT_SCENE_DEPTH);
+        const fct_volume *v = volumes + n;
+        if (v->instance != FCT_NONE) {
+            assert_false(used[v->instance]++);
+            assert_memory_equal(&v->bounds, bounds + v->instance, sizeof *bounds);
+            ++leaves;
+            continue;
+        }
+        for (int k = 0; k < 2; ++k) {
+            assert_true(v->child[k] > n && v->child[k] < nodes);
+            assert_false(seen[v->child[k]]++);
+            depth[v->child[k]] = depth[n] + 1;
+            assert_true(holds(&v->bounds, &volumes[v->child[k]].bounds));
+        }
+    }
+    assert_int_equal(leaves, count);
+    free(seen), free(used), free(depth);
+}
+
+static void volumes_hold_every_instance_once(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    static fct_bounds bounds[3000];
+    static fct_volume volumes[6000];
+    static const uint32_t counts[] = {1, 2, 3, 9, 500, 3000};
+    for (int kind = 0; kind < 3; ++kind) /* scattered, all the same, growing by the power of two */
+        for (size_t k = 0; k < sizeof counts / sizeof *counts; ++k) {
+            for (uint32_t i = 0; i < counts[k]; ++i)
+                for (int c = 0; c < 3; ++c) {
+                    double at = kind == 0 ? uniform() : kind == 1 ? 1 : ldexp(1, (int)(i % 200) - 100);
+                    bounds[i].lower[c] = (float)at, bounds[i].upper[c] = (float)(at * 1.1);
+                }
+            assert_int_equal(fct_scene_build_volumes(&env, counts[k], bounds, volumes), FCT_OK);
+            check_volumes(volumes, counts[k], bounds);
+        }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rays_agree_with_brute_force),
+        cmocka_unit_test(useless_rays_hit_nothing),
+        cmocka_unit_test(closest_points_agree_with_brute_force),
+        cmocka_unit_test(instances_say_what_their_transforms_do),
+        cmocka_unit_test(volumes_hold_every_instance_once),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
