@@ -5,7 +5,7 @@
 
 fct_tree_def fct_tree_def_default(void) {
     return (fct_tree_def){.size = sizeof(fct_tree_def),
-                          .method = FCT_CLUSTER_GREEDY,
+                          .method = FCT_CLUSTER_ROUNDS,
                           .cost = FCT_COST_INCREMENT,
                           .fit_measure = FCT_FIT_AREA,
                           .fit_weight = -1,
@@ -15,11 +15,13 @@ fct_tree_def fct_tree_def_default(void) {
                           .max_cost = INFINITY};
 }
 
-static fct_result contract(fct_work *work, const fct_mesh *mesh) {
+static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_method method) {
+    fct_result (*along_edges)(fct_work *, bool) =
+        method == FCT_CLUSTER_ROUNDS ? fct_work_rounds : fct_work_greedy;
     fct_result result = FCT_OK;
-    if (mesh->materials) result = fct_work_greedy(work, false);
+    if (mesh->materials) result = along_edges(work, false);
     work->phase_ends[0] = work->merge_count;
-    if (result == FCT_OK) result = fct_work_greedy(work, true);
+    if (result == FCT_OK) result = along_edges(work, true);
     work->phase_ends[1] = work->merge_count;
     if (result == FCT_OK) result = fct_work_join(work, mesh);
     work->phase_ends[2] = work->merge_count;
@@ -54,7 +56,7 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     fct_result result = fct_work_create(env, mesh, def, &work);
     if (result != FCT_OK) return result;
     double dual = fct_seconds();
-    result = contract(&work, mesh);
+    result = contract(&work, mesh, def->method);
     if (result == FCT_OK) {
         tree->view.def = used_def(def, &work.metric);
         result = fct_tree_order(&work, mesh, def, tree);

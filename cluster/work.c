@@ -109,8 +109,7 @@ bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
     return taller < 8 || taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b]);
 }
 
-void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost) {
-    uint32_t merge = work->merge_count++;
+void fct_work_merge_as(fct_work *work, uint32_t merge, uint32_t a, uint32_t b, float shared, float cost) {
     work->children[merge][0] = work->nodes[a];
     work->children[merge][1] = work->nodes[b];
     work->costs[merge] = cost;
@@ -122,4 +121,8 @@ void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float 
     work->heights[a] = (uint8_t)(taller + 1);
     work->nodes[a] = work->face_count + merge;
     work->nodes[b] = FCT_NONE;
+}
+
+void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost) {
+    fct_work_merge_as(work, work->merge_count++, a, b, shared, cost);
 }

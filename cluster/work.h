@@ -35,7 +35,7 @@ typedef struct fct_work {
     uint32_t edge_count;
 } fct_work;
 
-/* Leaf of `limit` below which a merge of `count` faces in all is put off: 3 log2 n - 1, so that a join of
+/* Height above which a merge of `count` faces in all is put off: 3 log2 n - 1, so that a join of
  * parts above keeps the whole tree within 3 log2 F, and no more than 2 log2 n + 8. */
 uint32_t fct_height_limit(uint32_t count);
 
@@ -49,10 +49,15 @@ float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared);
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
 /* Notes the merge; slot a holds the union, slot b dies. */
 void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost);
+/* The same as merge number `merge`, for merges of disjoint pairs on several threads; the caller counts. */
+void fct_work_merge_as(fct_work *work, uint32_t merge, uint32_t a, uint32_t b, float shared, float cost);
 
 /* Contracts along live edges, cheapest first, until no allowed one is left; with `across` false only between
  * clusters of one material. Leaves the edges that remain. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_greedy(fct_work *work, bool across);
+/* The same, but merging all mutually cheapest pairs at once as long as that pays. Errors: MEMORY, CANCELLED.
+ */
+fct_result fct_work_rounds(fct_work *work, bool across);
 /* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_join(fct_work *work, const fct_mesh *mesh);
 
