@@ -24,12 +24,12 @@ bool fct_bvh_degenerate(const fct_bvh *bvh, uint32_t place) {
     return true;
 }
 
-void fct_bvh_normal(const fct_bvh *bvh, uint32_t place, float out[3]) {
-    v3 a = v3_load(corner(bvh, place, 0));
-    v3 n = v3_cross(v3_sub(v3_load(corner(bvh, place, 1)), a), v3_sub(v3_load(corner(bvh, place, 2)), a));
-    double largest = fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z)));
-    if (largest > 0x1p126 || (largest < 0x1p-100 && largest > 0)) n = v3_scale(n, ldexp(1, -ilogb(largest)));
-    v3_store(out, n);
+/* A scaled normal in the model's own unit, or where a float could not tell it, some positive multiple. */
+static void unscale_normal(const fct_bvh *bvh, v3 n, float out[3]) {
+    double unit = 1 / bvh->scale, largest = fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) * unit * unit;
+    double factor = unit * unit;
+    if (largest > 0x1p126 || largest < 0x1p-100) factor *= ldexp(1, -ilogb(largest));
+    v3_store(out, v3_scale(n, factor));
 }
 
 /* Bounds over the vertices that faces use, and the scale that brings the model to unit size. */
@@ -127,7 +127,7 @@ bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, f
     hit->u = raw.u, hit->v = raw.v;
     hit->place = raw.place;
     hit->face = bvh->view.face_ids[raw.place];
-    fct_bvh_normal(bvh, raw.place, hit->normal);
+    unscale_normal(bvh, raw.normal, hit->normal);
     return true;
 }
 

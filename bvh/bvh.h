@@ -100,8 +100,6 @@ static inline void fct_bvh_position(const fct_bvh *bvh, uint32_t vertex, float o
 }
 /* No area at all: such a face is not hit by rays. */
 bool fct_bvh_degenerate(const fct_bvh *bvh, uint32_t place);
-/* The face's geometric normal as fct_hit tells it. */
-void fct_bvh_normal(const fct_bvh *bvh, uint32_t place, float out[3]);
 
 /* The clusters that become leaves, packed in order of place. */
 typedef struct fct_leaf_list {
@@ -141,6 +139,7 @@ size_t fct_embree_bytes(const fct_embree *embree);
 typedef struct fct_raw_hit {
     float t, u, v;
     uint32_t place; /* FCT_NONE: none */
+    v3 normal;
 } fct_raw_hit;
 bool fct_embree_closest(const fct_bvh *bvh, const struct fct_prepared_ray *ray, fct_raw_hit *hit);
 bool fct_embree_any(const fct_bvh *bvh, const struct fct_prepared_ray *ray);

@@ -34,7 +34,8 @@ struct fct_embree {
     RTCScene scene;
     float *positions;
     uint32_t *triangles;
-    _Atomic int64_t bytes;
+    size_t own_bytes;      /* of these two */
+    _Atomic int64_t bytes; /* of Embree */
 };
 
 static bool count_memory(void *user, ssize_t bytes, bool post) {
@@ -57,6 +58,7 @@ static fct_result copy_triangles(const fct_bvh *bvh, fct_embree *embree) {
     /* Embree reads 16 bytes at every vertex. */
     embree->positions = fct_allocate(bvh->env, 3 * (size_t)view->vertex_count + 4, sizeof(float));
     embree->triangles = fct_allocate(bvh->env, 3 * (size_t)view->face_count, sizeof(uint32_t));
+    embree->own_bytes = 12 * ((size_t)view->vertex_count + view->face_count);
     if (!embree->positions || !embree->triangles) return fct_fail_memory(bvh->env, "Embree's triangles");
     for (uint32_t i = 0; i < view->vertex_count; ++i)
         fct_bvh_position(bvh, i, embree->positions + 3 * (size_t)i);
@@ -113,7 +115,7 @@ void fct_embree_destroy(const fct_env *env, fct_embree *embree) {
 }
 
 size_t fct_embree_bytes(const fct_embree *embree) {
-    return (size_t)embree->bytes;
+    return embree->own_bytes + (size_t)embree->bytes;
 }
 
 static struct RTCRay embree_ray(const fct_prepared_ray *ray) {
@@ -137,6 +139,10 @@ bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw
     restore_mode(mode);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     *hit = (fct_raw_hit){.t = query.ray.tfar, .u = query.hit.u, .v = query.hit.v, .place = query.hit.primID};
+    const uint32_t *corner = bvh->embree->triangles + 3 * (size_t)hit->place;
+    v3 p[3];
+    for (int c = 0; c < 3; ++c) p[c] = v3_load(bvh->embree->positions + 3 * (size_t)corner[c]);
+    hit->normal = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
     return true;
 }
 

@@ -13,7 +13,9 @@
 typedef struct traversal {
     const fct_bvh *bvh;
     const fct_prepared_ray *ray;
-    fct_raw_hit hit; /* hit.t: nothing beyond matters */
+    fct_raw_hit hit;      /* hit.t: nothing beyond matters */
+    const fct_leaf *leaf; /* of the hit */
+    uint32_t number;      /* of its triangle */
     fct_visits visits;
 } traversal;
 
@@ -119,13 +121,17 @@ static void refine(const fct_leaf *leaf, uint32_t number, const fct_prepared_ray
     for (int c = 0; c < 3; ++c) out->w[c] = w[c], out->z[c] = z[c];
 }
 
+static inline float spread(const float x[3]) {
+    float low = x[0] < x[1] ? x[0] : x[1], high = x[0] < x[1] ? x[1] : x[0];
+    low = x[2] < low ? x[2] : low, high = x[2] > high ? x[2] : high;
+    return high - low;
+}
+
 /* Whether the triangle is seen so flat that rounding moves the hit along it by much more than across. */
 static inline bool seen_flat(const float x[3], const float y[3], const float z[3], double det) {
-    float dx = fmaxf(x[0], fmaxf(x[1], x[2])) - fminf(x[0], fminf(x[1], x[2]));
-    float dy = fmaxf(y[0], fmaxf(y[1], y[2])) - fminf(y[0], fminf(y[1], y[2]));
-    float dz = fmaxf(z[0], fmaxf(z[1], z[2])) - fminf(z[0], fminf(z[1], z[2]));
-    double wide = (double)fmaxf(dx, dy);
-    return 4 * fabs(det) < wide * fmax((double)dz, wide);
+    float dx = spread(x), dy = spread(y), dz = spread(z);
+    double wide = (double)(dx > dy ? dx : dy), deep = (double)dz;
+    return 4 * fabs(det) < wide * (deep > wide ? deep : wide);
 }
 
 /* Settles one triangle that the eight-wide test could not refuse. x, y, z: its corners. */
@@ -151,6 +157,7 @@ static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, c
     const uint32_t *ids = t->bvh->view.face_ids;
     if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
     t->hit = (fct_raw_hit){.t = at, .u = (float)(s.w[1] / det), .v = (float)(s.w[2] / det), .place = place};
+    t->leaf = leaf, t->number = number;
     return true;
 }
 
@@ -208,13 +215,23 @@ static inline float wait_distance(uint64_t entry) {
     return bits.f;
 }
 
+/* Leaves are read a little later: four lines of 64 bytes. */
+static inline void prefetch(const fct_bvh *bvh, uint32_t ref) {
+    const char *at = ref & FCT_REF_LEAF ? (const char *)fct_bvh_leaf(bvh, ref) : fct_bvh_node(bvh, ref);
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+    __builtin_prefetch(at + 128);
+    __builtin_prefetch(at + 192);
+}
+
 /* Puts the children met on the stack, farthest first, and returns its new height. */
-static inline uint32_t push_children(uint64_t *stack, uint32_t height, uint32_t met, const float enter[8],
-                                     const uint32_t child[8]) {
+static inline uint32_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t height, uint32_t met,
+                                     const float enter[8], const uint32_t child[8]) {
     uint32_t base = height;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met);
         uint64_t entry = wait_entry(enter[i], child[i]);
+        prefetch(bvh, child[i]);
         uint32_t at = height++;
         while (at > base && stack[at - 1] < entry) stack[at] = stack[at - 1], --at;
         stack[at] = entry;
@@ -256,7 +273,7 @@ static inline bool traverse(traversal *t, bool any) {
             met = meet_axis(node, r, t->hit.t, enter) & node->present;
             child = node->child;
         }
-        height = push_children(stack, height, met, enter, child);
+        height = push_children(bvh, stack, height, met, enter, child);
     }
     return found;
 }
@@ -264,6 +281,19 @@ static inline bool traverse(traversal *t, bool any) {
 static traversal begin(const fct_bvh *bvh, const fct_prepared_ray *ray) {
     return (traversal){
         .bvh = bvh, .ray = ray, .hit = {.t = ray->t_max, .place = FCT_NONE}, .visits = {0, 0, 0}};
+}
+
+/* (p1 - p0) x (p2 - p0) of the triangle hit. */
+static v3 hit_normal(const traversal *t) {
+    const float *rows = fct_leaf_vertices(t->leaf);
+    const uint8_t *corners = fct_leaf_corners(t->leaf) + 24 * (t->number / 8) + t->number % 8;
+    uint32_t stride = 8u * t->leaf->vertex_octets;
+    v3 p[3];
+    for (int c = 0; c < 3; ++c) {
+        uint32_t i = corners[8 * c];
+        p[c] = v3_make((double)rows[i], (double)rows[stride + i], (double)rows[2 * stride + i]);
+    }
+    return v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
 }
 
 static void add_visits(fct_visits *visits, const fct_visits *more) {
@@ -277,6 +307,7 @@ bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_r
                           fct_visits *visits) {
     traversal t = begin(bvh, ray);
     bool found = traverse(&t, false);
+    if (found) t.hit.normal = hit_normal(&t);
     *hit = t.hit;
     add_visits(visits, &t.visits);
     return found;

@@ -38,7 +38,8 @@ typedef struct fct_hit {
     float t;
     float u, v;      /* the hit is (1 - u - v) p0 + u p1 + v p2 in the face's input corner order */
     uint32_t face;   /* input face id, FCT_NONE on a miss */
-    float normal[3]; /* geometric, (p1 - p0) x (p2 - p0), not normalised; undefined on a miss */
+    float normal[3]; /* geometric, (p1 - p0) x (p2 - p0), not normalised (a positive multiple of it where a
+                        float would overflow or vanish); undefined on a miss */
     uint32_t place;  /* the face's place in the tree's order */
 } fct_hit;
 
