@@ -46,7 +46,7 @@ typedef struct fct_simplify_def {
     double regularization;    /* gamma of the squared distance to the edge's midpoint, relative to the trace;
                                  default 1e-9 */
     uint32_t refit_passes;    /* passes of the vertex refit after the contractions; default 2; 0: the plain
-                                 quadric result */
+                                 quadric result; none with FCT_PLACE_SUBSET, whose vertices are the input's */
     bool keep_topology;       /* refuse contractions that fail the link condition; default false */
     bool check_foldover;      /* refuse contractions that turn a face over; default true */
 } fct_simplify_def;
@@ -59,8 +59,12 @@ typedef struct fct_simplify_stats {
     double seconds_init, seconds_contract, seconds_refit;
 } fct_simplify_stats;
 
-/* Simplifies; the result's arrays are those of the input. Same bits on every run and for every thread count.
- * stats may be NULL. Any valid mesh, with no faces too. Errors: DATA (invalid mesh), MEMORY, CANCELLED. */
+/* Simplifies; the result's arrays are those of the input, its faces in the input's order. Vertices with equal
+ * coordinates move together whatever their attributes, so doubled creases and seams do not crack; doubles with
+ * equal attributes become one vertex. Vertices that no face uses, and faces with two corners at one place, are
+ * dropped. Colours stay within the range of the input's. A point of more than 512 faces keeps its place. Same
+ * bits on every run and for every thread count. stats may be NULL. Any valid mesh, with no faces too.
+ * Errors: DATA (invalid mesh; a negative or NaN option), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 
