@@ -53,9 +53,8 @@ static const struct argp_option options[] = {
     {"up", KEY_UP, "AXIS", 0, "y or z points up (default: as the scene's camera has it, else y)", 2},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 35)", 2},
     {"cull", KEY_CULL, "WHICH", 0,
-     "Leave out faces seen from behind: back or none (default: back for lit surfaces seen from outside, so "
-     "that one "
-     "looks into a room)",
+     "Leave out faces seen from behind: back or none (default: back for boxes, and for lit surfaces seen from "
+     "outside, so that one looks into a room)",
      2},
     {NULL, 0, NULL, 0, "How it looks:", 3},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x800)", 3},
@@ -229,7 +228,8 @@ static int draw(tool *t, const render_options *o, drawing *d, float *image) {
     code = drawing_prepare(t, d, cos(o->crease * 3.14159265358979323846 / 180), o->wireframe);
     if (code != TOOL_DONE) return code;
     bool lit = d->shading == DRAWING_LIGHT || d->glow;
-    camera.cull = o->cull == CULL_BACK || (o->cull == CULL_AUTO && lit && outside);
+    bool solid = o->subject == DRAWING_BOXES;
+    camera.cull = o->cull == CULL_BACK || (o->cull == CULL_AUTO && (solid || (lit && outside)));
     return raster_draw(t, &camera, &d->mesh, drawing_shade, d, image);
 }
 

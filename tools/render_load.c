@@ -249,7 +249,17 @@ static int label_clusters(tool *t, const loader *l, drawing *out) {
 static const uint8_t box_sides[12][3] = {{0, 4, 6}, {6, 2, 0}, {1, 3, 7}, {7, 5, 1}, {0, 1, 5}, {5, 4, 0},
                                          {2, 6, 7}, {7, 3, 2}, {0, 2, 3}, {3, 1, 0}, {4, 5, 7}, {7, 6, 4}};
 
-static void lay_box(const part *p, const cut *c, uint32_t number, drawing *out) {
+/* Of its largest side, in the world. */
+static double box_area(const loader *l, const cut *c) {
+    const part *p = l->parts + c->part;
+    fct_cluster cluster;
+    fct_tree_cluster(p->tree, c->node, &cluster);
+    double x = cluster.box_half[0], y = cluster.box_half[1], z = cluster.box_half[2];
+    return 4 * fmax(x * y, fmax(x * z, y * z)) * p->scale;
+}
+
+/* `pad` is added to each half extent: of boxes that lie in one plane the smaller stands out by a hair. */
+static void lay_box(const part *p, const cut *c, uint32_t number, double pad, drawing *out) {
     fct_cluster cluster;
     fct_box box;
     fct_tree_cluster(p->tree, c->node, &cluster);
@@ -258,7 +268,7 @@ static void lay_box(const part *p, const cut *c, uint32_t number, drawing *out) 
         float corner[3];
         for (int k = 0; k < 3; ++k) {
             double x = box.center[k];
-            for (int a = 0; a < 3; ++a) x += (i >> a & 1 ? 1 : -1) * (double)box.half[a] * box.axes[a][k];
+            for (int a = 0; a < 3; ++a) x += (i >> a & 1 ? 1 : -1) * (box.half[a] + pad) * box.axes[a][k];
             corner[k] = (float)x;
         }
         transform(p, corner, out->mesh.positions + 3 * (8 * (size_t)number + (size_t)i));
@@ -283,7 +293,13 @@ static int draw_boxes(tool *t, const loader *l, drawing *out) {
     out->paint = tool_allocate(t, 12 * (size_t)n, 3 * sizeof *out->paint);
     out->lines = tool_allocate(t, 12 * (size_t)n, 1);
     if (!out->paint || !out->lines) return TOOL_MEMORY;
-    for (uint32_t i = 0; i < n; ++i) lay_box(l->parts + l->cuts[i].part, l->cuts + i, i, out);
+    double largest = 0;
+    for (uint32_t i = 0; i < n; ++i) largest = fmax(largest, box_area(l, l->cuts + i));
+    for (uint32_t i = 0; i < n; ++i) {
+        const part *p = l->parts + l->cuts[i].part;
+        double part_of_all = largest > 0 ? box_area(l, l->cuts + i) / largest : 1;
+        lay_box(p, l->cuts + i, i, 3e-4 * sqrt(largest / p->scale) * (1 - sqrt(part_of_all)), out);
+    }
     out->shading = DRAWING_FLAT;
     return TOOL_DONE;
 }

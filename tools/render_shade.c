@@ -200,7 +200,7 @@ int drawing_prepare(tool *t, drawing *d, double crease, bool wireframe) {
 
 /* Light that falls on a unit normal; the sky is cool, the key warm, the ground gives a little back. */
 static void studio(const drawing *d, const float n[3], const float to_eye[3], float rgb[3], float *gloss) {
-    static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.135F, .115F, .10F},
+    static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.20F, .175F, .155F},
                        key[3] = {.92F, .85F, .75F}, fill[3] = {.07F, .09F, .13F};
     float up = .5F + .5F * dot(n, d->light[2]), f = fmaxf(dot(n, d->light[1]), 0);
     float k = fmaxf(dot(n, d->light[0]) + .12F, 0) / 1.12F; /* a lamp of some size */
