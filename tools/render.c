@@ -53,7 +53,8 @@ static const struct argp_option options[] = {
     {"up", KEY_UP, "AXIS", 0, "y or z points up (default: as the scene's camera has it, else y)", 2},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 35)", 2},
     {"cull", KEY_CULL, "WHICH", 0,
-     "Leave out faces seen from behind: back or none (default: back for boxes, and for lit surfaces seen from "
+     "Leave out faces seen from behind: back or none (default: back for boxes, and for lit surfaces seen "
+     "from "
      "outside, so that one looks into a room)",
      2},
     {NULL, 0, NULL, 0, "How it looks:", 3},
