@@ -15,6 +15,7 @@
 extern "C" {
 #include "base/env.h"
 #include "base/sort.h"
+#include "mesh/color.h"
 }
 #include "mesh/write.h"
 
@@ -30,7 +31,8 @@ class mesh_exporter : public IO::BaseExporter {
         int to, next, face;
     };
 
-    mesh_exporter(const fct_mesh *source, const uint64_t *keys, const uint32_t *sides) : mesh(source) {
+    mesh_exporter(const fct_sink *sink, const uint64_t *keys, const uint32_t *sides)
+        : mesh(sink->mesh), exposure(sink->def->exposure) {
         size_t count = 3 * size_t(mesh->face_count);
         side_halves.assign(count, -1);
         for (size_t begin = 0, end; begin < count; begin = end) {
@@ -77,7 +79,7 @@ class mesh_exporter : public IO::BaseExporter {
     // Not asked for with the options given.
     Vec3d pointd(VertexHandle v) const override { return Vec3d(point(v)); }
     Vec3d normald(VertexHandle v) const override { return Vec3d(normal(v)); }
-    Vec3uc color(VertexHandle) const override { return Vec3uc(0, 0, 0); }
+    Vec3uc color(VertexHandle v) const override { return bytes(mesh->colors, v); }
     Vec4uc colorA(VertexHandle) const override { return Vec4uc(0, 0, 0, 0); }
     Vec3ui colori(VertexHandle) const override { return Vec3ui(0, 0, 0); }
     Vec4ui colorAi(VertexHandle) const override { return Vec4ui(0, 0, 0, 0); }
@@ -88,7 +90,7 @@ class mesh_exporter : public IO::BaseExporter {
     unsigned int get_face_texcoords(std::vector<Vec2f> &) const override { return 0; }
     Vec3f normal(FaceHandle) const override { return Vec3f(0, 0, 0); }
     Vec3d normald(FaceHandle) const override { return Vec3d(0, 0, 0); }
-    Vec3uc color(FaceHandle) const override { return Vec3uc(0, 0, 0); }
+    Vec3uc color(FaceHandle f) const override { return bytes(mesh->face_colors, f); }
     Vec4uc colorA(FaceHandle) const override { return Vec4uc(0, 0, 0, 0); }
     Vec3ui colori(FaceHandle) const override { return Vec3ui(0, 0, 0); }
     Vec4ui colorAi(FaceHandle) const override { return Vec4ui(0, 0, 0, 0); }
@@ -107,6 +109,12 @@ class mesh_exporter : public IO::BaseExporter {
     static Vec3f triple(const float *values, BaseHandle h) {
         const float *p = values + 3 * size_t(h.idx());
         return Vec3f(p[0], p[1], p[2]);
+    }
+    Vec3uc bytes(const float *colors, BaseHandle h) const {
+        const float *c = colors + 3 * size_t(h.idx());
+        double e = double(exposure);
+        return Vec3uc(fct_srgb_byte(double(c[0]) * e), fct_srgb_byte(double(c[1]) * e),
+                      fct_srgb_byte(double(c[2]) * e));
     }
     static Vec4f opaque(const Vec3f &c) { return Vec4f(c[0], c[1], c[2], 1.f); }
 
@@ -148,6 +156,7 @@ class mesh_exporter : public IO::BaseExporter {
     }
 
     const fct_mesh *mesh;
+    float exposure;
     BaseKernel no_properties; // the writer asks it for named properties, without looking whether it is there
     std::vector<half> halves;
     std::vector<int> side_halves, vertex_halves;
@@ -185,14 +194,14 @@ extern "C" fct_result fct_write_om(const fct_sink *sink, FILE *stream) {
         keys && sides ? sort_sides(sink, keys, sides) : fct_fail_memory(sink->env, "half-edges");
     try {
         if (result == FCT_OK) {
-            mesh_exporter exporter(m, keys, sides);
+            mesh_exporter exporter(sink, keys, sides);
             fct_openmesh::call_guard guard;
             file_buffer buffer(stream);
             std::ostream to(&buffer);
             IO::Options options(IO::Options::Binary);
             if (m->normals) options += IO::Options::VertexNormal;
-            if (m->colors) options += IO::Options::VertexColor, options += IO::Options::ColorFloat;
-            if (m->face_colors) options += IO::Options::FaceColor, options += IO::Options::ColorFloat;
+            if (m->colors) options += IO::Options::VertexColor;
+            if (m->face_colors) options += IO::Options::FaceColor;
             if (!IO::OMWriter().write(to, exporter, options) && !std::ferror(stream))
                 result = fct_fail(sink->env, FCT_ERROR_INTERNAL, "%s: OpenMesh failed to write", sink->name);
         }

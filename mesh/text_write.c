@@ -6,6 +6,10 @@
 #include "base/vec.h"
 #include "mesh/write.h"
 
+static void print_floats(FILE *stream, const float *values, int count) {
+    for (int i = 0; i < count; ++i) fprintf(stream, " %.9g", (double)values[i]);
+}
+
 /* OBJ: v x y z [r g b], vt per corner, vn per vertex, usemtl where the material changes. */
 static void write_obj_faces(const fct_mesh *m, FILE *stream) {
     uint32_t material = FCT_NONE;
@@ -43,16 +47,17 @@ fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
     fct_note_left_out(sink, FCT_MESH_FACE_COLORS);
     fprintf(stream, "# Facetree %s\n", fct_version());
     for (size_t v = 0; v < m->vertex_count; ++v) {
-        const float *p = m->positions + 3 * v, *c = m->colors + 3 * v;
-        fprintf(stream, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
-        if (m->colors) fprintf(stream, " %.9g %.9g %.9g", (double)c[0], (double)c[1], (double)c[2]);
+        fputc('v', stream);
+        print_floats(stream, m->positions + 3 * v, 3);
+        if (m->colors) print_floats(stream, m->colors + 3 * v, 3);
         fputc('\n', stream);
     }
     for (size_t i = 0; m->texcoords && i < 3 * (size_t)m->face_count; ++i)
         fprintf(stream, "vt %.9g %.9g\n", (double)m->texcoords[2 * i], (double)m->texcoords[2 * i + 1]);
     for (size_t v = 0; m->normals && v < m->vertex_count; ++v) {
-        const float *n = m->normals + 3 * v;
-        fprintf(stream, "vn %.9g %.9g %.9g\n", (double)n[0], (double)n[1], (double)n[2]);
+        fputs("vn", stream);
+        print_floats(stream, m->normals + 3 * v, 3);
+        fputc('\n', stream);
     }
     write_obj_faces(m, stream);
     return fct_progress(sink->env, "write", 1);
@@ -72,9 +77,8 @@ fct_result fct_write_off(const fct_sink *sink, FILE *stream) {
     fprintf(stream, "%s%sOFF\n%u %u 0\n", m->colors ? "C" : "", m->normals ? "N" : "", m->vertex_count,
             m->face_count);
     for (size_t v = 0; v < m->vertex_count; ++v) {
-        const float *p = m->positions + 3 * v, *n = m->normals + 3 * v;
-        fprintf(stream, "%.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
-        if (m->normals) fprintf(stream, " %.9g %.9g %.9g", (double)n[0], (double)n[1], (double)n[2]);
+        print_floats(stream, m->positions + 3 * v, 3);
+        if (m->normals) print_floats(stream, m->normals + 3 * v, 3);
         for (int k = 0; m->colors && k < 3; ++k) print_component(stream, m->colors[3 * v + k]);
         fprintf(stream, m->colors ? " 1.0\n" : "\n");
     }

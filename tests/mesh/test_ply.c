@@ -1,0 +1,258 @@
+/* tests/mesh/test_ply.c: PLY in every form, and what is refused. */
+#include "mesh_support.h"
+
+static const char head_ascii[] = "ply\nformat ascii 1.0\n";
+
+static void reads_text(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    assert_int_equal(
+        parse_text(&r, "ply",
+                   "ply\r\nformat ascii 1.0\r\ncomment hello\r\nobj_info x\r\nelement vertex 4\r\n"
+                   "property double x\r\nproperty float y\r\nproperty int z\r\nproperty float quality\r\n"
+                   "property uchar red\r\nproperty uchar green\r\nproperty uchar blue\r\n"
+                   "element face 2\r\nproperty list uchar int vertex_index\r\nend_header\r\n"
+                   "0 0 0 nan 255 0 128\r\n1 0 0 1 0 0 0\r\n1 1e0 0 2 1 2 3\r\n-.5 1 7 -1 9 9 9\r\n"
+                   "3 0 1 2\r\n3 0 2 3\r\n",
+                   &m),
+        FCT_OK);
+    assert_int_equal(m.vertex_count, 4);
+    assert_int_equal(m.face_count, 2);
+    assert_true(m.positions[9] == -.5f && m.positions[11] == 7);
+    assert_true(m.colors[0] == 1 && m.colors[1] == 0);
+    assert_true(fabsf(m.colors[2] - .2158605f) < 1e-6f);
+    assert_null(m.source_faces);
+    assert_null(m.normals);
+    const uint32_t expected[] = {0, 1, 2, 0, 2, 3};
+    assert_memory_equal(m.triangles, expected, sizeof expected);
+    release(&r, &m);
+}
+
+/* Doubles, shuffled properties, unknown elements with lists before and between, in both byte orders. */
+static bytes make_binary(bool big, bool uniform) {
+    bytes b = {.size = 0};
+    put_text(&b, big ? "ply\nformat binary_big_endian 1.0\n" : "ply\nformat binary_little_endian 1.0\n");
+    put_text(&b, "element camera 2\nproperty list uchar short values\nproperty double d\nelement vertex 5\n"
+                 "property double z\nproperty uchar flag\nproperty double x\nproperty double y\n"
+                 "property float radiosity_r\nproperty float radiosity_g\nproperty float radiosity_b\n"
+                 "element face 2\nproperty short material_index\nproperty list uint uint vertex_indices\n"
+                 "property list uchar float texcoord\nend_header\n");
+    for (int i = 0; i < 2; ++i) {
+        put_u8(&b, 2 * i);
+        for (int k = 0; k < 4 * i; ++k) put_u8(&b, 7);
+        put_f64(&b, 1, big);
+    }
+    for (int v = 0; v < 5; ++v) {
+        put_f64(&b, .1 * v, big), put_u8(&b, 9), put_f64(&b, v & 1, big), put_f64(&b, v >> 1, big);
+        for (int k = 0; k < 3; ++k) put_f32(&b, (float)(v + k), big);
+    }
+    for (int f = 0; f < 2; ++f) {
+        int corners = uniform ? 3 : 3 + f;
+        int16_t material = (int16_t)(2 * f);
+        put_scalar(&b, &material, 2, big);
+        put_i32(&b, corners, big);
+        static const int quad[] = {0, 1, 3, 2};
+        for (int k = 0; k < corners; ++k) put_i32(&b, quad[k] + f, big);
+        put_u8(&b, 2 * corners);
+        for (int k = 0; k < 2 * corners; ++k) put_f32(&b, (float)(10 * f + k), big);
+    }
+    return b;
+}
+
+static void reads_both_byte_orders(void **state) {
+    (void)state;
+    for (int i = 0; i < 4; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        bytes b = make_binary(i & 1, i & 2);
+        assert_int_equal(parse_bytes(&r, "ply", b.data, b.size, &m), FCT_OK);
+        assert_int_equal(m.vertex_count, 5);
+        assert_int_equal(m.face_count, i & 2 ? 2 : 3);
+        assert_true(m.positions[12] == 0 && m.positions[13] == 2 && m.positions[14] == (float).4);
+        assert_true(m.colors[12] == 4 && m.colors[14] == 6);
+        assert_int_equal(m.triangles[3], 1);
+        assert_int_equal(m.materials[1], 2);
+        assert_int_equal(m.material_count, 3);
+        assert_true(m.texcoords[6] == 10 && m.texcoords[11] == 15);
+        assert_int_equal(m.source_faces != NULL, !(i & 2));
+        release(&r, &m);
+        starve("ply", b.data, b.size);
+    }
+}
+
+/* Whatever is cut off a file, it is refused; nothing is read beyond its end. */
+static void refuses_every_truncation(void **state) {
+    (void)state;
+    for (int i = 0; i < 4; ++i) {
+        bytes b = make_binary(i & 1, i & 2);
+        for (size_t size = 0; size < b.size; ++size) refuse_bytes("ply", b.data, size, "name");
+    }
+}
+
+/* OpenMesh drops strips without a word. Strip 0 1 2 3 is 012, 213; the winding stays. */
+static void reads_strips(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    static const char text[] =
+        "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+        "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n9 0 1 2 3 -1 2 3 4 2\n";
+    assert_int_equal(parse_text(&r, "ply", text, &m), FCT_OK);
+    const uint32_t expected[] = {0, 1, 2, 2, 1, 3, 2, 3, 4, 4, 3, 2};
+    assert_int_equal(m.face_count, 4);
+    assert_memory_equal(m.triangles, expected, sizeof expected);
+    release(&r, &m);
+    starve("ply", text, sizeof text - 1);
+}
+
+/* OpenMesh drops faces with a repeated index; here they stay, and are counted. */
+static void keeps_degenerate_faces(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh m;
+    fct_mesh_report report;
+    assert_int_equal(
+        parse_text(&r, "ply",
+                   "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 3\nproperty list uchar int vertex_indices\n"
+                   "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 1\n3 2 2 2\n",
+                   &m),
+        FCT_OK);
+    assert_int_equal(m.face_count, 3);
+    assert_int_equal(fct_mesh_inspect(&env, &m, &report), FCT_OK);
+    assert_int_equal(report.degenerate_faces, 2);
+    release(&r, &m);
+}
+
+static void header_of(char *text, size_t size, const char *vertices, const char *faces, const char *body) {
+    snprintf(text, size,
+             "%selement vertex %s\nproperty float x\nproperty float y\nproperty float z\nelement face %s\n"
+             "property list uchar int vertex_indices\nend_header\n%s",
+             head_ascii, vertices, faces, body);
+}
+
+static void refuses(void **state) {
+    (void)state;
+    static const struct {
+        const char *vertices, *faces, *body, *message;
+    } cases[] = {
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "vertex index 3 is out of range, of 3 vertices"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n", "vertex index -1 is out of range"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "name:13: face 0: fewer than three corners"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
+         "name:13: expected an integer in the range of its type, found the end"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 2\n", "name:13: expected the end of the line, found '2'"},
+        {"3", "1", "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n", "name:11: expected a number, found 'zero'"},
+        {"3", "1", "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n", "name:11: expected a number, found 'nan'"},
+        {"3", "1", "0 0 0\n1e39 0 0\n0 1 0\n3 0 1 2\n",
+         "name:11: expected a number that fits a float, found '1e39'"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", "found '1.5'"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n300 0 1 2\n", "found '300'"},
+        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n", "expected another record"},
+        {"3", "2", "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+         "name:14: expected another record, found the end of the file"},
+        {"4000000000", "1", "0 0 0\n", "at most"},
+        {"2000000000", "1", "0 0 0\n", "2000000000 records of at least 6 bytes are declared"},
+        {"-1", "1", "", "expected an element's count"},
+        {"1", "x", "", "expected an element's count"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        char text[1024];
+        header_of(text, sizeof text, cases[i].vertices, cases[i].faces, cases[i].body);
+        refuse("ply", text, cases[i].message);
+    }
+    refuse("ply", "", "the file is empty");
+    refuse("ply", "solid", "name:1: expected 'ply'");
+    refuse("ply", "ply\nformat ascii 1.0\n", "expected 'end_header'");
+    refuse("ply", "ply\nend_header\n", "no format line");
+    refuse("ply", "ply\nformat ascii 1.0\nend_header\n", "declares no vertices");
+    refuse("ply", "ply\nformat klingon 1.0\nend_header\n", "name:2: expected ascii");
+    refuse("ply", "ply\nformat ascii 1.0\nproperty float x\nend_header\n",
+           "a property before the first element");
+    refuse("ply", "ply\nformat ascii 1.0\nelement vertex 0\nproperty list float int x\nend_header\n",
+           "has to be an integer");
+    refuse("ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+           "lacks one of");
+    refuse("ply",
+           "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
+           "element vertex 0\nend_header\n",
+           "declared twice");
+}
+
+static void refuses_binary_nan_and_lies(void **state) {
+    (void)state;
+    for (int i = 0; i < 3; ++i) {
+        bytes b = {.size = 0};
+        put_text(
+            &b, "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                "property double z\nelement face 1\nproperty list int uint vertex_indices\nend_header\n");
+        put_f32(&b, 0, false), put_f32(&b, i == 0 ? NAN : 1, false), put_f64(&b, i == 1 ? 1e300 : 0, false);
+        put_i32(&b, i == 2 ? -3 : 3, false);
+        for (int k = 0; k < 3; ++k) put_i32(&b, 0, false);
+        static const char *messages[] = {"vertex 0: its position is not finite (nan)",
+                                         "vertex 0: its position is not finite (inf)", "face 0"};
+        refuse_bytes("ply", b.data, b.size, messages[i]);
+    }
+}
+
+/* 2^31 faces in a file of a few bytes must fail before memory is asked for. */
+static void lies_cost_no_memory(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    char text[1024];
+    header_of(text, sizeof text, "1", "2000000000", "0 0 0\n3 0 0 0\n");
+    assert_int_equal(parse_text(&r, "ply", text, &m), FCT_ERROR_DATA);
+    assert_true(strstr(r.text, "2000000000 records") != NULL);
+}
+
+static void a_mesh_without_faces_is_valid(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    assert_int_equal(
+        parse_text(&r, "ply",
+                   "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                   "property float z\nend_header\n1 2 3\n",
+                   &m),
+        FCT_OK);
+    assert_int_equal(m.vertex_count, 1);
+    assert_int_equal(m.face_count, 0);
+    assert_non_null(m.triangles);
+    release(&r, &m);
+}
+
+/* 1e-30 and 1e30 in one file keep every bit. */
+static void keeps_extreme_extents(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh m;
+    char text[1024];
+    header_of(text, sizeof text, "3", "1", "0 0 1e30\n1e-30 0 0\n0 3.40282347e38 0\n3 0 1 2\n");
+    assert_int_equal(parse_text(&r, "ply", text, &m), FCT_OK);
+    assert_true(m.positions[2] == 1e30f && m.positions[3] == 1e-30f && m.positions[7] == 3.40282347e38f);
+    fct_mesh_report report;
+    assert_int_equal(fct_mesh_inspect(&env, &m, &report), FCT_OK);
+    assert_true(isfinite(report.area) && report.area > 0 && isfinite(report.diagonal));
+    release(&r, &m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(reads_text),
+        cmocka_unit_test(reads_both_byte_orders),
+        cmocka_unit_test(refuses_every_truncation),
+        cmocka_unit_test(reads_strips),
+        cmocka_unit_test(keeps_degenerate_faces),
+        cmocka_unit_test(refuses),
+        cmocka_unit_test(refuses_binary_nan_and_lies),
+        cmocka_unit_test(lies_cost_no_memory),
+        cmocka_unit_test(a_mesh_without_faces_is_valid),
+        cmocka_unit_test(keeps_extreme_extents),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
