@@ -129,18 +129,23 @@ fct_result fct_scene_parse_json(const fct_env *env, const char *name, const char
 
 static fct_result read_any(fct_scene *scene, const char *path) {
     const fct_env *env = scene->env;
-    if (!fct_path_ends(path, ".json")) return read_mesh(scene, path);
+    bool json = fct_path_ends(path, ".json"), obj = fct_path_ends(path, ".obj");
+    if (!json && !obj) return read_mesh(scene, path);
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
+    const char *text = (const char *)file.data;
+    bool plain = obj && !fct_scene_obj_names_materials(text, file.size);
     char *base = fct_path_folder(env, path);
     if (!base)
         result = FCT_ERROR_MEMORY;
-    else
-        result = fct_scene_read_json(scene, path, (const char *)file.data, file.size, base);
+    else if (json)
+        result = fct_scene_read_json(scene, path, text, file.size, base);
+    else if (!plain)
+        result = fct_scene_read_obj(scene, path, text, file.size, base);
     fct_release(env, base);
     fct_file_close(env, &file);
-    return result;
+    return result == FCT_OK && plain ? read_mesh(scene, path) : result;
 }
 
 fct_result fct_scene_load(const fct_env *env, const char *path, fct_backend backend, fct_scene **out) {

@@ -12,6 +12,11 @@ fct_result fct_scene_parse_json(const fct_env *env, const char *name, const char
 fct_result fct_scene_read_json(fct_scene *scene, const char *name, const char *text, size_t size,
                                const char *base);
 
+/* An OBJ with materials (fct_scene_obj_names_materials) and their MTL. */
+fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *text, size_t size,
+                              const char *base);
+bool fct_scene_obj_names_materials(const char *text, size_t size);
+
 /* What a model file holds: a hierarchy, or a mesh (the other is empty). */
 typedef struct fct_model_file {
     fct_tree *tree;

@@ -139,8 +139,7 @@ static fct_result add_part(fct_scene *scene, const char *name, const fct_mesh *m
     return add_model(scene, name, &own);
 }
 
-/* Faces sorted by label, stable; starts has label_count + 1 entries. */
-static void sort_by_label(const uint32_t *labels, uint32_t face_count, uint32_t label_count, uint32_t *starts,
+void fct_scene_sort_faces(const uint32_t *labels, uint32_t face_count, uint32_t label_count, uint32_t *starts,
                           uint32_t *faces) {
     memset(starts, 0, ((size_t)label_count + 1) * sizeof *starts);
     for (uint32_t f = 0; f < face_count; ++f) ++starts[labels[f] + 1];
@@ -160,7 +159,7 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
         result = fct_fail_memory(env, "a model's parts");
         goto done;
     }
-    sort_by_label(labels, mesh->face_count, label_count, starts, faces);
+    fct_scene_sort_faces(labels, mesh->face_count, label_count, starts, faces);
     uint32_t used = 0;
     for (uint32_t k = 0; k < label_count; ++k) used += starts[k + 1] > starts[k];
     parts->labels = fct_allocate(env, used, sizeof *parts->labels);

@@ -79,6 +79,11 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
 fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, uint32_t count,
                            const uint32_t *materials, const float transform[12]);
 
+/* Faces in ascending order of their labels, stable: those of label k are faces[starts[k]] up to
+ * faces[starts[k + 1]]; starts has label_count + 1 entries. */
+void fct_scene_sort_faces(const uint32_t *labels, uint32_t face_count, uint32_t label_count, uint32_t *starts,
+                          uint32_t *faces);
+
 /* Binary hierarchy over `count` >= 1 boxes: 2 count - 1 volumes, node 0 the root, children after parents,
  * depth at most FCT_SCENE_DEPTH. */
 fct_result fct_scene_build_volumes(const fct_env *env, uint32_t count, const fct_bounds *bounds,
