@@ -1,0 +1,489 @@
+/* tests/scene/test_load.c: scene.json and OBJ + MTL: what is read, what is refused and how it is told, shared
+ * models, hierarchies beside meshes, and running out of memory at every allocation. */
+#include "support.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "base/file.h"
+#include "facetree/scene.h"
+#include "scene/load.h"
+
+static char folder[] = "/tmp/facetree-scene-XXXXXX";
+
+static const char *path_of(const char *name) {
+    static char path[4][256];
+    static int turn;
+    char *to = path[turn++ % 4];
+    snprintf(to, sizeof path[0], "%s/%s", folder, name);
+    return to;
+}
+
+static void write_text(const char *name, const char *text) {
+    FILE *file = fopen(path_of(name), "wb");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static int set_up(void **unused) {
+    (void)unused;
+    assert_non_null(mkdtemp(folder));
+    write_text("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    /* two quads and a triangle of three materials */
+    write_text("parts.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 3 0 0\n"
+                            "usemtl oak\nf 1 2 3 4\nusemtl tin\nf 2 5 6 3\nusemtl oak2\nf 5 7 6\n");
+    write_text("empty.obj", "v 0 0 0\n");
+    write_text("broken.obj", "v 0 0 zero\nf 1 1 1\n");
+    return 0;
+}
+
+static int clear(void **unused) {
+    (void)unused;
+    char command[256];
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    return system(command);
+}
+
+#define HEAD  "{\"materials\": {\"a\": {\"reflectance\": 0.5}, \"b\": {\"reflectance\": [0.1, 0.2, 0.3]}}, "
+#define TRI   "\"models\": {\"t\": \"tri.obj\"}, "
+#define PARTS "\"models\": {\"p\": \"parts.obj\"}, "
+
+static fct_result parse(const fct_env *env, const char *text, fct_scene **scene) {
+    char base[256];
+    snprintf(base, sizeof base, "%s/", folder);
+    return fct_scene_parse_json(env, "s.json", text, strlen(text), base, FCT_BACKEND_OBB, scene);
+}
+
+static fct_scene *must_parse(const fct_env *env, const char *text) {
+    fct_scene *scene;
+    assert_int_equal(parse(env, text, &scene), FCT_OK);
+    return scene;
+}
+
+static void reads_materials_camera_and_groups(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene = must_parse(
+        &env,
+        "{\"light_groups\": [\"day\", \"night\"], \"materials\": ["
+        "{\"name\": \"a\", \"reflectance\": 0.25, \"emission\": [1, 2, 3], \"two_sided\": true, "
+        "\"light_group\": \"night\"}, {\"name\": \"b\"}], "
+        "\"models\": [{\"name\": \"t\", \"file\": \"tri.obj\"}], "
+        "\"camera\": {\"position\": [0, 1, 5], \"target\": [0, 1, 0], \"vertical_fov\": 30}, "
+        "\"instances\": [{\"model\": \"t\", \"material\": \"a\"}, {\"model\": \"t\", \"material\": \"b\"}]}");
+    fct_scene_view v = fct_scene_get(scene);
+    assert_int_equal(v.material_count, 2);
+    assert_true(v.materials[0].reflectance[1] == .25f && v.materials[0].emission[2] == 3);
+    assert_true(v.materials[0].two_sided && v.materials[0].light_group == 1);
+    assert_true(v.materials[1].reflectance[0] == .7f && !v.materials[1].two_sided);
+    assert_int_equal(v.light_group_count, 2);
+    assert_string_equal(v.light_groups[1], "night");
+    assert_true(v.camera.given && v.camera.position[2] == 5 && v.camera.vertical_fov == 30 &&
+                v.camera.up[1] == 1);
+    assert_int_equal(v.model_count, 1); /* shared */
+    assert_int_equal(v.instance_count, 2);
+    assert_int_equal(v.face_count, 2);
+    assert_string_equal(v.instances[0].name, "t");
+    assert_string_not_equal(v.instances[1].name, "t");
+    fct_scene_destroy(scene);
+
+    scene = must_parse(&env, HEAD TRI "\"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}");
+    v = fct_scene_get(scene);
+    assert_int_equal(v.light_group_count, 1);
+    assert_false(v.camera.given);
+    assert_true(v.camera.vertical_fov > 0 && v.camera.position[2] > v.bounds.upper[2]);
+    fct_scene_destroy(scene);
+}
+
+static void expect_point(const fct_instance *i, double x, double y, double z) {
+    const float *m = i->to_world; /* of the model's (1, 2, 3) */
+    double at[3];
+    for (int r = 0; r < 3; ++r) at[r] = m[4 * r] + 2 * m[4 * r + 1] + 3 * m[4 * r + 2] + m[4 * r + 3];
+    assert_true(fabs(at[0] - x) + fabs(at[1] - y) + fabs(at[2] - z) < 1e-5);
+}
+
+static void reads_transforms(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+#define PLACE "{\"model\": \"t\", \"material\": \"a\", "
+    fct_scene *scene =
+        must_parse(&env, HEAD TRI
+                   "\"instances\": [" PLACE "\"transform\": [2,0,0,0, 0,2,0,0, 0,0,2,0, 5,6,7,1]}," PLACE
+                   "\"translate\": [5, 6, 7]}," PLACE "\"scale\": [1, 2, -1]}," PLACE
+                   "\"rotate\": {\"axis\": [0, 0, 2], \"degrees\": 90}}," PLACE
+                   "\"rotate\": [0, 0, 0.70710678, 0.70710678], \"scale\": 2, \"translate\": [1, 0, 0]}]}");
+    fct_scene_view v = fct_scene_get(scene);
+    expect_point(v.instances, 7, 10, 13);
+    expect_point(v.instances + 1, 6, 8, 10);
+    expect_point(v.instances + 2, 1, 4, -3);
+    expect_point(v.instances + 3, -2, 1, 3);
+    expect_point(v.instances + 4, -3, 2, 6);
+    assert_true(v.instances[2].mirrored && !v.instances[3].mirrored);
+    assert_true(fabs(v.instances[4].uniform_scale - 2) < 1e-5);
+    fct_scene_destroy(scene);
+}
+
+static void cuts_models_by_material(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene = must_parse(
+        &env, HEAD PARTS "\"instances\": ["
+                         "{\"name\": \"x\", \"model\": \"p\", \"materials\": {\"oak\": \"a\", \"tin\": "
+                         "\"b\", \"oak2\": \"a\"}},"
+                         "{\"name\": \"y\", \"model\": \"p\", \"materials\": {\"tin\": \"a\", \"*\": \"b\"}},"
+                         "{\"name\": \"z\", \"model\": \"p\", \"material\": \"b\"},"
+                         "{\"name\": \"w\", \"model\": \"p\", \"face_materials\": [\"b\", \"a\", \"b\"]}]}");
+    fct_scene_view v = fct_scene_get(scene);
+    assert_int_equal(v.object_count, 4);
+    assert_int_equal(v.instance_count, 3 + 3 + 1 + 2);
+    assert_int_equal(v.model_count, 3 + 1 + 2);
+    assert_int_equal(v.face_count, 4 * 5);
+    static const uint32_t materials[9] = {0, 1, 0, 1, 0, 1, 1, 0, 1}, faces[9] = {2, 2, 1, 2, 2, 1, 5, 2, 3};
+    static const char names[] = "xxxyyyzww";
+    for (uint32_t i = 0; i < 9; ++i) {
+        const fct_instance *instance = v.instances + i;
+        assert_int_equal(instance->material, materials[i]);
+        assert_int_equal(instance->name[0], names[i]);
+        assert_int_equal(fct_tree_get(v.models[instance->model].tree).face_count, faces[i]);
+    }
+    assert_int_equal(v.instances[0].model, v.instances[3].model);
+    /* the parts of w know their faces and vertices of the mesh */
+    const fct_model *w = v.models + v.instances[8].model;
+    assert_int_equal(w->source_faces[0], 0);
+    assert_int_equal(w->source_faces[2], 4);
+    assert_int_equal(w->source_vertices[0], 0);
+    assert_null(v.models[v.instances[6].model].source_faces);
+    fct_scene_destroy(scene);
+}
+
+typedef struct bad {
+    const char *text, *message; /* what the message holds */
+    fct_result result;
+} bad;
+
+#define ONE(...) HEAD TRI "\"instances\": [{\"model\": \"t\", \"material\": \"a\"" __VA_ARGS__ "}]}"
+#define MATERIAL(m)                                                                                          \
+    "{\"materials\": {\"a\": " m "}, " TRI "\"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}"
+#define CAMERA(c) HEAD TRI "\"camera\": " c ", \"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}"
+
+static const bad bad_scenes[] = {
+    {"", "s.json:1:", FCT_ERROR_DATA},
+    {"{\n  \"models\": {,\n}", "s.json:2:", FCT_ERROR_DATA},
+    {"{\"models\": NaN}", "s.json:1:", FCT_ERROR_DATA},
+    {"{\"models\": {}, \"models\": {}}", "duplicate", FCT_ERROR_DATA},
+    {"[]", "expected an object, found an array", FCT_ERROR_DATA},
+    {"{}", "materials: expected an object or an array, found nothing", FCT_ERROR_DATA},
+    {"{\"modles\": 1}", "unknown key \"modles\"", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": []}", "instances: expected at least one", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": 5}", "instances: expected an array of objects, found 5", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": [5]}", "instances[0]: expected an object, found 5", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": [{\"material\": \"a\"}]}",
+     "instances[0].model: expected a string, found nothing", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": [{\"model\": \"u\"}]}", "instances[0].model: there is no model \"u\"",
+     FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": [{\"model\": \"t\", \"material\": \"c\"}]}",
+     "instances[0].material: there is no material \"c\"", FCT_ERROR_DATA},
+    {HEAD TRI "\"instances\": [{\"model\": \"t\"}]}", "names no materials", FCT_ERROR_DATA},
+    {ONE(", \"materials\": {}"), "found several", FCT_ERROR_DATA},
+    {ONE(", \"colour\": 1"), "instances[0]: unknown key \"colour\"", FCT_ERROR_DATA},
+    {ONE(", \"name\": \"\""), "instances[0].name: expected a string of 1 to", FCT_ERROR_DATA},
+    {ONE(", \"name\": \"x\"}, {\"model\": \"t\", \"material\": \"a\", \"name\": \"x\""),
+     "instances[1].name: the name is there already", FCT_ERROR_DATA},
+    {ONE(", \"transform\": [1, 2]"), "transform: expected an array of 16 numbers, found an array of 2",
+     FCT_ERROR_DATA},
+    {ONE(", \"transform\": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,\"x\",1]"),
+     "transform[14]: expected a number, found \"x\"", FCT_ERROR_DATA},
+    {ONE(", \"transform\": [1,0,0,5, 0,1,0,0, 0,0,1,0, 0,0,0,1]"), "last row 0 0 0 1", FCT_ERROR_DATA},
+    {ONE(", \"transform\": [1,0,0,0, 0,1,0,0, 1,1,0,0, 0,0,0,1]"),
+     "instances[0].transform: the transform is singular", FCT_ERROR_DATA},
+    {ONE(", \"scale\": 0"), "singular", FCT_ERROR_DATA},
+    {ONE(", \"scale\": 1e39"), "scale: expected a number that fits a float", FCT_ERROR_DATA},
+    {ONE(", \"scale\": 1e30"), "singular", FCT_ERROR_DATA},
+    {ONE(", \"scale\": [1, 2]"), "scale: expected an array of 3 numbers", FCT_ERROR_DATA},
+    {ONE(", \"rotate\": [0, 0, 0, 0]"), "rotate: the quaternion has no length", FCT_ERROR_DATA},
+    {ONE(", \"rotate\": {\"axis\": [0, 0, 0], \"degrees\": 1}"), "the axis has no length", FCT_ERROR_DATA},
+    {ONE(", \"rotate\": {\"axis\": [0, 0, 1]}"), "rotate.degrees: expected a number, found nothing",
+     FCT_ERROR_DATA},
+    {ONE(", \"scale\": 2, \"transform\": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]"), "found both",
+     FCT_ERROR_DATA},
+    {MATERIAL("{\"reflectance\": 1}"), "materials.a.reflectance: expected numbers below 1, found 1",
+     FCT_ERROR_DATA},
+    {MATERIAL("{\"reflectance\": 0.99999999999}"), "expected numbers below 1", FCT_ERROR_DATA},
+    {MATERIAL("{\"reflectance\": [0.5, 0.5, -0.1]}"), "expected numbers >= 0, found -0.1", FCT_ERROR_DATA},
+    {MATERIAL("{\"emission\": -1}"), "materials.a.emission: expected numbers >= 0", FCT_ERROR_DATA},
+    {MATERIAL("{\"emission\": [1, 2]}"), "expected an array of 3 numbers", FCT_ERROR_DATA},
+    {MATERIAL("{\"reflectence\": 0.5}"), "materials.a: unknown key \"reflectence\"", FCT_ERROR_DATA},
+    {MATERIAL("{\"two_sided\": 1}"), "materials.a.two_sided: expected true or false, found 1",
+     FCT_ERROR_DATA},
+    {MATERIAL("{\"light_group\": \"x\"}"), "there is no light group \"x\"", FCT_ERROR_DATA},
+    {MATERIAL("\"white\""), "materials.a: expected an object, found \"white\"", FCT_ERROR_DATA},
+    {CAMERA("{\"position\": [0, 0, 0]}"), "camera.target", FCT_ERROR_DATA},
+    {CAMERA("{\"position\": [1, 0, 0], \"target\": [1, 0, 0]}"), "the same point", FCT_ERROR_DATA},
+    {CAMERA("{\"position\": [0, 1, 0], \"target\": [0, 0, 0]}"), "along the view", FCT_ERROR_DATA},
+    {CAMERA("{\"position\": [1, 0, 0], \"target\": [0, 0, 0], \"vertical_fov\": 180}"), "between 0 and 180",
+     FCT_ERROR_DATA},
+    {HEAD "\"models\": {\"t\": \"gone.ply\"}, \"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}",
+     "gone.ply", FCT_ERROR_INPUT},
+    {HEAD "\"models\": {\"t\": \"gone.fct\"}, \"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}",
+     "gone.fct", FCT_ERROR_INPUT},
+    {HEAD "\"models\": {\"t\": \"empty.obj\"}, \"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}",
+     "at least one face", FCT_ERROR_DATA},
+    {HEAD "\"models\": {\"t\": \"broken.obj\"}, \"instances\": [{\"model\": \"t\", \"material\": \"a\"}]}",
+     "broken.obj:1", FCT_ERROR_DATA},
+    {HEAD "\"models\": {\"t\": {\"path\": \"x\"}}, \"instances\": []}", "models.t: unknown key \"path\"",
+     FCT_ERROR_DATA},
+    {HEAD "\"models\": [{\"name\": \"t\", \"file\": \"x\"}, {\"name\": \"t\", \"file\": \"x\"}], "
+          "\"instances\": []}",
+     "models[1].name: \"t\" is there already", FCT_ERROR_DATA},
+    {HEAD "\"models\": [{\"file\": \"x\"}], \"instances\": []}", "models[0].name", FCT_ERROR_DATA},
+    {HEAD PARTS "\"instances\": [{\"model\": \"p\"}]}", "no material for \"oak\"", FCT_ERROR_DATA},
+    {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"materials\": {\"pine\": \"a\"}}]}",
+     "has no faces of material \"pine\"", FCT_ERROR_DATA},
+    {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"materials\": {\"tin\": \"c\", \"*\": \"a\"}}]}",
+     "instances[0].materials.tin: there is no material \"c\"", FCT_ERROR_DATA},
+    {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"face_materials\": [\"a\"]}]}",
+     "face_materials: expected an array of 3 materials, one per face, found an array of 1", FCT_ERROR_DATA},
+    {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"face_materials\": [\"a\", \"b\", \"c\"]}]}",
+     "face_materials[2]: there is no material \"c\"", FCT_ERROR_DATA},
+    {"{\"light_groups\": [\"x\", \"x\"]}", "light_groups[1]: the name is there already", FCT_ERROR_DATA},
+};
+
+static void refuses_bad_scenes_and_says_where(void **unused) {
+    (void)unused;
+    for (size_t k = 0; k < sizeof bad_scenes / sizeof *bad_scenes; ++k) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene = (fct_scene *)&r;
+        fct_result result = parse(&env, bad_scenes[k].text, &scene);
+        if (result != bad_scenes[k].result || !strstr(r.text, bad_scenes[k].message))
+            fail_msg("case %zu: %s\nresult %d, message: %s\nexpected: %s", k, bad_scenes[k].text, result,
+                     r.text, bad_scenes[k].message);
+        assert_null(scene);
+        assert_int_equal(r.alive, 0);
+    }
+}
+
+static void fails_cleanly_at_every_allocation(void **unused) {
+    (void)unused;
+    static const char text[] = HEAD PARTS "\"light_groups\": [\"x\"], \"instances\": ["
+                                          "{\"model\": \"p\", \"materials\": {\"tin\": \"a\", \"*\": \"b\"}},"
+                                          "{\"model\": \"p\", \"material\": \"b\", \"translate\": [5, 0, 0]},"
+                                          "{\"model\": \"p\", \"face_materials\": [\"b\", \"a\", \"b\"]}]}";
+    long failures = 0;
+    for (long n = 1;; ++n) {
+        recorder r = {.fail_at = n};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        fct_result result = parse(&env, text, &scene);
+        if (result == FCT_OK) fct_scene_destroy(scene);
+        assert_int_equal(r.alive, 0);
+        if (r.allocations < n) {
+            assert_int_equal(result, FCT_OK);
+            break;
+        }
+        assert_int_equal(result, FCT_ERROR_MEMORY);
+        assert_true(r.messages > 0);
+        ++failures;
+    }
+    assert_true(failures > 50);
+}
+
+static fct_result load(const fct_env *env, const char *name, fct_scene **scene) {
+    return fct_scene_load(env, path_of(name), FCT_BACKEND_OBB, scene);
+}
+
+static void opens_the_hierarchy_beside_a_mesh(void **unused) {
+    (void)unused;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh mesh = make_grid(&env, 6);
+    fct_tree *tree;
+    fct_scene *scene;
+    fct_file file;
+    fct_tree_def def = fct_tree_def_default();
+    assert_int_equal(fct_mesh_save(&env, path_of("grid.ply"), &mesh, NULL), FCT_OK);
+    assert_int_equal(fct_file_open(&env, path_of("grid.ply"), &file), FCT_OK);
+    def.source = "told by the test";
+    def.source_hash = XXH3_64bits(file.data, file.size);
+    fct_file_close(&env, &file);
+    assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
+    assert_int_equal(fct_tree_save(&env, tree, path_of("grid.fct")), FCT_OK);
+    fct_tree_destroy(tree);
+
+    static const char *const names[] = {"grid.ply", "grid.fct"};
+    for (int k = 0; k < 2; ++k) {
+        assert_int_equal(load(&env, names[k], &scene), FCT_OK);
+        fct_scene_view v = fct_scene_get(scene);
+        assert_string_equal(fct_tree_get(v.models[0].tree).source, "told by the test");
+        assert_true(v.face_count == 72 && v.materials[0].reflectance[0] == .7f);
+        fct_scene_destroy(scene);
+    }
+    mesh.positions[2] = .5f; /* the file is of another mesh now */
+    assert_int_equal(fct_mesh_save(&env, path_of("grid.ply"), &mesh, NULL), FCT_OK);
+    assert_int_equal(load(&env, "grid.ply", &scene), FCT_OK);
+    assert_string_not_equal(fct_tree_get(fct_scene_get(scene).models[0].tree).source, "told by the test");
+    fct_scene_destroy(scene);
+    /* a hierarchy that is none is an error, not passed over */
+    write_text("grid.fct", "no hierarchy");
+    assert_int_equal(load(&env, "grid.ply", &scene), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "grid.fct"));
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+}
+
+#define QUAD "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+static void reads_obj_with_materials(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene;
+    write_text("box.mtl",
+               "# two\nnewmtl white wall\n Kd 0.5 0.25 .125\n Ns 10\n\nnewmtl lamp\nKd 0.1\nKe 5 4 3 # on\n");
+    write_text("box.obj",
+               "mtllib box.mtl\n" QUAD "usemtl white wall\no one\nf 1 2 3\ng two\nusemtl lamp\nf 1 3 4\n"
+               "o one\nf 1 2 4\n");
+    assert_int_equal(load(&env, "box.obj", &scene), FCT_OK);
+    fct_scene_view v = fct_scene_get(scene);
+    assert_int_equal(v.material_count, 2);
+    assert_true(v.materials[0].reflectance[2] == .125f && v.materials[0].two_sided);
+    assert_true(v.materials[1].reflectance[2] == .1f && v.materials[1].emission[0] == 5 &&
+                !v.materials[1].two_sided);
+    assert_int_equal(v.object_count, 2);
+    assert_int_equal(v.instance_count, 3);
+    assert_string_equal(v.instances[0].name, "one");
+    assert_string_equal(v.instances[1].name, "one");
+    assert_string_equal(v.instances[2].name, "two");
+    assert_true(v.instances[0].material == 0 && v.instances[1].material == 1 && v.instances[2].material == 1);
+    fct_scene_destroy(scene);
+
+    write_text("plain.obj", QUAD "o one\nf 1 2 3\no two\nf 1 3 4\n"); /* no materials: a grey mesh */
+    assert_int_equal(load(&env, "plain.obj", &scene), FCT_OK);
+    assert_int_equal(fct_scene_get(scene).instance_count, 1);
+    fct_scene_destroy(scene);
+}
+
+static void refuses_bad_obj_scenes(void **unused) {
+    (void)unused;
+    static const struct {
+        const char *obj, *mtl, *message;
+        fct_result result;
+    } cases[] = {
+        {"mtllib none.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "", "none.mtl", FCT_ERROR_INPUT},
+        {"mtllib bad.mtl\n" QUAD "usemtl b\nf 1 2 3\n", "newmtl a\n", "\"b\" is used and in no library",
+         FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "f 1 2 3\n", "newmtl a\n", "usemtl before the first face", FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "f 1 2 3\nusemtl a\nf 1 2 3\n", "newmtl a\n", "usemtl before the first face",
+         FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd red\n", "bad.mtl:2", FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd 1 1 1\n",
+         "expected Kd in [0, 1), found 1", FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd nan\n", "bad.mtl:2", FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKe -1\n", "expected Ke >= 0, found -1",
+         FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "Kd 1 1 1\n", "bad.mtl:1: expected newmtl",
+         FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nnewmtl a\n", "defined twice",
+         FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 9\n", "newmtl a\n", "bad.obj:7", FCT_ERROR_DATA},
+        {"mtllib bad.mtl\n" QUAD "usemtl a\n", "newmtl a\n", "at least one face", FCT_ERROR_DATA},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        write_text("bad.obj", cases[k].obj);
+        write_text("bad.mtl", cases[k].mtl);
+        fct_result result = load(&env, "bad.obj", &scene);
+        if (result != cases[k].result || !strstr(r.text, cases[k].message))
+            fail_msg("case %zu: result %d, message: %s\nexpected: %s", k, result, r.text, cases[k].message);
+        assert_null(scene);
+        assert_int_equal(r.alive, 0);
+    }
+}
+
+static void obj_fails_cleanly_at_every_allocation(void **unused) {
+    (void)unused;
+    write_text("memory.mtl", "newmtl a\nnewmtl b\nKe 1 1 1\n");
+    write_text("memory.obj", "mtllib memory.mtl\n" QUAD "usemtl a\nf 1 2 3\no x\nusemtl b\nf 1 3 4\n");
+    for (long n = 1;; ++n) {
+        recorder r = {.fail_at = n};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        fct_result result = load(&env, "memory.obj", &scene);
+        if (result == FCT_OK) fct_scene_destroy(scene);
+        assert_int_equal(r.alive, 0);
+        assert_int_equal(result, r.allocations < n ? FCT_OK : FCT_ERROR_MEMORY);
+        if (result == FCT_OK) break;
+    }
+}
+
+static void missing_files_are_told(void **unused) {
+    (void)unused;
+    static const char *const names[] = {"gone.json", "gone.obj", "gone.ply", "gone.fct"};
+    for (int k = 0; k < 4; ++k) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        assert_int_equal(load(&env, names[k], &scene), FCT_ERROR_INPUT);
+        assert_non_null(strstr(r.text, names[k]));
+        assert_null(scene);
+    }
+}
+
+static void scenes_made_by_calls_are_checked(void **unused) {
+    (void)unused;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_scene *scene;
+    uint32_t id, group;
+    fct_material material = {.name = "m", .reflectance = {.5f, .5f, .5f}};
+    fct_mesh mesh = make_grid(&env, 2);
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+    material.reflectance[1] = NAN;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_ERROR_DATA);
+    material.reflectance[1] = 1;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_ERROR_DATA);
+    material.reflectance[1] = 0, material.emission[0] = INFINITY;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_ERROR_DATA);
+    material.emission[0] = 0;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    float flat[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0}, nan[12] = {1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0};
+    assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, flat, id, NULL), FCT_ERROR_DATA);
+    assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, nan, id, NULL), FCT_ERROR_DATA);
+    uint32_t faces[8] = {0, 0, 0, 7, 0, 0, 0, 0};
+    assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, NULL, id, faces), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "face 3 has material 7 of 1"));
+    mesh.positions[4] = NAN;
+    assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, NULL, id, NULL), FCT_ERROR_DATA);
+    mesh.positions[4] = 0;
+    material.light_group = 1;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    assert_int_equal(fct_scene_add_light_group(scene, "one", &group), FCT_OK);
+    assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, NULL, id, NULL), FCT_OK);
+    assert_int_equal(fct_scene_commit(scene), FCT_ERROR_DATA); /* group 1 of 1 */
+    fct_scene_destroy(scene);
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+    assert_int_equal(fct_scene_commit(scene), FCT_ERROR_DATA); /* empty */
+    fct_scene_destroy(scene);
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(reads_materials_camera_and_groups),
+        cmocka_unit_test(reads_transforms),
+        cmocka_unit_test(cuts_models_by_material),
+        cmocka_unit_test(refuses_bad_scenes_and_says_where),
+        cmocka_unit_test(fails_cleanly_at_every_allocation),
+        cmocka_unit_test(opens_the_hierarchy_beside_a_mesh),
+        cmocka_unit_test(reads_obj_with_materials),
+        cmocka_unit_test(refuses_bad_obj_scenes),
+        cmocka_unit_test(obj_fails_cleanly_at_every_allocation),
+        cmocka_unit_test(missing_files_are_told),
+        cmocka_unit_test(scenes_made_by_calls_are_checked),
+    };
+    return cmocka_run_group_tests(tests, set_up, clear);
+}
