@@ -3,9 +3,7 @@
  * All geometry is scaled by a power of two so that the larger half extent of the model is in [1/2, 1):
  * models of any size meet the same arithmetic. Leaves are face clusters of at most 16 faces and 16 vertices;
  * above them stand nodes of eight children that hold either axis boxes or oriented boxes, the latter as
- * affine maps that take a box to [-1, 1]^3. Boxes are widened by FCT_AXIS_PAD and FCT_ORIENTED_PAD, more than
- * everything that float rounding in box and triangle tests can do while ray origins stay within FCT_REACH of
- * the centre (derivation in docs/bvh.md); farther origins are moved along the ray first, see ray.h.
+ * affine maps that take a box to [-1, 1]^3.
  */
 #ifndef FCT_BVH_BVH_H
 #define FCT_BVH_BVH_H
@@ -14,6 +12,14 @@
 #include "base/vec.h"
 #include "facetree/bvh.h"
 
+/* Boxes are widened by more than float rounding can do, so that no triangle the triangle test would accept is
+ * left out. With u = 2^-24, half extents below 1 and origins within FCT_REACH = 4 of the centre (farther ones
+ * are moved along the ray first, see ray.h), vertices lie within D = 5 of an origin in each coordinate.
+ * Moving a vertex to the origin and shearing it displaces it by at most 6 u D = 30 u across the ray; edge
+ * functions then decide exactly. A slab's two distances err by 3 u D = 15 u each: 60 u in all, and the axis
+ * boxes are widened by 64 u. A map adds the rounding of its rows, of the mapped origin (30 u of the box's
+ * half extent in the model's unit) and direction (32 u over the length to the box) and of the divisions (26
+ * u): about 120 u, and oriented boxes are widened by 256 u. */
 #define FCT_AXIS_PAD      0x1p-18f
 #define FCT_ORIENTED_PAD  0x1p-16f
 #define FCT_REACH         4.0f

@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-/* What the float test may move a triangle by, in scaled units; see docs/bvh.md. */
+/* More than the float test moves a triangle by, in scaled units; see bvh.h. */
 #define ROUNDING ((double)FCT_AXIS_PAD)
 enum { SLICE = 65536, AROUND = 16 };
 

@@ -82,7 +82,8 @@ static void agrees_with_brute_force(const fct_env *env, fct_mesh mesh, float sca
         assert_false(fct_bvh_closest_point(m.bvh, point, near.distance * .99999f, &near, NULL));
         assert_int_equal(near.face, FCT_NONE);
     }
-    assert_true(visits.triangles < count * mesh.face_count / 8);
+    /* The tenth that ask from afar look at everything. */
+    assert_true(visits.triangles < count * mesh.face_count / 5);
     model_release(env, &m);
 }
 
