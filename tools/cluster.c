@@ -27,7 +27,8 @@ enum {
 };
 
 static const struct argp_option options_table[] = {
-    {"method", KEY_METHOD, "greedy", 0, "The cheapest merge first (default)", 0},
+    {"method", KEY_METHOD, "NAME", 0,
+     "rounds: all mutually cheapest pairs at once (default); greedy: the cheapest merge first", 0},
     {"cost", KEY_COST, "COST", 0,
      "increment: growth of the total error (default); mean: mean error of the union", 0},
     {"fit", KEY_FIT, "W", 0, "Weight of the distance to the plane (default: as suits the cost)", 0},
@@ -40,8 +41,10 @@ static const struct argp_option options_table[] = {
     {0}};
 
 static error_t parse(int key, char *text, struct argp_state *state) {
-    static const char *const methods[] = {"greedy", NULL}, *const costs[] = {"increment", "mean", NULL},
+    static const char *const methods[] = {"greedy", "rounds", NULL},
+                             *const costs[] = {"increment", "mean", NULL},
                              *const measures[] = {"area", "points", NULL};
+    static const fct_cluster_method method_values[] = {FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS};
     static const fct_cluster_cost cost_values[] = {FCT_COST_INCREMENT, FCT_COST_MEAN};
     static const fct_fit_measure measure_values[] = {FCT_FIT_AREA, FCT_FIT_POINTS};
     fct_tree_def *def = state->input;
@@ -49,8 +52,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     error_t error;
     switch (key) {
     case KEY_METHOD:
-        def->method = FCT_CLUSTER_GREEDY;
-        return tool_parse_choice(state, "--method", text, methods, &index);
+        error = tool_parse_choice(state, "--method", text, methods, &index);
+        def->method = method_values[index];
+        return error;
     case KEY_COST:
         error = tool_parse_choice(state, "--cost", text, costs, &index);
         def->cost = cost_values[index];

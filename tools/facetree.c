@@ -8,9 +8,7 @@ static const struct {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
 } commands[] = {
-#ifdef TOOL_HAS_MAKE
     {"make", "make an example scene or mesh", tool_make},
-#endif
     {"info", "count what a file holds; check a hierarchy file", tool_info},
     {"cluster", "build the hierarchy of face clusters of a mesh", tool_cluster},
     {"partition", "cut a mesh into K clusters", tool_partition},
@@ -20,9 +18,7 @@ static const struct {
     {"bake", "radiosity of a scene to vertex colours", tool_bake},
     {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
     {"compare", "measure how far two meshes lie apart", tool_compare},
-#ifdef TOOL_HAS_RENDER
     {"render", "draw a mesh, a scene, clusters or boxes", tool_render},
-#endif
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 

@@ -17,9 +17,9 @@ fail() {
     sed 's/^/    stderr: /' err 2>/dev/null | head -n 5 >&2
 }
 
-# run ARGUMENTS...: leaves stdout in out, stderr in err, the exit code in $code.
+# run ARGUMENTS...: leaves stdout in out, stderr in err, the exit code in $code (124: it hangs).
 run() {
-    "$program" "$@" >out 2>err
+    timeout 180 "$program" "$@" >out 2>err
     code=$?
 }
 

@@ -22,6 +22,11 @@ expect 0 cluster sphere.off -o roots.fct --roots 7 --cost mean --fit 2 --directi
 holds "$(value roots) == 7"
 expect 0 info roots.fct --json
 check "the options of the build are recorded" test "$(value cost) $(value fit_measure) $(value fit) $(value shape)" = "mean points 2.0 0.5"
+for method in greedy rounds; do
+    expect 0 cluster sphere.off -o method.fct --method $method
+    expect 0 info method.fct --json
+    check "the method is recorded" test "$(value method)" = $method
+done
 expect 0 cluster sphere.off -o quiet.fct --quiet
 check "--quiet says nothing" test ! -s out -a ! -s err
 expect 0 cluster sphere.off -o progress.fct --progress

@@ -4,14 +4,14 @@ source "$(dirname "$0")/support.sh"
 printf '0 0 9 0 0 -1\n' >rays.txt
 
 through() {
-    local file=$1 faces=$2
+    local file=$1 faces=$2 rays=$3 # every ray near a fan's middle meets all of its triangles
     expect 0 cluster "$file" -o large.fct --json
     holds "$(value faces) == $faces && $(value roots) == 1 && $(value depth) <= 3 * log($faces) / log(2) + 1"
     echo "$file: $(value total) s to cluster"
     expect 0 info large.fct --verify --json
     expect 0 partition large.fct -k 100 -o labels.txt
     check "100 clusters" test "$(sort -u labels.txt | wc -l)" = 100
-    expect 0 raycast large.fct --check --count 20000 --json
+    expect 0 raycast large.fct --check --count $rays --json
     holds "$(value unexplained) == 0"
     expect 0 simplify "$file" --ratio .5 -o large.ply --json
     rm -f large.*
@@ -21,22 +21,22 @@ through() {
 awk -v n=$fan 'BEGIN { print "OFF"; print n + 2, n, 0; print "0 0 0"; print "0 0 1"
     for (i = 0; i < n; ++i) print cos(6.2831853 * i / n), sin(6.2831853 * i / n), .5
     for (i = 0; i < n; ++i) print 3, 0, 1, i + 2 }' >edge.off
-through edge.off $fan
+through edge.off $fan 300
 # A vertex of high valence.
 awk -v n=$fan 'BEGIN { print "OFF"; print n + 1, n, 0; print "0 0 1"
     for (i = 0; i < n; ++i) print cos(6.2831853 * i / n), sin(6.2831853 * i / n), 0
     for (i = 0; i < n; ++i) print 3, 0, i + 1, (i + 1) % n + 1 }' >fan.off
-through fan.off $fan
+through fan.off $fan 300
 # A strip: a chain of neighbours.
 awk -v n=$fan 'BEGIN { print "OFF"; print n + 2, n, 0; for (i = 0; i < n + 2; ++i) print int(i / 2), i % 2, 0
     for (i = 0; i < n; ++i) print 3, i, i + 1, i + 2 }' >strip.off
-through strip.off $fan
+through strip.off $fan 20000
 # Triangles that touch nothing.
 awk -v n=$many 'BEGIN { print "OFF"; print 3 * n, n, 0; side = int(n ^ (1 / 3)) + 1
     for (i = 0; i < n; ++i) { x = i % side; y = int(i / side) % side; z = int(i / side / side)
         print x, y, z; print x + .5, y, z; print x, y + .5, z }
     for (i = 0; i < n; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }' >soup.off
-through soup.off $many
+through soup.off $many 20000
 # A limit on memory is an answer, not a crash.
 expect 75 cluster soup.off -o limited.fct --max-memory 20M
 check "no output" test ! -e limited.fct

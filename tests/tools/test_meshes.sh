@@ -10,7 +10,7 @@ for mesh in "$data"/*.obj; do
     expect 0 info "$name.fct" --verify
     expect 0 raycast "$name.fct" --check --count $rays --json
     holds "$(value unexplained) == 0 && $(value occlusion_differences) == 0 && $(value hits) > $rays / 10"
-    for k in 2 100 1000; do
+    for k in 2 100 900; do
         expect 0 partition "$name.fct" -k $k -o labels.txt --json
         holds "$(value clusters) == $k"
         check "$name: $k labels" test "$(sort -u labels.txt | wc -l)" = $k

@@ -59,7 +59,7 @@ expect 64 cluster cube.off -o x.fct --seed -1
 expect 64 cluster cube.off -o x.fct --seed 99999999999999999999999
 expect 64 cluster cube.off -o x.fct --max-memory lots
 expect 64 cluster cube.off -o x.fct --max-memory 0
-expect 64 cluster cube.off -o x.fct --method rounds
+expect 64 cluster cube.off -o x.fct --method quick
 expect 64 cluster cube.off -o x.fct --cost cheap
 says "expected increment or mean, found 'cheap'"
 expect 64 cluster cube.off -o x.fct --fit -1
