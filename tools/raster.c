@@ -334,12 +334,12 @@ static raster_point find_point(const raster_camera *camera, const plane *p, doub
     raster_point point = {.face = p->face, .back = p->back};
     double total = 0;
     for (int i = 0; i < 3; ++i) {
-        double w = (p->n[i][0] * ray[0] + p->n[i][1] * ray[1] + p->n[i][2] * ray[2]) / sum;
-        double gx = (p->n[i][0] - w * p->sum[0]) / sum, gy = (p->n[i][1] - w * p->sum[1]) / sum;
-        double slope = sqrt(gx * gx + gy * gy) / camera->focal;
+        const double *n = p->n[i];
+        double along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2], slope = hypot(n[0], n[1]),
+               w = along / sum;
+        point.side[i] = w > 0 && slope > 0 ? camera->focal * fabs(along) / slope : 0;
         w = w > 0 ? w < 1 ? w : 1 : 0; /* a NaN becomes 0 too */
         point.weight[i] = w;
-        point.side[i] = slope > 0 ? w / slope : 0;
         total += w;
     }
     for (int i = 0; i < 3; ++i) point.weight[i] = total > 0 ? point.weight[i] / total : 1. / 3;
