@@ -140,33 +140,40 @@ fct_result fail_om(const fct_source *s, const char *what) {
     return fct_fail(s->env, FCT_ERROR_DATA, "%s: %s", s->name, what);
 }
 
-// The bytes of the chunk's data at p, or SIZE_MAX where they cannot be told. Topology: a half-edge is its
-// next, its vertex and its face; a vertex or a face is a half-edge; each of 1 to 8 bytes, as the chunk's bits
-// say.
+// The kinds of chunks that are let through: OpenMesh asserts that others do not come, which in Debian's build
+// ends the program. Ids of topology: a half-edge is its next, its vertex and its face; a vertex or a face is
+// a half-edge.
+struct chunk_kind {
+    unsigned entity, type, components;
+    bool is_float;
+    unsigned largest_bits; // as in the chunk's head: 0 is 8 bits of an integer and 32 of a float
+};
+
+const chunk_kind kinds[] = {
+    {Chunk::Entity_Vertex, Chunk::Type_Pos, 3, true, 1},
+    {Chunk::Entity_Vertex, Chunk::Type_Normal, 3, true, 1},
+    {Chunk::Entity_Vertex, Chunk::Type_Texcoord, 2, true, 0},
+    {Chunk::Entity_Vertex, Chunk::Type_Color, 3, false, 0},
+    {Chunk::Entity_Face, Chunk::Type_Color, 3, false, 0},
+    {Chunk::Entity_Face, Chunk::Type_Normal, 3, true, 1},
+    {Chunk::Entity_Halfedge, Chunk::Type_Texcoord, 2, true, 0},
+    {Chunk::Entity_Vertex, Chunk::Type_Topology, 1, false, 2},
+    {Chunk::Entity_Face, Chunk::Type_Topology, 1, false, 2},
+    {Chunk::Entity_Halfedge, Chunk::Type_Topology, 3, false, 2},
+};
+
+// The bytes of the chunk's data, or SIZE_MAX for a chunk that is not let through.
 size_t chunk_bytes(const Chunk::Header &h, const IO::OMFormat::Header &head) {
-    uint64_t vertices = head.n_vertices_, faces = head.n_faces_, edges = head.n_edges_, count;
-    switch (h.entity_) {
-    case Chunk::Entity_Vertex:
-        count = vertices;
-        break;
-    case Chunk::Entity_Face:
-        count = faces;
-        break;
-    case Chunk::Entity_Edge:
-        count = edges;
-        break;
-    case Chunk::Entity_Halfedge:
-        count = 2 * edges;
-        break;
-    default:
-        return SIZE_MAX;
+    if (h.name_) return SIZE_MAX;
+    bool topology = h.type_ == Chunk::Type_Topology; // OpenMesh sets the bit for floats there as well
+    uint64_t count = h.entity_ == Chunk::Entity_Vertex ? head.n_vertices_
+                     : h.entity_ == Chunk::Entity_Face ? head.n_faces_
+                                                       : 2 * uint64_t(head.n_edges_);
+    for (const chunk_kind &k : kinds) {
+        if (h.entity_ != k.entity || h.type_ != k.type || h.dim_ + 1u != k.components) continue;
+        if ((h.float_ != k.is_float && !topology) || h.bits_ > k.largest_bits) continue;
+        return size_t(count * k.components * ((k.is_float ? 4u : 1u) << h.bits_));
     }
-    if (h.name_ || h.type_ == Chunk::Type_Custom) return SIZE_MAX;
-    bool topology = h.type_ == Chunk::Type_Topology; // ids; OpenMesh sets the bit for floats there as well
-    uint64_t scalar = h.float_ && !topology ? uint64_t(4) << h.bits_ : uint64_t(1) << h.bits_;
-    if (!topology) return size_t(count * scalar * (h.dim_ + 1));
-    if (h.entity_ == Chunk::Entity_Halfedge) return size_t(count * scalar * 3);
-    if (h.entity_ == Chunk::Entity_Vertex || h.entity_ == Chunk::Entity_Face) return size_t(count * scalar);
     return SIZE_MAX;
 }
 
@@ -193,10 +200,10 @@ fct_result check_chunks(const fct_source *s, IO::OMFormat::Header *head) {
         p += 2;
         if (version < 0x40 && h.type_ == Chunk::Type_Topology)
             return fail_om(s, "OM files before version 2.0 are not read");
-        if (h.type_ == Chunk::Type_Status) return fail_om(s, "an OM file with status bits is not read");
         if (h.entity_ == Chunk::Entity_Sentinel && p == end) break;
         size_t size = chunk_bytes(h, *head);
-        if (size == SIZE_MAX) return fail_om(s, "an OM file with properties of its own is not read");
+        if (size == SIZE_MAX)
+            return fail_om(s, "an OM file with status bits or properties of its own is not read");
         if (size > size_t(end - p)) return fail_om(s, "the file ends within a chunk, or its head lies");
         points |= h.entity_ == Chunk::Entity_Vertex && h.type_ == Chunk::Type_Pos;
         faces |= h.entity_ == Chunk::Entity_Face && h.type_ == Chunk::Type_Topology;

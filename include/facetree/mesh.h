@@ -59,13 +59,13 @@ FCT_API void fct_memory_release(const fct_env *env, void *memory);
 
 /* What a file or a mesh holds; counts of zero mean a clean closed manifold. */
 typedef struct fct_mesh_report {
-    uint32_t polygons;        /* faces of the file before triangulation; 0 for a mesh not read from a file */
-    uint32_t vertices, faces; /* as in the mesh */
-    uint32_t edges;           /* distinct vertex pairs that are sides of a face */
-    uint32_t boundary_edges;  /* sides of exactly one face */
-    uint32_t boundary_loops;  /* connected sets of boundary edges */
-    uint32_t nonmanifold_edges;     /* sides of three or more faces */
-    uint32_t misoriented_edges;     /* shared by two faces that run along it in the same direction */
+    uint32_t polygons;          /* faces before triangulation: runs of source_faces, the face count without */
+    uint32_t vertices, faces;   /* as in the mesh */
+    uint32_t edges;             /* distinct vertex pairs that are sides of a face */
+    uint32_t boundary_edges;    /* sides of exactly one face */
+    uint32_t boundary_loops;    /* connected sets of boundary edges */
+    uint32_t nonmanifold_edges; /* sides of three or more faces */
+    uint32_t misoriented_edges; /* shared by two faces that run along it in the same direction */
     uint32_t nonmanifold_vertices;  /* whose faces form more than one fan */
     uint32_t degenerate_faces;      /* repeated index or zero area */
     uint32_t duplicate_faces;       /* same three vertices as an earlier face, in any order */
@@ -88,7 +88,9 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
  * chosen by the name's ending. Byte colours are sRGB and become linear; float colours are taken as linear;
  * radiosity_r/g/b of a PLY win over both.
  * "-" reads a PLY from standard input. A mesh without faces is valid input here.
- * Errors: INPUT, DATA (with file, line or element), MEMORY, CANCELLED. */
+ * What a file has and a mesh has no place for (lines, groups, normals that differ by corner, ...) is told in
+ * a message. docs/mesh.md says what is read of each format. Errors: INPUT, DATA (with file, line or element),
+ * MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
 
 typedef struct fct_mesh_save_def {
@@ -101,8 +103,10 @@ FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
 
 /* Writes .ply (binary little endian; colours as sRGB bytes plus float radiosity_r/g/b), .obj, .off, .stl, .om
  * or .glb (unlit; COLOR_0 exposed, clamped, linear, plus float _RADIOSITY). Atomic: a temporary file beside
- * the target, fsync, rename. "-" writes a PLY to standard output. Errors: OUTPUT, DATA (unknown ending),
- * MEMORY. */
+ * the target, fsync, rename. "-" writes a PLY to standard output. PLY keeps every array but source_faces, bit
+ * for bit; arrays that another format has no place for are told in a note. GLB groups faces by material and
+ * splits vertices where texture coordinates differ; OM keeps colours as bytes. def may be NULL. Errors:
+ * OUTPUT, DATA (unknown ending, invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
                                  const fct_mesh_save_def *def);
 
