@@ -5,8 +5,7 @@
  * which is left out, and a colour (three floats, linear). Texture coordinates are per corner, materials are
  * numbered in the order of their first use. Normals are taken when every corner has one and the corners of a
  * vertex agree. Lines, points and free-form surfaces are left out with a message, groups and smoothing
- * without one. OpenMesh's reader gives no line numbers, loses faces with repeated indices, and its materials
- * cannot be had through its importer; this one also reads five times faster.
+ * without one.
  */
 #include <math.h>
 #include <string.h>

@@ -3,8 +3,7 @@
  * A vertex line holds x y z, then a normal (N), a colour of 3 or 4 components (C), texture coordinates (ST).
  * A face line holds n, n indices, and nothing, 3 or 4 colour components, or the number of a colour map's
  * entry, which is passed over, for the map is not in the file. Components written with a point or an exponent
- * are linear floats, others sRGB bytes. OpenMesh's reader takes words for zeros and lets lying counts
- * through; hence our own.
+ * are linear floats, others sRGB bytes.
  */
 #include <math.h>
 #include <string.h>
