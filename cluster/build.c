@@ -15,13 +15,21 @@ fct_tree_def fct_tree_def_default(void) {
                           .max_cost = INFINITY};
 }
 
+/* Along edges as far as heights allow, then with the reserve of height. */
+static fct_result contract_edges(fct_work *work, fct_cluster_method method, bool across) {
+    work->steep = false;
+    fct_result result =
+        method == FCT_CLUSTER_ROUNDS ? fct_work_rounds(work, across) : fct_work_greedy(work, across);
+    work->steep = true;
+    return result == FCT_OK ? fct_work_greedy(work, across) : result;
+}
+
 static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_method method) {
-    fct_result (*along_edges)(fct_work *, bool) =
-        method == FCT_CLUSTER_ROUNDS ? fct_work_rounds : fct_work_greedy;
     fct_result result = FCT_OK;
-    if (mesh->materials) result = along_edges(work, false);
+    if (mesh->materials) result = contract_edges(work, method, false);
     work->phase_ends[0] = work->merge_count;
-    if (result == FCT_OK) result = along_edges(work, true);
+    if (result == FCT_OK) result = contract_edges(work, method, true);
+    if (result == FCT_OK) result = fct_work_graft(work, mesh);
     work->phase_ends[1] = work->merge_count;
     if (result == FCT_OK) result = fct_work_join(work, mesh);
     work->phase_ends[2] = work->merge_count;

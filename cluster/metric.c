@@ -35,7 +35,7 @@ fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
     v3 lower = v3_load(bounds->lower), upper = v3_load(bounds->upper);
     double diagonal = v3_norm(v3_sub(upper, lower));
     fct_metric metric = {.cost = def->cost, .measure = def->fit_measure};
-    metric.fit_weight = (float)(def->fit_weight >= 0 ? def->fit_weight : mean ? 1 : 1e4);
+    metric.fit_weight = (float)(def->fit_weight >= 0 ? def->fit_weight : mean ? 1e6 : 1e4);
     metric.direction_weight = (float)(def->direction_weight >= 0 ? def->direction_weight : 1);
     metric.shape_weight = (float)(def->shape_weight >= 0 ? def->shape_weight : mean ? 1 : 0.006);
     metric.origin = v3_scale(v3_add(lower, upper), 0.5);

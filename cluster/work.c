@@ -13,10 +13,10 @@ typedef struct face_job {
     const float *perimeters;
 } face_job;
 
-uint32_t fct_height_limit(uint32_t count) {
+uint32_t fct_height_limit(uint32_t count, bool mild) {
     if (count < 2) return 0;
-    double levels = log2(count), steep = 3 * levels - 1, mild = 2 * levels + 8;
-    return (uint32_t)(steep < mild ? steep : mild);
+    double levels = log2(count), steep = 3 * levels - 1, gentle = 2 * levels + 8;
+    return (uint32_t)(mild && gentle < steep ? gentle : steep);
 }
 
 static void make_records(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -106,7 +106,7 @@ float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared) 
 
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
     uint32_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
-    return taller < 8 || taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b]);
+    return taller < 8 || taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b], !work->steep);
 }
 
 void fct_work_merge_as(fct_work *work, uint32_t merge, uint32_t a, uint32_t b, float shared, float cost) {

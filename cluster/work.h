@@ -24,6 +24,7 @@ typedef struct fct_work {
     uint32_t *counts;          /* faces */
     uint8_t *heights;          /* of the subtree */
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
+    bool steep;                /* the reserve of height may be used */
     const uint32_t *materials; /* of the face of the slot, or NULL */
     /* per merge, F - 1 of them */
     uint32_t (*children)[2]; /* build ids */
@@ -35,9 +36,10 @@ typedef struct fct_work {
     uint32_t edge_count;
 } fct_work;
 
-/* Height above which a merge of `count` faces in all is put off: 3 log2 n - 1, so that a join of
- * parts above keeps the whole tree within 3 log2 F, and no more than 2 log2 n + 8. */
-uint32_t fct_height_limit(uint32_t count);
+/* The greatest height of a cluster of `count` faces: 3 log2 n - 1, so that a join of parts keeps the whole
+ * tree within 3 log2 F; as long as `mild`, no more than 2 log2 n + 8 either, which leaves the rest in
+ * reserve. */
+uint32_t fct_height_limit(uint32_t count, bool mild);
 
 /* Records of all faces and the edges of the dual graph. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out);
@@ -58,6 +60,9 @@ fct_result fct_work_greedy(fct_work *work, bool across);
 /* The same, but merging all mutually cheapest pairs at once as long as that pays. Errors: MEMORY, CANCELLED.
  */
 fct_result fct_work_rounds(fct_work *work, bool across);
+/* Hangs clusters that edges still lead to, but heights forbid to merge, into their neighbours' trees; see
+ * graft.c. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh);
 /* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_join(fct_work *work, const fct_mesh *mesh);
 
