@@ -96,12 +96,14 @@ static double box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
     return sqrt(sum) * (1 - 1e-5) - 1e-6;
 }
 
-/* Whether the faces around a point on the ray leave no gap: all rays of a ring around this one meet one of
- * them. */
-static bool surface_covers(const checker *c, const exact_ray *e, v3 point) {
+/* Whether the ray, as given, meets a face near `point`, and the faces there leave no gap: all rays of a ring
+ * around this one meet one of them too. Only what lies before `farthest` counts: at a silhouette the surface
+ * behind it is met just as surely. */
+static bool surface_covers(const checker *c, const exact_ray *e, v3 point, double farthest) {
     const fct_bvh *bvh = c->obb;
     const fct_tree_view *view = &bvh->view;
     uint32_t height = 0, covered = 0;
+    bool met = false;
     for (uint32_t r = 0; r < view->root_count; ++r) c->stack[height++] = view->roots[r];
     while (height) {
         uint32_t node = c->stack[--height];
@@ -116,12 +118,14 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point) {
         face_corners(bvh, node - view->node_count, p);
         if (v3_norm(v3_sub(fct_triangle_closest(point, p[0], p[1], p[2], &u, &v), point)) > 4 * ROUNDING)
             continue;
+        met = met || (rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
-            if (rim_distance(e, p, radius * cos(angle), radius * sin(angle), &at) >= 0) covered |= 1u << i;
+            double rim = rim_distance(e, p, radius * cos(angle), radius * sin(angle), &at);
+            if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }
-    return covered == (1u << AROUND) - 1;
+    return met && covered == (1u << AROUND) - 1;
 }
 
 /* Whether our answer `ours` (distance from e->origin) is wrong given Embree's. Either place may be FCT_NONE.
@@ -145,7 +149,8 @@ static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, d
         return within && (ours == FCT_NONE || at < our_distance - c->near);
     }
     if (their_distance < e->t_min + c->near || their_distance > e->t_max - c->near) return false;
-    return surface_covers(c, e, v3_mad(e->origin, their_distance, e->direction));
+    double farthest = ours == FCT_NONE ? INFINITY : (our_distance + their_distance) / 2;
+    return surface_covers(c, e, v3_mad(e->origin, their_distance, e->direction), farthest);
 }
 
 /* Both backends' unrounded answers to one ray that differed. */
