@@ -180,10 +180,18 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
     for (uint32_t s = 0; s < work->face_count; ++s)
         if (work->nodes[s] != FCT_NONE) keys[count] = work->counts[s], order[count++] = s;
     result = fct_sort_pairs(work->env, keys, order, count);
-    for (uint32_t i = 0; result == FCT_OK && i < count; ++i) {
-        if (i % 1024 == 0) result = fct_progress(work->env, "clusters", 1);
-        place at = find_place(g, order[i]);
-        if (at.node != FCT_NONE) graft(g, order[i], at);
+    /* again while it helps: hosts that have grown may be taller */
+    for (uint32_t before = 0; result == FCT_OK && count != before;) {
+        before = count;
+        count = 0;
+        for (uint32_t i = 0; result == FCT_OK && i < before; ++i) {
+            if (i % 1024 == 0) result = fct_progress(work->env, "clusters", 1);
+            place at = find_place(g, order[i]);
+            if (at.node != FCT_NONE)
+                graft(g, order[i], at);
+            else
+                order[count++] = order[i];
+        }
     }
     return result == FCT_OK ? renumber(g) : result;
 }
