@@ -246,6 +246,37 @@ static void odd_meshes(void **state) {
     }
 }
 
+/* Two thirds of a steep cone: the mean normal lies behind the outer faces, another direction does not. A
+ * third of a screw of faces that turns over has none, and comes apart. */
+static void fronts_are_found(void **state) {
+    (void)state;
+    plain = fct_env_default();
+    for (int turned = 0; turned < 2; ++turned) {
+        uint32_t n = turned ? 9 : 13;
+        fct_mesh mesh;
+        assert_int_equal(fct_mesh_create(&plain, n + 2, n, 0, &mesh), FCT_OK);
+        v3_store(mesh.positions, v3_make(0, 0, 0));
+        for (uint32_t i = 0; i <= n; ++i) {
+            double angle = FCT_PI / 9 * i;
+            v3_store(mesh.positions + 3 * (size_t)(i + 1),
+                     turned ? v3_make(.001 * cos(angle), .001 * sin(angle), -5)
+                            : v3_make(cos(angle), sin(angle), -5));
+        }
+        if (turned) v3_store(mesh.positions + 3, v3_make(.001, -.0001, 5));
+        for (uint32_t i = 0; i < n; ++i) {
+            uint32_t t[3] = {0, i + 1, i + 2};
+            memcpy(mesh.triangles + 3 * (size_t)i, t, sizeof t);
+        }
+        fct_scene *scene = one_mesh(&mesh, NULL);
+        fct_surface s = build(scene, 0, 100);
+        assert_sound(scene, 0, &s);
+        assert_true(turned ? s.mesh.vertex_count > n + 2 : s.mesh.vertex_count == n + 2);
+        fct_surface_release(&plain, &s);
+        fct_scene_destroy(scene);
+        fct_mesh_release(&plain, &mesh);
+    }
+}
+
 typedef struct border {
     const fct_surface *surface;
 } border;
@@ -255,6 +286,12 @@ static bool crosses(void *user, uint32_t a, uint32_t b) {
     assert_true(a < b);
     double h = .37;
     return (at(x->surface, a).x - h) * (at(x->surface, b).x - h) < 0;
+}
+
+/* Edges of the top alone: what its rim shares with the other sides must be split there too. */
+static bool on_top(void *user, uint32_t a, uint32_t b) {
+    const border *x = user;
+    return x->surface->normals[3 * (size_t)a + 2] > .5F && x->surface->normals[3 * (size_t)b + 2] > .5F;
 }
 
 static bool never(void *user, uint32_t a, uint32_t b) {
@@ -291,6 +328,10 @@ static void refinement(void **state) {
         }
         fct_memory_release(&plain, positions);
     }
+    border x = {&s};
+    assert_int_equal(fct_surface_refine(&plain, &s, on_top, &x, NULL), FCT_OK);
+    assert_closed(&s);
+    assert_sound(scene, 0, &s);
     uint32_t added, faces = s.mesh.face_count;
     assert_int_equal(fct_surface_refine(&plain, &s, never, NULL, &added), FCT_OK);
     assert_true(added == 0 && s.mesh.face_count == faces);
@@ -370,6 +411,7 @@ int main(void) {
         cmocka_unit_test(odd_meshes),
         cmocka_unit_test(refinement),
         cmocka_unit_test(threads_do_not_matter),
+        cmocka_unit_test(fronts_are_found),
         cmocka_unit_test(memory_runs_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
