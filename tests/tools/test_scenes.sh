@@ -68,9 +68,6 @@ expect 0 closest two.json --points points.txt
 check "nearest point of a scene" test "$(awk '{ print $1 }' out)" = 2
 holds "$(awk '{ print $6 }' out) > .199 && $(awk '{ print $6 }' out) < .201"
 
-# Light groups of a lamp and a wall: the bake keeps its promise of exit code 1 for what has not converged out of tests' reach; it is
-# a matter of the solver.
-
 # --- Mistakes: one line that names the file, exit code 65 or 66, no output ---
 refused() {
     local wanted=$1 file=$2
