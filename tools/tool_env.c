@@ -52,11 +52,18 @@ static void limited_release(void *user, void *memory) {
     free(memory);
 }
 
+/* Sanitizers map terabytes of data for themselves, so no limit holds beside them. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+enum { DATA_LIMITED = 0 };
+#else
+enum { DATA_LIMITED = 1 };
+#endif
+
 static void limit_data(const tool *t) {
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     size_t threads = t->threads ? t->threads : (size_t)(cores > 0 ? cores : 1);
     struct rlimit limit;
-    if (getrlimit(RLIMIT_DATA, &limit)) return;
+    if (!DATA_LIMITED || getrlimit(RLIMIT_DATA, &limit)) return;
     rlim_t wanted = t->max_memory + DATA_SLACK + threads * DATA_SLACK_THREAD;
     if (limit.rlim_cur == RLIM_INFINITY || wanted < limit.rlim_cur) limit.rlim_cur = wanted;
     setrlimit(RLIMIT_DATA, &limit);
