@@ -6,6 +6,9 @@
 #include "radiosity/transport.h"
 
 enum { NEAREST = 10, STACK = 64 };
+/* Squared difference of normals beyond which an anchor says nothing of a vertex: a group's own are nearer
+ * than that. */
+#define MOST_TURN2 .4
 
 typedef struct group {
     uint32_t begin, end;
@@ -305,7 +308,7 @@ static void find_nearest(const fct_anchors *t, const float p[3], const float n[3
             double dp = (double)p[k] - a->position[k], dn = (double)n[k] - a->normal[k];
             d2 += dp * dp, turn2 += dn * dn;
         }
-        consider(found, mid, d2 + t->turn * t->turn * turn2);
+        if (turn2 < MOST_TURN2) consider(found, mid, d2 + t->turn * t->turn * turn2);
         double side = (double)p[t->axes[mid]] - a->position[t->axes[mid]];
         struct visit low = {r.begin, mid, r.least2}, high = {mid + 1, r.end, r.least2};
         if (side < 0)

@@ -15,6 +15,7 @@
 #define MAJOR_SHARE .01
 #define MAX_RAYS    64
 #define LARGE_AREA  .25
+#define FLAT_ENOUGH .9 /* |S| / A: a nearly flat lamp does not shine on itself */
 
 struct fct_lamps {
     const fct_env *env;
@@ -31,6 +32,7 @@ typedef struct query {
     float origin[3];
     uint64_t seed;
     uint32_t base_rays;
+    bool fixed;
     double total; /* of the lamps' estimates times strength */
     double scale; /* the same, with what is known better in place of estimates */
     uint64_t rays;
@@ -59,7 +61,9 @@ static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receive
     uint64_t seed = fct_hash2(q->seed, lamp->instance);
     double all = 0, seen = 0;
     uint32_t sent = 0;
-    for (uint32_t goal = q->base_rays; sent < goal;) {
+    /* a lamp that brings much of the light is not judged by four rays */
+    uint32_t first = !q->fixed && power > .2 * q->total ? 2 * q->base_rays : q->base_rays;
+    for (uint32_t goal = first; sent < goal;) {
         for (; sent < goal; ++sent) {
             double u[2];
             fct_plane_point(sent, seed, u);
@@ -69,7 +73,7 @@ static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receive
             if (visible(q, lamp, point.y)) seen += point.weight;
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
-        if (!mixed || sent >= MAX_RAYS) break;
+        if (!mixed || sent >= MAX_RAYS || q->fixed) break;
         /* As though one more ray had been seen by half: the spread of few rays is not to be trusted. */
         double fraction = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
         double error = sqrt(fraction * (1 - fraction) / sent) * power;
@@ -126,7 +130,7 @@ static bool sample_minor(query *q, double sum, uint32_t count, double all[3], do
 static void add_minor(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
     double all[3], seen[3];
     bool mixed = sample_minor(q, sum, q->base_rays, all, seen, cut);
-    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < 16)
+    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < 16 && !q->fixed)
         sample_minor(q, sum, 16, all, seen, cut);
     double grey = all[0] + all[1] + all[2];
     grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
@@ -175,7 +179,8 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
                .point = point,
                .normal = normal,
                .seed = item_seed,
-               .base_rays = base_rays};
+               .base_rays = base_rays & ~FCT_LAMPS_FIXED,
+               .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)(point[k] + offset * normal[k]);
     double open = gather(&q, irradiance);
     if (rays) *rays += q.rays;
@@ -190,28 +195,37 @@ bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance) {
     return instance < lamps->instance_count && lamps->sampled[instance];
 }
 
-/* World area of an instance; face by face only under a transform that is no similarity. */
-static double instance_area(const fct_scene_view *view, uint32_t instance) {
+/* World area of an instance, and the length of its area vector; face by face only under a transform that is
+ * no similarity. */
+static double instance_area(const fct_scene_view *view, uint32_t instance, double *vector) {
     const fct_instance *placed = view->instances + instance;
     const fct_tree *tree = view->models[placed->model].tree;
     fct_tree_view model = fct_tree_get(tree);
     double area = 0;
+    v3 sum = {0, 0, 0};
     if (placed->uniform_scale > 0) {
         for (uint32_t i = 0; i < model.root_count; ++i) {
             fct_cluster c;
             fct_tree_cluster(tree, model.roots[i], &c);
             area += c.area;
+            sum = v3_add(sum, v3_load(c.area_vector));
         }
-        return area * placed->uniform_scale * placed->uniform_scale;
+        double scale2 = (double)placed->uniform_scale * placed->uniform_scale;
+        *vector = scale2 * v3_norm(sum);
+        return area * scale2;
     }
     for (size_t place = 0; place < model.face_count; ++place) {
         const uint32_t *t = model.triangles + 3 * place;
         v3 a = v3_load(model.positions + 3 * (size_t)t[0]);
         v3 e1 = v3_sub(v3_load(model.positions + 3 * (size_t)t[1]), a);
         v3 e2 = v3_sub(v3_load(model.positions + 3 * (size_t)t[2]), a);
-        area += .5 * v3_norm(v3_cross(fct_transform_vector(placed->to_world, e1),
-                                      fct_transform_vector(placed->to_world, e2)));
+        v3 s = v3_scale(
+            v3_cross(fct_transform_vector(placed->to_world, e1), fct_transform_vector(placed->to_world, e2)),
+            .5);
+        area += v3_norm(s);
+        sum = v3_add(sum, s);
     }
+    *vector = v3_norm(sum);
     return area;
 }
 
@@ -227,8 +241,9 @@ fct_result fct_lamps_create(const fct_env *env, const fct_scene *scene, fct_lamp
     *out = NULL;
     fct_lamps *lamps = fct_allocate_zero(env, 1, sizeof *lamps);
     double *areas = fct_allocate(env, view.instance_count, sizeof *areas);
+    double *vectors = fct_allocate(env, view.instance_count, sizeof *vectors);
     if (lamps) lamps->env = env;
-    if (!lamps || !areas) {
+    if (!lamps || !areas || !vectors) {
         result = fct_fail_memory(env, "lamps");
         goto done;
     }
@@ -239,14 +254,17 @@ fct_result fct_lamps_create(const fct_env *env, const fct_scene *scene, fct_lamp
         result = fct_fail_memory(env, "lamps");
         goto done;
     }
-    for (uint32_t i = 0; i < view.instance_count; ++i) total += areas[i] = instance_area(&view, i);
+    for (uint32_t i = 0; i < view.instance_count; ++i)
+        total += areas[i] = instance_area(&view, i, &vectors[i]);
     for (uint32_t i = 0; i < view.instance_count && result == FCT_OK; ++i) {
-        if (!emits(&view, i) || !(areas[i] > 0) || areas[i] > LARGE_AREA * total) continue;
+        if (!emits(&view, i) || !(areas[i] > 0)) continue;
+        if (areas[i] > LARGE_AREA * total && vectors[i] < FLAT_ENOUGH * areas[i]) continue;
         result = fct_lamp_init(env, &view, i, lamps->lamps + lamps->count);
         if (result == FCT_OK) lamps->sampled[i] = true, ++lamps->count;
     }
 done:
     fct_release(env, areas);
+    fct_release(env, vectors);
     if (result != FCT_OK) fct_lamps_destroy(lamps);
     if (result == FCT_OK) *out = lamps;
     return result;

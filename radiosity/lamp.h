@@ -20,8 +20,12 @@ void fct_lamps_destroy(fct_lamps *lamps);
 /* Lamps that shadow rays are sent to. */
 uint32_t fct_lamps_count(const fct_lamps *lamps);
 /* Whether the direct light of this instance comes from fct_lamps_direct. False for what does not emit and for
- * an emitter of more than a quarter of the scene's area, which gather rays see better. */
+ * an emitter of more than a quarter of the scene's area that is not flat, which gather rays see better. */
 bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance);
+
+/* Added to base_rays: exactly so many, so that the mean over many receivers is not biased by when the search
+ * stops. */
+#define FCT_LAMPS_FIXED 0x80000000u
 
 /* Irradiance (RGB) of all lamps at the point with unit normal as though nothing blocked the way. */
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],

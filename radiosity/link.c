@@ -11,6 +11,9 @@
 
 #include "radiosity/transfer.h"
 
+/* The surface of an element lies within this part of its bounding ball, most of it. */
+#define TYPICAL .55
+
 typedef enum verdict { KEEP, DROP, SPLIT_RECEIVER, SPLIT_SOURCE } verdict;
 
 typedef struct judging {
@@ -86,7 +89,7 @@ static uint32_t shoot(const fct_elements *set, const fct_link *link, uint32_t fr
 static double flow_bound(const fct_element *i, const fct_element *j, v3 u, double r, bool overlap) {
     double form = 1;
     if (!overlap) {
-        double spread = (i->radius + j->radius) / r;
+        double spread = TYPICAL * (i->radius + j->radius) / r;
         double pj = fct_projected_bound(j, v3_scale(u, -1), .5 * spread);
         double pi = i->area > 0 ? fct_projected_bound(i, u, .5 * spread) / i->area : 0;
         form = fmin(1, pj * pi * fct_distance_factor(r * r, pj));
@@ -110,12 +113,12 @@ static verdict judge(const fct_elements *set, fct_link *link, double epsilon, ui
     const fct_element *i = &set->items[link->receiver], *j = &set->items[link->source];
     if (i->area <= 0 || j->area <= 0) return DROP;
     v3 d = v3_sub(j->center, i->center);
-    double r = v3_norm(d), radii = i->radius + j->radius;
+    double r = v3_norm(d), ball = i->radius + j->radius, radii = TYPICAL * ball;
     bool overlap = r <= radii, self = link->receiver == link->source;
     v3 u = r > 0 ? v3_scale(d, 1 / r) : v3_make(0, 0, 0);
     if (self && i->kind == FCT_ELEMENT_TRIANGLE) return DROP;
     if (!overlap) {
-        double angle = asin(fmin(radii / r, 1));
+        double angle = asin(fmin(ball / r, 1));
         if (fct_faces_away(i, u, angle) || fct_faces_away(j, v3_scale(u, -1), angle)) return DROP;
     }
     double flow = flow_bound(i, j, u, r, overlap);
@@ -127,13 +130,13 @@ static verdict judge(const fct_elements *set, fct_link *link, double epsilon, ui
 
     /* relative uncertainty of one sample for the pair, then of its visibility */
     double error = 1;
-    if (!overlap) error = fmin(1, j->radius * j->radius / (r * r) + .25 * i->radius / r);
+    double source = TYPICAL * j->radius / r, spread = .25 * TYPICAL * i->radius / r;
+    if (!overlap) error = fmin(1, source * source + spread);
     verdict larger = can_i && (!can_j || i->radius >= j->radius) ? SPLIT_RECEIVER : SPLIT_SOURCE;
     bool may_split = can_i || can_j;
     if (self && !can_i) may_split = false;
     if (may_split && flow * error > epsilon) {
-        if (!overlap && can_i && can_j)
-            larger = j->radius * j->radius / (r * r) > .25 * i->radius / r ? SPLIT_SOURCE : SPLIT_RECEIVER;
+        if (!overlap && can_i && can_j) larger = source * source > spread ? SPLIT_SOURCE : SPLIT_RECEIVER;
         return larger;
     }
     if (i->kind == FCT_ELEMENT_VOLUME && overlap && may_split) return larger;

@@ -49,13 +49,18 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
         const fct_element *e = &g->set->items[id];
         const fct_element_point *points = g->set->points + (size_t)id * FCT_ELEMENT_POINTS;
         double sum[3] = {0, 0, 0}, least[3], most[3], spread = 0;
+        const size_t stride = FCT_ELEMENT_POINTS / DIRECT_POINTS;
         bool dark = false;
+        /* not the points that decided on splits: what passed their test is biased */
+        const uint64_t fresh = g->out->direct ? 1 : 0;
         for (int k = 0; k < DIRECT_POINTS; ++k) {
-            const fct_element_point *p = &points[k * FCT_ELEMENT_POINTS / DIRECT_POINTS + k];
+            const fct_element_point *p =
+                &points[(size_t)k * stride + (fct_hash3(g->seed, id, (uint64_t)k) + fresh) % stride];
             double x[3], n[3], irradiance[3];
             for (int c = 0; c < 3; ++c) x[c] = p->position[c], n[c] = p->normal[c];
-            fct_lamps_direct(g->lamps, g->set->scene, x, n, p->offset, fct_hash3(g->seed, id, (uint64_t)k), 4,
-                             irradiance, &rays);
+            fct_lamps_direct(g->lamps, g->set->scene, x, n, p->offset,
+                             fct_hash3(g->seed + fresh, id, (uint64_t)k),
+                             fresh ? 4 | FCT_LAMPS_FIXED : 2 | FCT_LAMPS_FIXED, irradiance, &rays);
             for (int c = 0; c < 3; ++c) {
                 sum[c] += irradiance[c] / DIRECT_POINTS;
                 least[c] = k ? fmin(least[c], irradiance[c]) : irradiance[c];
@@ -63,12 +68,12 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
             }
         }
         for (int c = 0; c < 3; ++c) {
-            g->out->direct[3 * (size_t)id + (size_t)c] = sum[c];
+            if (g->out->direct) g->out->direct[3 * (size_t)id + (size_t)c] = sum[c];
             spread += e->reflectance[c] * (most[c] - least[c]) * e->area;
             dark |= least[c] <= 0 && most[c] > 0;
         }
         if (dark) spread *= DARK_WEIGHT;
-        g->spread[l] = (float)spread;
+        if (g->spread) g->spread[l] = (float)spread;
     }
     g->chunk_rays[chunk] += rays;
 }
@@ -223,41 +228,36 @@ static size_t list_leaves(const fct_elements *set, size_t from, uint32_t *leaves
     return n;
 }
 
-/* Direct light of all leaves; those that it crosses with a border are split, and their parts looked at in
- * turn. */
+/* Leaves that a border of direct light crosses are split, and their parts looked at in turn. */
 static fct_result split_by_direct(gathering *g, const fct_transport_def *def) {
     fct_elements *set = g->set;
     const fct_env *env = set->env;
     fct_result result = FCT_OK;
     size_t from = 0;
-    for (int turn = 0; result == FCT_OK && from < set->count; ++turn) {
+    for (int turn = 0; turn < MOST_ROUNDS && result == FCT_OK && from < set->count; ++turn) {
         if ((result = fct_progress(env, "direct light", turn / (double)MOST_ROUNDS)) != FCT_OK) break;
         fct_elements_make_points(set);
-        double *direct = fct_allocate_zero(env, 3 * set->count, sizeof *direct);
-        uint32_t *leaves = fct_allocate(env, set->count, sizeof *leaves);
-        float *spread = fct_allocate(env, set->count, sizeof *spread);
-        uint64_t *chunk_rays = fct_allocate_zero(env, fct_chunk_count(set->count, 16), sizeof *chunk_rays);
-        if (!direct || !leaves || !spread || !chunk_rays) {
+        uint32_t *leaves = fct_allocate(env, set->count - from, sizeof *leaves);
+        g->spread = fct_allocate(env, set->count - from, sizeof *g->spread);
+        g->chunk_rays = fct_allocate_zero(env, fct_chunk_count(set->count, 16), sizeof *g->chunk_rays);
+        if (!leaves || !g->spread || !g->chunk_rays) {
             result = fct_fail_memory(env, "direct light");
-            fct_release(env, direct);
         } else {
-            if (g->out->direct) memcpy(direct, g->out->direct, 3 * from * sizeof *direct);
-            fct_release(env, g->out->direct);
-            g->out->direct = direct;
-            g->leaves = leaves, g->spread = spread, g->chunk_rays = chunk_rays;
             size_t count = list_leaves(set, from, leaves);
             from = set->count;
+            g->leaves = leaves;
             fct_parallel_for(env, count, 16, direct_chunk, g);
-            for (size_t c = 0; c < fct_chunk_count(count, 16); ++c) g->out->rays += chunk_rays[c];
-            for (size_t l = 0; turn < MOST_ROUNDS && l < count && result == FCT_OK; ++l)
-                if (spread[l] > def->epsilon && fct_elements_can_split(set, leaves[l]))
+            for (size_t c = 0; c < fct_chunk_count(count, 16); ++c) g->out->rays += g->chunk_rays[c];
+            for (size_t l = 0; l < count && result == FCT_OK; ++l)
+                if (g->spread[l] > def->epsilon && fct_elements_can_split(set, leaves[l]))
                     result = fct_elements_split(set, leaves[l]);
         }
         fct_release(env, leaves);
-        fct_release(env, spread);
-        fct_release(env, chunk_rays);
+        fct_release(env, g->spread);
+        fct_release(env, g->chunk_rays);
         g->leaves = NULL, g->spread = NULL, g->chunk_rays = NULL;
     }
+    fct_elements_make_points(set);
     return result;
 }
 
@@ -271,8 +271,9 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     if (result != FCT_OK) goto done;
     result = FCT_ERROR_MEMORY;
     out->stored = fct_allocate_zero(env, 3 * set->count, sizeof *out->stored);
+    out->direct = fct_allocate_zero(env, 3 * set->count, sizeof *out->direct);
     leaves = fct_allocate(env, set->count, sizeof *leaves);
-    if (!out->stored || !leaves) goto done;
+    if (!out->stored || !out->direct || !leaves) goto done;
     size_t count = list_leaves(set, 0, leaves);
     g.leaves = leaves;
     g.rays = def->rays ? def->rays
@@ -282,6 +283,8 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     g.hits = fct_allocate(env, count * g.rays, sizeof *g.hits);
     g.chunk_rays = fct_allocate_zero(env, fct_chunk_count(count, 16), sizeof *g.chunk_rays);
     if (!g.hits || !g.chunk_rays) goto done;
+    result = fct_parallel_for_progress(env, "direct light", count, 16, direct_chunk, &g);
+    if (result != FCT_OK) goto done;
     result = fct_parallel_for_progress(env, "gathering", count, 16, hit_chunk, &g);
     if (result != FCT_OK) goto done;
     for (size_t c = 0; c < fct_chunk_count(count, 16); ++c) out->rays += g.chunk_rays[c];
