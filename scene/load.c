@@ -129,8 +129,9 @@ fct_result fct_scene_parse_json(const fct_env *env, const char *name, const char
 
 static fct_result read_any(fct_scene *scene, const char *path) {
     const fct_env *env = scene->env;
-    bool json = fct_path_ends(path, ".json"), obj = fct_path_ends(path, ".obj");
-    if (!json && !obj) return read_mesh(scene, path);
+    bool json = fct_path_ends(path, ".json"), obj = fct_path_ends(path, ".obj"),
+         gltf = fct_path_ends(path, ".gltf") || fct_path_ends(path, ".glb");
+    if (!json && !obj && !gltf) return read_mesh(scene, path);
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
@@ -141,6 +142,8 @@ static fct_result read_any(fct_scene *scene, const char *path) {
         result = FCT_ERROR_MEMORY;
     else if (json)
         result = fct_scene_read_json(scene, path, text, file.size, base);
+    else if (gltf)
+        result = fct_scene_read_gltf(scene, path, file.data, file.size, base);
     else if (!plain)
         result = fct_scene_read_obj(scene, path, text, file.size, base);
     fct_release(env, base);

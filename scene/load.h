@@ -17,6 +17,10 @@ fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *te
                               const char *base);
 bool fct_scene_obj_names_materials(const char *text, size_t size);
 
+/* A .gltf with its buffers, or a GLB. */
+fct_result fct_scene_read_gltf(fct_scene *scene, const char *name, const unsigned char *data, size_t size,
+                               const char *base);
+
 /* What a model file holds: a hierarchy, or a mesh (the other is empty). */
 typedef struct fct_model_file {
     fct_tree *tree;
