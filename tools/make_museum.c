@@ -46,13 +46,13 @@ static const struct {
     double reflectance[3], emission[3];
     const char *group;
 } materials[] = {
-    {"floor", {.50, .45, .38}, {0}, NULL},
+    {"floor", {.43, .38, .32}, {0}, NULL},
     {"carpet", {.52, .07, .08}, {0}, NULL},
     {"terracotta", {.66, .24, .15}, {0}, NULL},
     {"blue", {.16, .29, .60}, {0}, NULL},
     {"ivory", {.74, .70, .61}, {0}, NULL},
-    {"ceiling", {.80, .78, .74}, {0}, NULL},
-    {"stone", {.70, .67, .60}, {0}, NULL},
+    {"ceiling", {.72, .70, .66}, {0}, NULL},
+    {"stone", {.66, .62, .55}, {0}, NULL},
     {"wood", {.34, .21, .12}, {0}, NULL},
     {"marble", {.80, .78, .74}, {0}, NULL},
     {"plaster", {.78, .75, .70}, {0}, NULL},
@@ -60,8 +60,8 @@ static const struct {
     {"coral", {.72, .42, .32}, {0}, NULL},
     {"jade", {.34, .56, .40}, {0}, NULL},
     {"cobalt", {.20, .28, .55}, {0}, NULL},
-    {"skylight", {.5, .5, .5}, {9.0, 10.2, 11.6}, "daylight"},
-    {"lamp", {.6, .6, .6}, {30, 18, 8.5}, "lamps"},
+    {"skylight", {.5, .5, .5}, {6.6, 7.6, 8.8}, "daylight"},
+    {"lamp", {.6, .6, .6}, {27, 16, 7.5}, "lamps"},
     {"panel_warm", {.5, .5, .5}, {4.6, 2.1, .5}, "panels"},
     {"panel_cool", {.5, .5, .5}, {.5, 2.0, 4.6}, "panels"},
 };
@@ -208,7 +208,7 @@ static void add_furniture(museum *s) {
     add_model(s, &seat, "bench_seat");
 }
 
-static const double bench_x[2] = {-2.25, 2.25}, bench_z = 5.875, bench_leg_z = .625;
+static const double bench_x[2] = {-2.25, 2.25}, bench_z = 4.75, bench_leg_z = .625;
 
 static void place_furniture(museum *s) {
     char name[48];
