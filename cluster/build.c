@@ -30,10 +30,19 @@ static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_met
     work->phase_ends[0] = work->merge_count;
     if (result == FCT_OK) result = contract_edges(work, method, true);
     if (result == FCT_OK) result = fct_work_graft(work, mesh);
-    work->phase_ends[1] = work->merge_count;
-    if (result == FCT_OK) result = fct_work_join(work, mesh);
-    work->phase_ends[2] = work->merge_count;
     return result;
+}
+
+/* Contraction along edges, and once more by size where heights left neighbours apart: stars of a tall hub. */
+static fct_result make_parts(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                             fct_work *work) {
+    fct_result result = contract(work, mesh, def->method);
+    if (result != FCT_OK || work->stranded == 0) return result;
+    fct_work_release(work);
+    result = fct_work_create(env, mesh, def, work);
+    if (result != FCT_OK) return result;
+    work->balanced = true;
+    return contract(work, mesh, FCT_CLUSTER_GREEDY);
 }
 
 /* The options as used, with the default weights filled in. */
@@ -64,7 +73,10 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     fct_result result = fct_work_create(env, mesh, def, &work);
     if (result != FCT_OK) return result;
     double dual = fct_seconds();
-    result = contract(&work, mesh, def->method);
+    result = make_parts(env, mesh, def, &work);
+    work.phase_ends[1] = work.merge_count;
+    if (result == FCT_OK) result = fct_work_join(&work, mesh);
+    work.phase_ends[2] = work.merge_count;
     if (result == FCT_OK) {
         tree->view.def = used_def(def, &work.metric);
         result = fct_tree_order(&work, mesh, def, tree);

@@ -171,6 +171,24 @@ static fct_result renumber(grafter *g) {
     return FCT_OK;
 }
 
+/* Whether an edge leads from the cluster to another: a finished part of the mesh has none. */
+static bool has_neighbors(const grafter *g, uint32_t slot) {
+    place none = {FCT_NONE, FCT_NONE, 0};
+    uint32_t faces = g->work->face_count, top = 0;
+    g->stack[top++] = g->work->nodes[slot];
+    while (top > 0) {
+        uint32_t node = g->stack[--top];
+        if (node >= faces) {
+            g->stack[top++] = g->work->children[node - faces][1];
+            g->stack[top++] = g->work->children[node - faces][0];
+            continue;
+        }
+        for (uint32_t i = g->starts[node]; i < g->starts[node + 1]; ++i)
+            if (look_up(g, g->neighbors[i], g->work->nodes[slot], slot, &none)) return true;
+    }
+    return false;
+}
+
 static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t *order) {
     fct_work *work = g->work;
     uint32_t count = 0;
@@ -193,6 +211,7 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
                 order[count++] = order[i];
         }
     }
+    for (uint32_t i = 0; result == FCT_OK && i < count; ++i) work->stranded += has_neighbors(g, order[i]);
     return result == FCT_OK ? renumber(g) : result;
 }
 

@@ -25,6 +25,8 @@ typedef struct fct_work {
     uint8_t *heights;          /* of the subtree */
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
     bool steep;                /* the reserve of height may be used */
+    bool balanced;             /* the greedy loop goes by size first, then by cost */
+    uint32_t stranded;         /* clusters that edges lead to but grafting found no place for */
     const uint32_t *materials; /* of the face of the slot, or NULL */
     /* per merge, F - 1 of them */
     uint32_t (*children)[2]; /* build ids */

@@ -19,7 +19,9 @@ extern "C" {
 
 typedef struct fct_tree fct_tree;
 
-/* One cluster; 132 bytes, as in the file. All in the mesh's own coordinates. */
+/* One cluster; 132 bytes, as in the file. All in the mesh's own coordinates. Areas beyond a float's range end
+ * at its largest value, with S and M scaled alike, below it at 0; the rest does not depend on them, but for
+ * the cone, which is pi where S is 0. */
 typedef struct fct_cluster {
     float area;           /* sum A_k */
     float area_vector[3]; /* S = sum A_k n_k */
@@ -39,9 +41,12 @@ typedef struct fct_cluster {
 /* The oriented box, whose extents hold every vertex for exactly these axes. */
 FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
 
+/* GREEDY: always the cheapest edge (8.2). ROUNDS: all mutually cheapest pairs at once; the default. */
 typedef enum fct_cluster_method { FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS } fct_cluster_method;
-/* MEAN: E = a1 E_fit + a2 E_dir + a3 E_shape of the union (8.18). INCREMENT: the growth of the total error.
- */
+/* MEAN: E = a1 E_fit + a2 E_dir + a3 E_shape of the union (8.18). INCREMENT, the default: the growth of the
+ * total error, a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 w E_shape. E_shape is (8.17) as printed.
+ * All on the model scaled to a bounding-box diagonal of 1; default weights 1e4, 1, .006 (INCREMENT) and 1e6,
+ * 1, 1 (MEAN: weight 1 on a model of diagonal 1000). */
 typedef enum fct_cluster_cost { FCT_COST_INCREMENT, FCT_COST_MEAN } fct_cluster_cost;
 /* POINTS: each face adds its three corners (8.3). AREA: the surface integral over the triangles. */
 typedef enum fct_fit_measure { FCT_FIT_AREA, FCT_FIT_POINTS } fct_fit_measure;
@@ -65,8 +70,8 @@ typedef struct fct_tree_stats {
 
 /* Builds the tree. Any valid mesh with at least one face; disconnected parts are joined by proximity under
  * one root. Where mesh->materials is present, clusters of different materials are merged only after all
- * merges within a material are done. Depth at most 3 log2 F for one root. The mesh is copied. stats may be
- * NULL. Errors: DATA (no faces, invalid mesh), MEMORY, CANCELLED. */
+ * merges along edges within a material are done. Depth at most 3 log2 F for one root. The mesh is copied. def
+ * may be NULL (the defaults), stats too. Errors: DATA (no faces, invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                                   fct_tree_stats *stats, fct_tree **out);
 FCT_API void fct_tree_destroy(fct_tree *tree);
@@ -122,8 +127,9 @@ FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, co
 
 /* Writes the hierarchy file: temporary file, fsync, rename. Errors: OUTPUT, MEMORY. */
 FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);
-/* Maps a hierarchy file read-only and validates header, sizes and section bounds in O(1). Errors: INPUT,
- * DATA, MEMORY. */
+/* Maps a hierarchy file read-only, validates the header in O(1) and what traversals rely on (links, ranges,
+ * indices) in one parallel pass, so that no file can crash a later query; docs/hierarchy-file.md. Errors:
+ * INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out);
 /* Reads everything: checksums, ranges, children, containment of vertices in boxes, areas. Errors: DATA with
  * what is wrong. */

@@ -22,8 +22,8 @@ static void set_face(fct_mesh *mesh, uint32_t f, uint32_t a, uint32_t b, uint32_
     t[0] = a, t[1] = b, t[2] = c;
 }
 
-/* Which partitions must be of connected clusters: none, those of the default cost, all. */
-enum { NEVER, DEFAULT_COST, ALWAYS };
+/* Whether every partition must be of connected clusters. */
+enum { NEVER, ALWAYS };
 
 /* Builds with both methods and costs, checks, releases. */
 static void check(fct_mesh *mesh, int connected) {
@@ -39,8 +39,7 @@ static void check(fct_mesh *mesh, int connected) {
         check_tree(tree, mesh);
         assert_int_equal(fct_tree_verify(&env, tree), FCT_OK);
         uint32_t *nodes = malloc(4 * (size_t)mesh->face_count);
-        bool whole = connected == ALWAYS || (connected == DEFAULT_COST && !(option & 2));
-        for (uint32_t k = 1; whole && k <= mesh->face_count; k *= 3) {
+        for (uint32_t k = 1; connected == ALWAYS && k <= mesh->face_count; k *= 3) {
             fct_partition_quality quality;
             assert_int_equal(fct_tree_partition(tree, k, nodes), k);
             assert_int_equal(fct_tree_quality(&env, tree, nodes, k, &quality), FCT_OK);
@@ -188,8 +187,7 @@ static void fan_of_one_vertex(void **state) {
             set_face(&mesh, f, 0, f + 1, (f + 1) % count + 1);
             if (closed) set_face(&mesh, count + f, f + 1, count + f + 1, (f + 1) % count + 1);
         }
-        /* the MEAN cost makes the lid one chain with no height left for the wall at its ends */
-        check(&mesh, closed ? DEFAULT_COST : ALWAYS);
+        check(&mesh, ALWAYS);
     }
 }
 
@@ -234,6 +232,37 @@ static void short_chains(void **state) {
     }
 }
 
+/* Memory that runs out where chains are cut up and parts are joined. */
+static void no_memory_for_odd_shapes(void **state) {
+    (void)state;
+    fct_env plain = fct_env_default();
+    uint32_t count = 400;
+    fct_mesh mesh = make(&plain, 2 * count + 5, 2 * count + 1);
+    for (uint32_t f = 0; f < count; ++f) {
+        double angle = 2 * 3.14159265358979 * f / count;
+        set_vertex(&mesh, f + 1, cos(angle), sin(angle), 0);
+        set_vertex(&mesh, count + f + 1, 1.001 * cos(angle), 1.001 * sin(angle), -1e-3);
+        set_face(&mesh, f, 0, f + 1, (f + 1) % count + 1);
+        set_face(&mesh, count + f, f + 1, count + f + 1, (f + 1) % count + 1);
+    }
+    set_face(&mesh, 2 * count, 2 * count + 1, 2 * count + 2, 2 * count + 3);
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_tree_def def = fct_tree_def_default();
+    def.cost = FCT_COST_MEAN;
+    for (r.fail_at = 1;; ++r.fail_at) {
+        r.allocations = 0;
+        fct_tree *tree;
+        fct_result result = fct_tree_build(&env, &mesh, &def, NULL, &tree);
+        fct_tree_destroy(tree);
+        assert_int_equal(r.alive, 0);
+        if (result == FCT_OK) break;
+        assert_int_equal(result, FCT_ERROR_MEMORY);
+    }
+    assert_true(r.fail_at > 50);
+    fct_mesh_release(&plain, &mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(one_and_two_faces),
                                        cmocka_unit_test(no_faces_is_an_error),
@@ -245,6 +274,7 @@ int main(void) {
                                        cmocka_unit_test(fan_of_one_vertex),
                                        cmocka_unit_test(strips),
                                        cmocka_unit_test(flat_grid),
-                                       cmocka_unit_test(short_chains)};
+                                       cmocka_unit_test(short_chains),
+                                       cmocka_unit_test(no_memory_for_odd_shapes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
