@@ -1,4 +1,5 @@
 /* cluster/build.c: fct_tree_build: dual graph, contraction, order, boxes. */
+#include <assert.h>
 #include <string.h>
 
 #include "cluster/tree.h"
@@ -102,6 +103,10 @@ fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tr
     fct_tree *tree = fct_tree_new(env);
     if (!tree) return fct_fail_memory(env, "the tree");
     result = build(env, mesh, &options, stats, tree);
+#ifndef NDEBUG
+    if (result == FCT_OK) result = fct_tree_verify(env, tree);
+    assert(result != FCT_ERROR_DATA);
+#endif
     if (result == FCT_OK)
         *out = tree;
     else

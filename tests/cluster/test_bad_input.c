@@ -126,7 +126,7 @@ static void extents(void **state) {
 static void scattered_triangles(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    uint32_t count = 20000, seed = 1;
+    uint32_t count = 8000, seed = 1;
     fct_mesh mesh = make(&env, 3 * count, count);
     for (uint32_t v = 0; v < 3 * count; ++v) {
         double p[3];
@@ -162,7 +162,7 @@ static void large_and_small_parts(void **state) {
 static void book_of_one_spine(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    uint32_t count = 20000;
+    uint32_t count = 6000;
     fct_mesh mesh = make(&env, count + 2, count);
     set_vertex(&mesh, 1, 0, 0, 1);
     for (uint32_t f = 0; f < count; ++f) {
@@ -176,7 +176,7 @@ static void book_of_one_spine(void **state) {
 static void fan_of_one_vertex(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    uint32_t count = 20000;
+    uint32_t count = 6000;
     for (int closed = 0; closed < 2;
          ++closed) { /* a disc; a cylinder's lid with its wall, which makes a hub */
         fct_mesh mesh = make(&env, 2 * count + 1, closed ? 2 * count : count);
@@ -194,7 +194,7 @@ static void fan_of_one_vertex(void **state) {
 static void strips(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    uint32_t count = 20000;
+    uint32_t count = 6000;
     for (int kind = 0; kind < 3; ++kind) { /* even, growing by a thousandth a step, curling */
         fct_mesh mesh = make(&env, count + 2, count);
         double x = 0, step = 1;
