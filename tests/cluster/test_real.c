@@ -1,0 +1,69 @@
+/* Real meshes: every promise of check_tree.h, connected partitions of the manifold ones, and the quality that
+ * the clustering is known for. Left out where the meshes are absent. */
+#include "check_tree.h"
+
+typedef struct figures {
+    const char *name;
+    bool connected;                            /* one manifold part */
+    double deviation, irregularity, box_areas; /* at 1000 clusters: upper bounds; boxes of the whole tree */
+} figures;
+
+static double box_areas(const fct_tree_view *view) {
+    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY}, sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)view->vertex_count; ++i) {
+        lower[i % 3] = fmin(lower[i % 3], (double)view->positions[i]);
+        upper[i % 3] = fmax(upper[i % 3], (double)view->positions[i]);
+    }
+    for (uint32_t i = 0; i < view->node_count; ++i) {
+        const float *h = view->clusters[i].box_half;
+        sum += 8 * (double)(h[0] * h[1] + h[1] * h[2] + h[2] * h[0]);
+    }
+    v3 d = {upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]};
+    return sum / v3_norm2(d);
+}
+
+static void check_model(const figures *expected) {
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s.obj", FACETREE_DATA, expected->name);
+    if (!file_exists(path)) return;
+    fct_env env = fct_env_default();
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_load(&env, path, &mesh), FCT_OK);
+    for (int method = 0; method < 2; ++method) {
+        fct_tree_def def = fct_tree_def_default();
+        def.method = (fct_cluster_method)method;
+        fct_tree *tree;
+        assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
+        check_tree(tree, &mesh);
+        fct_tree_view view = fct_tree_get(tree);
+        assert_int_equal(view.root_count, 1);
+        assert_true(box_areas(&view) <= expected->box_areas);
+        uint32_t *nodes = malloc(4 * (size_t)view.face_count);
+        const uint32_t counts[] = {1, 2, 3, 10, 100, 1000, view.face_count / 2};
+        for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {
+            fct_partition_quality quality;
+            assert_int_equal(fct_tree_partition(tree, counts[i], nodes), counts[i]);
+            assert_int_equal(fct_tree_quality(&env, tree, nodes, counts[i], &quality), FCT_OK);
+            if (expected->connected) assert_true(quality.connected);
+            if (counts[i] != 1000) continue;
+            assert_true(quality.mean_normal_deviation <= expected->deviation);
+            assert_true(quality.mean_irregularity <= expected->irregularity);
+        }
+        free(nodes);
+        fct_tree_destroy(tree);
+    }
+    fct_mesh_release(&env, &mesh);
+}
+
+static void real_meshes(void **state) {
+    (void)state;
+    const figures models[] = {{"stanford-bunny", true, 0.0207, 3.2, 66},
+                              {"cow", true, 0.0105, 2.4, 42},
+                              {"fandisk", true, 0.0003, 1.8, 45}};
+    for (size_t i = 0; i < sizeof models / sizeof *models; ++i) check_model(&models[i]);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(real_meshes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
