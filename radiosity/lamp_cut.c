@@ -72,9 +72,9 @@ static int cluster_side(const fct_cluster *c, v3 w, double spread) {
     v3 s = v3_load(c->area_vector);
     double length = v3_norm(s);
     if (!(c->cone_angle < 1.6) || length == 0 || spread > .9) return 0;
-    double cosine = -v3_dot(s, w) / length;
-    double angle = acos(cosine > 1 ? 1 : cosine < -1 ? -1 : cosine), margin = c->cone_angle + 1.25 * spread;
-    return angle + margin < FCT_PI / 2 ? 1 : angle - margin > FCT_PI / 2 ? -1 : 0;
+    /* sin(margin) <= margin: a little wide, and no arc cosine */
+    double cosine = -v3_dot(s, w) / length, margin = c->cone_angle + 1.25 * spread;
+    return cosine > margin ? 1 : cosine < -margin ? -1 : 0;
 }
 
 /* The mean of max(0, c) for cosines spread evenly over c +- s. */
@@ -278,10 +278,24 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
     }
 }
 
+/* The bound on a cluster's projected area times the most that its place lets through. */
+static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
+    v3 d = v3_sub(v3_load(c->centroid), rec->x);
+    double radius = v3_norm(v3_load(c->box_half)), r2 = v3_norm2(d) + radius * radius, r = sqrt(r2);
+    double top = v3_dot(d, rec->n) + 2 * radius;
+    if (top <= 0) return 0;
+    double m[6];
+    for (int k = 0; k < 6; ++k) m[k] = c->moment[k];
+    double cross = sqrt(fmax(0, c->area * sym3_form(m, d, d) / r2)),
+           toward = -v3_dot(v3_load(c->area_vector), d) / r;
+    double seen = lamp->two_sided ? cross : .5 * (cross + toward);
+    return (fmax(seen, 0) + .02 * c->area) * fmin(top, r) / (r2 * r);
+}
+
 /* How much of the light below an inner node comes through one of its children, roughly; positive unless
  * nothing does. */
 static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node) {
-    if (node < lamp->view.node_count) return cluster_outlook(lamp, rec, lamp->view.clusters + node).upper;
+    if (node < lamp->view.node_count) return cluster_weight(lamp, rec, lamp->view.clusters + node);
     v3 p[3];
     triangle_corners(&lamp->view, node - lamp->view.node_count, p);
     for (int k = 0; k < 3; ++k) p[k] = v3_sub(p[k], rec->x);

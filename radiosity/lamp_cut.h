@@ -12,7 +12,7 @@
 /* Directions for which a bent lamp's projected area is stored: FCT_LAMP_CELLS^2 squares a side of a cube. */
 #define FCT_LAMP_CELLS 16
 #define FCT_LAMP_TABLE (6 * (FCT_LAMP_CELLS + 1) * (FCT_LAMP_CELLS + 1))
-#define FCT_CUT_SIZE 1024
+#define FCT_CUT_SIZE   1024
 
 typedef struct fct_lamp {
     uint32_t instance;

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-enum { BORDER_ROUNDS = 3, PROBE_RAYS = 1024 };
+enum { BORDER_ROUNDS = 2, PROBE_RAYS = 1024 };
 
 typedef struct lighting {
     const fct_solution *s;
@@ -95,7 +95,7 @@ static bool crosses_border(void *user, uint32_t a, uint32_t b) {
         difference += fabs(x - y);
         level += x + y;
     }
-    return difference > .06 * level + .03 * l->s->mean_radiosity;
+    return difference > .1 * level + .04 * l->s->mean_radiosity;
 }
 
 static void turn_over(fct_mesh *mesh) {

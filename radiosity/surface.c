@@ -14,7 +14,7 @@
 
 #include <string.h>
 
-#define DIAGONAL_EDGES 96
+#define DIAGONAL_EDGES 72
 #define GRADES         4
 #define STACK_SIZE     288
 #define SMALL_BOX      .35 /* of the distance asked about */
