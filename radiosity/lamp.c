@@ -12,7 +12,7 @@
 #include "radiosity/sample.h"
 #include "scene/transform.h"
 
-#define MAJOR_SHARE .01
+#define MAJOR_SHARE .025
 #define MAX_RAYS    64
 #define LARGE_AREA  .25
 #define FLAT_ENOUGH .9 /* |S| / A: a nearly flat lamp does not shine on itself */

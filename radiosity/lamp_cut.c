@@ -278,18 +278,16 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
     }
 }
 
-/* The bound on a cluster's projected area times the most that its place lets through. */
+/* A cluster's projected area, its area vector's or at least a tenth of it all, times the most that its place
+ * lets through. */
 static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
-    v3 d = v3_sub(v3_load(c->centroid), rec->x);
-    double radius = v3_norm(v3_load(c->box_half)), r2 = v3_norm2(d) + radius * radius, r = sqrt(r2);
-    double top = v3_dot(d, rec->n) + 2 * radius;
+    v3 d = v3_sub(v3_load(c->centroid), rec->x), half = v3_load(c->box_half);
+    double radius = half.x + half.y + half.z, r2 = v3_norm2(d) + radius * radius;
+    double top = v3_dot(d, rec->n) + radius;
     if (top <= 0) return 0;
-    double m[6];
-    for (int k = 0; k < 6; ++k) m[k] = c->moment[k];
-    double cross = sqrt(fmax(0, c->area * sym3_form(m, d, d) / r2)),
-           toward = -v3_dot(v3_load(c->area_vector), d) / r;
-    double seen = lamp->two_sided ? cross : .5 * (cross + toward);
-    return (fmax(seen, 0) + .02 * c->area) * fmin(top, r) / (r2 * r);
+    double r = sqrt(r2), toward = -v3_dot(v3_load(c->area_vector), d);
+    double seen = lamp->two_sided ? fabs(toward) : fmax(toward, 0);
+    return (seen + .1 * c->area * r) * fmin(top, r) / (r2 * r2);
 }
 
 /* How much of the light below an inner node comes through one of its children, roughly; positive unless

@@ -82,11 +82,10 @@ static fct_result light_vertices(lighting *l, uint64_t *rays) {
     return result;
 }
 
-/* Flat ground whose light changes along an edge that is long enough to be worth two. */
+/* Light changes along an edge that is long enough to be worth two. */
 static bool crosses_border(void *user, uint32_t a, uint32_t b) {
     const lighting *l = user;
     const fct_mesh *m = &l->surface->mesh;
-    if (!l->surface->flat[a] || !l->surface->flat[b]) return false;
     const float *p = m->positions + 3 * (size_t)a, *q = m->positions + 3 * (size_t)b;
     if (v3_norm(v3_sub(v3_load(p), v3_load(q))) < l->s->max_edge / 7) return false;
     double difference = 0, level = 0;

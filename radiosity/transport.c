@@ -59,8 +59,8 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
             double x[3], n[3], irradiance[3];
             for (int c = 0; c < 3; ++c) x[c] = p->position[c], n[c] = p->normal[c];
             fct_lamps_direct(g->lamps, g->set->scene, x, n, p->offset,
-                             fct_hash3(g->seed + fresh, id, (uint64_t)k),
-                             fresh ? 4 | FCT_LAMPS_FIXED : 2 | FCT_LAMPS_FIXED, irradiance, &rays);
+                             fct_hash3(g->seed + fresh, id, (uint64_t)k), 2 | FCT_LAMPS_FIXED, irradiance,
+                             &rays);
             for (int c = 0; c < 3; ++c) {
                 sum[c] += irradiance[c] / DIRECT_POINTS;
                 least[c] = k ? fmin(least[c], irradiance[c]) : irradiance[c];
