@@ -208,12 +208,13 @@ static fct_result grow_vertices(reader *r, size_t count) {
     if (total > r->limit || total > FCT_MESH_LIMIT)
         return fct_fail(r->env, FCT_ERROR_DATA, "%s: its nodes place more than %llu vertices", r->name,
                         (unsigned long long)r->limit);
+    size_t room = total > 0 ? total : 1; /* no array is NULL, whatever follows */
     fct_result result =
-        fct_grow(r->env, (void **)&soup->positions, &r->vertex_capacity, total, 3 * sizeof(float));
+        fct_grow(r->env, (void **)&soup->positions, &r->vertex_capacity, room, 3 * sizeof(float));
     if (result == FCT_OK && r->has_colors)
-        result = fct_grow(r->env, (void **)&soup->colors, &r->color_capacity, total, 3 * sizeof(float));
+        result = fct_grow(r->env, (void **)&soup->colors, &r->color_capacity, room, 3 * sizeof(float));
     if (result == FCT_OK && r->has_normals)
-        result = fct_grow(r->env, (void **)&soup->normals, &r->normal_capacity, total, 3 * sizeof(float));
+        result = fct_grow(r->env, (void **)&soup->normals, &r->normal_capacity, room, 3 * sizeof(float));
     return result;
 }
 
