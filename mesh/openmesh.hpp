@@ -28,9 +28,7 @@ class call_guard {
     call_guard &operator=(const call_guard &) = delete;
 
   private:
-    static OpenMesh::mostream &stream(int i) {
-        return i == 0 ? ::omerr() : i == 1 ? ::omlog() : ::omout();
-    }
+    static OpenMesh::mostream &stream(int i) { return i == 0 ? ::omerr() : i == 1 ? ::omlog() : ::omout(); }
     std::lock_guard<std::mutex> lock;
     bool was_enabled[3];
 };

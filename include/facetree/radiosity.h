@@ -23,9 +23,10 @@ typedef enum fct_final { FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER } fc
 typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
-    fct_final final; /* default GATHER */
-    double error;         /* epsilon: links and elements are split until none is uncertain by more than this share of the
-                             emitted power; rays and anchors of the output grow with 1 / sqrt(error); default 2e-5 */
+    fct_final final;  /* default GATHER */
+    double error;     /* epsilon: links and elements are split until none is uncertain by more than this share
+                         of the emitted power; rays and anchors of the output grow with 1 / sqrt(error);
+                         default 2e-5 */
     uint32_t samples; /* REFERENCE: paths per vertex; FACE: gather rays per anchor; 0: the default */
     uint64_t seed;
     bool indirect_only; /* leave out e and direct light */
