@@ -36,6 +36,13 @@ static void direct(const fct_solution *s, const float point[3], const float norm
     fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, irradiance, rays);
 }
 
+/* A small scene has few vertices: they take up to four times the rays, and it is done in seconds all the
+ * same. */
+static double care(const fct_solution *s) {
+    double faces = fmax((double)s->elements.view.face_count, 1);
+    return fmin(fmax(sqrt(2e5 / faces), 1), 4);
+}
+
 static uint32_t lamp_rays(const fct_solution *s, uint32_t least) {
     return (uint32_t)fmin(fmax(least * s->fineness, least), 64);
 }
@@ -61,7 +68,8 @@ static void vertex_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
         } else {
             uint64_t seed = fct_hash3(s->def.seed + 1, l->instance, i);
-            direct(s, point, normal, f->offsets[i], seed, lamp_rays(s, 4), irradiance, &l->chunk_rays[chunk]);
+            direct(s, point, normal, f->offsets[i], seed, lamp_rays(s, (uint32_t)(4 * care(s))), irradiance,
+                   &l->chunk_rays[chunk]);
             fct_anchors_irradiance(l->anchors, &s->elements, point, normal, f->offsets[i], f->flat[i],
                                    indirect, &l->chunk_rays[chunk]);
             for (int c = 0; c < 3; ++c) irradiance[c] += indirect[c];
@@ -127,7 +135,8 @@ fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mes
     l.back = back_is_brighter(s, instance);
     if (s->def.final != FCT_FINAL_NONE) {
         bool dense = s->def.final == FCT_FINAL_GATHER;
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(64 * s->fineness),
+        fct_anchors_def def = {.rays =
+                                   s->def.samples ? s->def.samples : (uint32_t)(64 * s->fineness * care(s)),
                                .tolerance = (dense ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
                                .side = l.back ? -1 : 1,
                                .seed = fct_hash2(s->def.seed, instance)};
