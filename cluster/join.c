@@ -61,8 +61,9 @@ static bool fits(const joiner *j, const group *g, uint32_t middle) {
            height_needed(j, middle, g->end) < g->height_left;
 }
 
-static float middle_of(const part *p, int axis) {
-    return 0.5f * (p->lower[axis] + p->upper[axis]);
+/* In double, as sums, differences and products of large or small floats need not be floats. */
+static double middle_of(const part *p, int axis) {
+    return 0.5 * ((double)p->lower[axis] + (double)p->upper[axis]);
 }
 
 typedef struct bin {
@@ -80,26 +81,28 @@ static void bin_add(bin *b, const float *lower, const float *upper, uint64_t fac
     b->faces += faces;
 }
 
-static float bin_cost(const bin *b) {
+static double bin_cost(const bin *b) {
     if (b->faces == 0) return INFINITY;
-    float x = b->upper[0] - b->lower[0], y = b->upper[1] - b->lower[1], z = b->upper[2] - b->lower[2];
-    return (x * y + y * z + z * x) * (float)b->faces;
+    double extent[3];
+    for (int k = 0; k < 3; ++k) extent[k] = (double)b->upper[k] - (double)b->lower[k];
+    double area = extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0];
+    return area * (double)b->faces;
 }
 
-static int bin_of(const part *p, int axis, float lower, float factor) {
+static int bin_of(const part *p, int axis, double lower, double factor) {
     int i = (int)((middle_of(p, axis) - lower) * factor);
     return i < 0 ? 0 : i >= BINS ? BINS - 1 : i;
 }
 
 /* The cheapest cut of one axis: parts in bins up to *cut go left. */
-static float best_cut(const joiner *j, const group *g, int axis, float lower, float factor, int *cut) {
+static double best_cut(const joiner *j, const group *g, int axis, double lower, double factor, int *cut) {
     bin bins[BINS], all = empty_bin;
     for (int i = 0; i < BINS; ++i) bins[i] = empty_bin;
     for (uint32_t i = g->begin; i < g->end; ++i) {
         const part *p = &j->parts[i];
         bin_add(&bins[bin_of(p, axis, lower, factor)], p->lower, p->upper, p->count);
     }
-    float right[BINS], best = INFINITY;
+    double right[BINS], best = INFINITY;
     for (int i = BINS - 1; i > 0; --i) {
         bin_add(&all, bins[i].lower, bins[i].upper, bins[i].faces);
         right[i] = bin_cost(&all);
@@ -107,7 +110,7 @@ static float best_cut(const joiner *j, const group *g, int axis, float lower, fl
     all = empty_bin;
     for (int i = 0; i + 1 < BINS; ++i) {
         bin_add(&all, bins[i].lower, bins[i].upper, bins[i].faces);
-        float cost = bin_cost(&all) + right[i + 1];
+        double cost = bin_cost(&all) + right[i + 1];
         if (cost < best) best = cost, *cut = i;
     }
     return best;
@@ -116,20 +119,20 @@ static float best_cut(const joiner *j, const group *g, int axis, float lower, fl
 /* Cuts by the surface area heuristic; returns the end of the left side, or g->begin where all parts lie in
  * one place. Keeps the order within both sides. */
 static uint32_t cut_by_area(joiner *j, const group *g, part *scratch) {
-    float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (uint32_t i = g->begin; i < g->end; ++i)
         for (int k = 0; k < 3; ++k) {
-            float m = middle_of(&j->parts[i], k);
+            double m = middle_of(&j->parts[i], k);
             if (m < lower[k]) lower[k] = m;
             if (m > upper[k]) upper[k] = m;
         }
-    float best = INFINITY, factor = 0;
+    double best = INFINITY, factor = 0;
     int best_axis = -1, best_bin = 0;
     for (int k = 0; k < 3; ++k) {
         if (!(upper[k] > lower[k])) continue;
-        float f = BINS / (upper[k] - lower[k]);
+        double f = BINS / (upper[k] - lower[k]);
         int cut = 0;
-        float cost = best_cut(j, g, k, lower[k], f, &cut);
+        double cost = best_cut(j, g, k, lower[k], f, &cut);
         if (best_axis < 0 || cost < best) best = cost, best_axis = k, best_bin = cut, factor = f;
     }
     if (best_axis < 0 || best == INFINITY) return g->begin;
