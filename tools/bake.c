@@ -13,6 +13,7 @@ typedef struct bake_options {
     fct_backend backend;
     const char *probes;
     double exposure;
+    const char *also;
 } bake_options;
 
 enum {
@@ -24,14 +25,17 @@ enum {
     KEY_FINAL,
     KEY_PROBE,
     KEY_EXPOSURE,
-    KEY_MAX_EDGE
+    KEY_MAX_EDGE,
+    KEY_ALSO
 };
 
 static const struct argp_option options_table[] = {
     {"method", KEY_METHOD, "NAME", 0,
      "face: face clusters (default); reference: path tracing at every vertex", 0},
     {"error", KEY_ERROR, "E", 0,
-     "Refinement threshold; 1 (default) is within a few per cent, smaller is finer", 0},
+     "Links are split until none is uncertain by more than this share of the emitted power (default 2e-5); "
+     "smaller is finer, in rays and anchors too",
+     0},
     {"samples", KEY_SAMPLES, "N", 0, "reference: paths a vertex; face: gather rays an anchor", 0},
     {"visibility", KEY_VISIBILITY, "NAME", 0, "Rays through obb (default) or embree", 0},
     {"backend", KEY_VISIBILITY, NULL, OPTION_ALIAS, NULL, 0},
@@ -47,6 +51,7 @@ static const struct argp_option options_table[] = {
      "Factor on colours for display (default 1); radiosity is stored unchanged", 0},
     {"max-edge", KEY_MAX_EDGE, "L", 0,
      "Longest edge on flat ground, in the scene's unit (default: from the scene)", 0},
+    {"also", KEY_ALSO, "FILE", 0, "Write the mesh to a second file too, in the format of its name", 0},
     {0}};
 
 static error_t parse(int key, char *text, struct argp_state *state) {
@@ -67,7 +72,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         o->def.final = final_values[index];
         return error;
     case KEY_ERROR:
-        return tool_parse_real(state, "--error", text, 1e-6, 1e6, &o->def.error);
+        return tool_parse_real(state, "--error", text, 1e-9, 1, &o->def.error);
     case KEY_SAMPLES:
         return tool_parse_count32(state, "--samples", text, 1, 100000000, &o->def.samples);
     case KEY_VISIBILITY:
@@ -80,6 +85,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_EXPOSURE:
         return tool_parse_real(state, "--exposure", text, 0, 1e12, &o->exposure);
+    case KEY_ALSO:
+        o->also = text;
+        return 0;
     case KEY_MAX_EDGE:
         return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
     default:
@@ -178,6 +186,7 @@ static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
     code = tool_save_mesh(t, t->output, &mesh, o->exposure);
+    if (code == TOOL_DONE && o->also) code = tool_save_mesh(t, o->also, &mesh, o->exposure);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -187,7 +196,15 @@ static bool folder_wanted(const char *output) {
                                         !(tool_is_mesh_name(output) || tool_ends(output, "fct")));
 }
 
-static int check_output(tool *t) {
+static int check_output(tool *t, const bake_options *o) {
+    if (o->also) {
+        if (!t->output || folder_wanted(t->output) || !tool_is_mesh_name(o->also) ||
+            tool_ends(o->also, "stl"))
+            return tool_fail(t, TOOL_USAGE,
+                             "--also %s: expected a name that ends in .glb or .ply, beside -o FILE", o->also);
+        int code = tool_check_output(t, o->also);
+        if (code != TOOL_DONE) return code;
+    }
     if (!t->output) return TOOL_DONE;
     if (folder_wanted(t->output)) return tool_check_folder(t, t->output);
     if (tool_ends(t->output, "stl") || tool_ends(t->output, "fct"))
@@ -330,7 +347,7 @@ static int run(tool *t, void *options) {
     probe_set set = {0};
     if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
     o->def.seed = t->seed;
-    int code = check_output(t);
+    int code = check_output(t, o);
     if (code == TOOL_DONE && o->probes) code = read_probes(t, o->probes, &set);
     if (code == TOOL_DONE) code = bake_scene(t, o, &set);
     tool_release(t, set.points);

@@ -34,7 +34,7 @@ expect 0 info lit.ply --json
 check "the bake has colours" test "$(value vertex_colors)" = true
 expect 0 bake furnace.json --probe - <probes.txt
 check "probes without -o are printed" grep -q '^probe 0 0 -1: radiosity' out
-expect 0 bake furnace.json -o lit.glb --visibility embree --final direct --error 2 --exposure .5 --max-edge .5 --quiet
+expect 0 bake furnace.json -o lit.glb --visibility embree --final direct --error 5e-5 --exposure .5 --max-edge .5 --quiet
 expect 0 bake furnace.json -o lit.glb --final none --json
 expect 0 bake furnace.json --method reference --samples 64 --probe probes.txt --json
 check "the method is named" test "$(value method)" = reference
