@@ -203,6 +203,7 @@ bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], float max_d
     }
     *out = (fct_closest){.distance = (float)sqrt(near.distance2),
                          .face = bvh->view.face_ids[near.place],
+                         .place = near.place,
                          .u = (float)near.u,
                          .v = (float)near.v};
     v3_store(out->point, near.point);

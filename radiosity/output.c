@@ -196,8 +196,7 @@ fct_site fct_output_site(const fct_scene *scene, const float point[3], const flo
             const fct_instance *in = &view.instances[instance];
             const fct_tree *tree = view.models[in->model].tree;
             fct_tree_view t = fct_tree_get(tree);
-            for (uint32_t p = 0; p < t.face_count; ++p)
-                if (t.face_ids[p] == closest.face) site.place = p;
+            site.place = closest.place;
             fct_cluster c;
             fct_tree_cluster(tree, t.node_count + site.place, &c);
             double facing = 0;

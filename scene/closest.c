@@ -76,7 +76,8 @@ static void try_triangle(search *s, const fct_tree_view *view, const float *to_w
         return;
     s->distance = distance;
     s->instance = instance;
-    s->best = (fct_closest){.distance = (float)distance, .face = face, .u = (float)u, .v = (float)v};
+    s->best = (fct_closest){
+        .distance = (float)distance, .face = face, .place = place, .u = (float)u, .v = (float)v};
     v3_store(s->best.point, nearest);
 }
 

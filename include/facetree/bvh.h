@@ -80,8 +80,9 @@ FCT_API void fct_ray_mix(const fct_bvh *bvh, uint64_t seed, size_t count, fct_ra
 typedef struct fct_closest {
     float point[3];
     float distance;
-    uint32_t face; /* input face id; FCT_NONE when nothing lies within the maximum distance */
-    float u, v;    /* barycentrics of the point as in fct_hit */
+    uint32_t face;  /* input face id; FCT_NONE when nothing lies within the maximum distance */
+    float u, v;     /* barycentrics of the point as in fct_hit */
+    uint32_t place; /* of the face in the tree's order */
 } fct_closest;
 /* The point of the surface nearest to `point`, if within max_distance (may be infinity). OBB backend only. */
 FCT_API bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], float max_distance,
