@@ -6,6 +6,7 @@
  * around the smaller end) at a hub, a point of more than SIMPLIFY_HUB faces, and O(both rings) elsewhere.
  */
 #include "base/parallel.h"
+#include "simplify/loss.h"
 #include "simplify/placement.h"
 
 /* Cosine of the largest angle by which a face may turn in one contraction. */
@@ -197,6 +198,11 @@ static void apply(fct_simplifier *s, uint32_t ends[2], const fct_candidate *cand
     at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
 }
 
+static double *first_quadric(const fct_simplifier *s, uint32_t point) {
+    uint32_t w = s->first_wedges ? s->first_wedges[point] : point;
+    return s->quadrics + (size_t)s->quadric_size * w;
+}
+
 /* Edges of the faces around a point that were put aside come back; `refused` tells where there may be any. */
 static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
@@ -216,8 +222,24 @@ static bool allowed(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a,
              fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), at));
 }
 
+/* Whether a candidate that costs more than was thought can still be taken now; if not, it is put back. */
+static bool still_cheapest(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
+                           const fct_candidate *candidate) {
+    uint32_t bucket = queue_bucket(candidate->key);
+    if (bucket > s->queue.current) {
+        queue_push(&s->queue, e, bucket);
+        return false;
+    }
+    double bound = s->def->max_error / s->extent;
+    if (candidate->error > 0 && candidate->error > bound * bound * candidate->area) {
+        refuse_edge(s, e, ends, EDGE_OVER_BOUND);
+        return false;
+    }
+    return true;
+}
+
 /* Gathers both rings (b's alone where a is a hub) and contracts if that is allowed. */
-static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], const fct_candidate *candidate) {
+static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
     fct_edge *edge = &s->edges[e];
     uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
     uint32_t a = ends[keep], b = ends[1 - keep];
@@ -240,8 +262,15 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], con
         }
         return false;
     }
+    fct_loss loss;
+    double cost = hub ? 0 : fct_simplify_loss(s, a, b, count_a, count_b, candidate, &loss);
+    if (cost > 0) {
+        candidate->error += cost, candidate->key += cost;
+        if (!still_cheapest(s, e, ends, candidate)) return false;
+    }
     drop_edge(s, e);
     apply(s, ends, candidate, keep, count_b);
+    if (cost > 0) fct_simplify_remember(&loss, first_quadric(s, a));
     s->refused[a] |= s->refused[b];
     if (s->refused[a]) {
         requeue_around(s, s->ring_a, count_a);
@@ -263,19 +292,9 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
         refuse_edge(s, e, ends, EDGE_REFUSED);
         return false;
     }
-    uint32_t bucket = queue_bucket(candidate.key);
-    if (bucket > s->queue.current) {
-        queue_push(&s->queue, e, bucket);
-        return false;
-    }
-    double bound = s->def->max_error / s->extent;
-    double error2 = candidate.error > 0 ? candidate.error / candidate.area : 0;
-    if (error2 > bound * bound) {
-        refuse_edge(s, e, ends, EDGE_OVER_BOUND);
-        return false;
-    }
+    if (!still_cheapest(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
-    s->max_error2 = fmax(s->max_error2, error2);
+    if (candidate.error > 0) s->max_error2 = fmax(s->max_error2, candidate.error / candidate.area);
     return true;
 }
 

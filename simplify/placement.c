@@ -222,6 +222,7 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
         place_by_policy(s, r, pa, pb, ends_only, out);
     if (!(out->error > 0)) out->error = 0;
     out->area = r[10];
+    memcpy(out->resistance, r, sizeof out->resistance);
     double reach2 = v3_norm2(v3_sub(out->at, pa)) + v3_norm2(v3_sub(out->at, pb));
     out->key = out->error + .5 * s->def->regularization * quadric_trace(r) * reach2;
     return true;

@@ -18,6 +18,7 @@ typedef struct fct_candidate {
     uint32_t end; /* 0 or 1 when `at` is that end, else 2 */
     double error; /* quadric error, at least 0 */
     double area;
+    double resistance[6]; /* of the quadric to moves: xx xy xz yy yz zz */
     double key; /* error plus the regularisation, which decides between equals */
 } fct_candidate;
 

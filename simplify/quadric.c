@@ -55,14 +55,6 @@ double fct_quadric_value(const double *q, uint32_t m, v3 p, const double *a) {
     return value;
 }
 
-/* q += weight times the squared distance from the plane through p with unit normal n. */
-static void add_plane(double *q, v3 n, v3 p, double weight) {
-    double d = -v3_dot(n, p);
-    sym3_add_outer(q, weight, n);
-    q[6] += weight * d * n.x, q[7] += weight * d * n.y, q[8] += weight * d * n.z;
-    q[9] += weight * d * d;
-}
-
 /* q = the squared distance from the 2-plane through x[0..2] in R^(3 + m) (5.8)-(5.10), for a face of
  * weight 1.
  */
@@ -104,7 +96,7 @@ static void add_face(fct_simplifier *s, uint32_t f, v3 normal, double area) {
     uint32_t m = s->steering;
     double q[MAX_QUADRIC] = {0};
     if (m == 0) {
-        add_plane(q, normal, point_position(s, s->triangles[3 * f]), 1);
+        quadric_add_plane(q, normal, point_position(s, s->triangles[3 * f]), 1);
         q[10] = 1;
     } else {
         double x[3][3 + SIMPLIFY_MAX_CHANNELS];
@@ -165,8 +157,8 @@ static void add_constraints(fct_simplifier *s, uint32_t f, v3 normal, const floa
         v3 side = v3_sub(point_position(s, s->triangles[corner_next(c)]), p);
         double weight = s->def->boundary_weight * held * v3_norm2(side);
         v3 across = v3_unit(v3_cross(normal, side));
-        add_plane(wedge_quadric(s, c), across, p, weight);
-        add_plane(wedge_quadric(s, corner_next(c)), across, p, weight);
+        quadric_add_plane(wedge_quadric(s, c), across, p, weight);
+        quadric_add_plane(wedge_quadric(s, corner_next(c)), across, p, weight);
     }
 }
 

@@ -30,6 +30,14 @@ static inline double quadric_at(const double *q, v3 p) {
     return v3_dot(p, g) + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
 }
 
+/* q += weight times the squared distance from the plane through p with unit normal n. */
+static inline void quadric_add_plane(double *q, v3 n, v3 p, double weight) {
+    double d = -v3_dot(n, p);
+    sym3_add_outer(q, weight, n);
+    q[6] += weight * d * n.x, q[7] += weight * d * n.y, q[8] += weight * d * n.z;
+    q[9] += weight * d * d;
+}
+
 /* The attributes eliminated from a quadric: what is left for the position, and how to find them again. */
 typedef struct fct_elimination {
     double position[POSITION_QUADRIC];

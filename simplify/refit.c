@@ -8,6 +8,7 @@
  * valence) a pass; the search is parallel, the sums run in the order of the samples.
  */
 #include "base/parallel.h"
+#include "simplify/nearest.h"
 #include "simplify/quadric.h"
 
 #define STEP    .5
@@ -19,13 +20,6 @@
 
 enum { GRAIN = 1024, MAX_STEPS = 4 };
 
-/* A face of the result, ready for the search. */
-typedef struct target {
-    v3 a, ab, ac, n;        /* first corner, sides from it, unit normal */
-    double aa, bb, cc, det; /* ab.ab, ab.ac, ac.ac, aa cc - bb bb */
-    uint32_t face;
-} target;
-
 /* Where a sample came to lie: barycentrics of the second and third corner. */
 typedef struct landing {
     uint32_t target; /* FCT_NONE: nowhere */
@@ -36,6 +30,13 @@ typedef struct landing {
 typedef struct ring_entry {
     uint32_t corner, target;
 } ring_entry;
+
+/* A face of the result, ready for the search. */
+typedef struct target {
+    triangle shape;
+    v3 n; /* unit normal */
+    uint32_t face;
+} target;
 
 typedef struct refit {
     fct_simplifier *s;
@@ -49,32 +50,6 @@ typedef struct refit {
     double *sums, *weights; /* by wedge and channel; by wedge */
 } refit;
 
-typedef struct foot {
-    double u, v, distance2;
-} foot;
-
-/* The nearest point of the face to p, by the regions of the triangle's corners and sides. */
-static foot nearest_on(const target *t, v3 p) {
-    v3 ap = v3_sub(p, t->a);
-    double d1 = v3_dot(t->ab, ap), d2 = v3_dot(t->ac, ap), aa = t->aa, bb = t->bb, cc = t->cc;
-    double u = cc * d1 - bb * d2, v = aa * d2 - bb * d1;
-    if (t->det > 0 && u >= 0 && v >= 0 && u + v <= t->det)
-        u /= t->det, v /= t->det;
-    else {
-        double on_ab = aa > 0 ? fmin(fmax(d1 / aa, 0), 1) : 0;
-        double on_ac = cc > 0 ? fmin(fmax(d2 / cc, 0), 1) : 0;
-        double bc2 = aa + cc - 2 * bb, along = d2 - d1 + aa - bb; /* (p - b).(c - b) */
-        double y = bc2 > 0 ? fmin(fmax(along / bc2, 0), 1) : 0, x = 1 - y;
-        double e_ab = on_ab * (on_ab * aa - 2 * d1), e_ac = on_ac * (on_ac * cc - 2 * d2);
-        double e_bc = x * x * aa + y * y * cc + 2 * x * y * bb - 2 * (x * d1 + y * d2);
-        u = on_ab, v = 0;
-        if (e_ac < e_ab) u = 0, v = on_ac;
-        if (e_bc < fmin(e_ab, e_ac)) u = x, v = y;
-    }
-    v3 rest = v3_sub(ap, v3_add(v3_scale(t->ab, u), v3_scale(t->ac, v)));
-    return (foot){u, v, v3_norm2(rest)};
-}
-
 /* Looks for the nearest face around a point, among those on the wedge's side of a seam if there are any. */
 static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, foot *best, landing *out) {
     const fct_simplifier *s = r->s;
@@ -84,9 +59,9 @@ static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, fo
         const target *t = &r->targets[r->rings[i].target];
         bool same_side = s->corner_wedges && s->wedge_parents[s->corner_wedges[r->rings[i].corner]] == wedge;
         if (out->attributes && !same_side) continue;
-        double height = v3_dot(t->n, v3_sub(p, t->a));
+        double height = v3_dot(t->n, v3_sub(p, t->shape.a));
         if (same_side == out->attributes && height * height >= best->distance2) continue;
-        foot found = nearest_on(t, p);
+        foot found = triangle_nearest(&t->shape, p);
         if (same_side == out->attributes && found.distance2 >= best->distance2) continue;
         *best = found;
         out->target = r->rings[i].target;
@@ -172,7 +147,7 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
         v3 p = sample_position(s, corners, count);
         foot best = {0, 0, INFINITY};
         if (out->target != FCT_NONE)
-            best = nearest_on(&r->targets[out->target], p);
+            best = triangle_nearest(&r->targets[out->target].shape, p);
         else {
             for (uint32_t k = 0; k < count; ++k) {
                 uint32_t input = input_wedge(s, corners[k]);
@@ -220,9 +195,10 @@ static void add_sample(refit *r, size_t sample, const landing *at) {
     uint32_t corners[3], count = sample_corners(r, sample, corners);
     double weight = count == 1 ? r->corner_weights[sample] : .75 * input_area(s, corners[0] / 3);
     const target *face = &r->targets[at->target];
+    const triangle *shape = &face->shape;
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
-    v3 rest = v3_sub(sample_position(s, corners, count), face->a);
-    rest = v3_sub(rest, v3_add(v3_scale(face->ab, b[1]), v3_scale(face->ac, b[2])));
+    v3 rest = v3_sub(sample_position(s, corners, count), shape->a);
+    rest = v3_sub(rest, v3_add(v3_scale(shape->ab, b[1]), v3_scale(shape->ac, b[2])));
     double residual = v3_norm(rest);
     v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : face->n;
     for (size_t k = 0; k < 3; ++k) {
@@ -306,12 +282,9 @@ static void set_targets(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) {
         target *t = &r->targets[i];
         const uint32_t *points = r->s->triangles + 3 * (size_t)t->face;
-        t->a = point_position(r->s, points[0]);
-        t->ab = v3_sub(point_position(r->s, points[1]), t->a);
-        t->ac = v3_sub(point_position(r->s, points[2]), t->a);
-        t->n = v3_unit(v3_cross(t->ab, t->ac));
-        t->aa = v3_norm2(t->ab), t->bb = v3_dot(t->ab, t->ac), t->cc = v3_norm2(t->ac);
-        t->det = t->aa * t->cc - t->bb * t->bb;
+        t->shape = triangle_make(point_position(r->s, points[0]), point_position(r->s, points[1]),
+                                 point_position(r->s, points[2]));
+        t->n = v3_unit(v3_cross(t->shape.ab, t->shape.ac));
     }
 }
 
