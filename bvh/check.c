@@ -96,13 +96,46 @@ static double box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
     return sqrt(sum) * (1 - 1e-5) - 1e-6;
 }
 
+/* A number for the segment from a to b, the same from b to a and for other vertices at the same places. */
+static uint64_t segment_hash(v3 a, v3 b) {
+    double ends[2][3] = {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
+    uint64_t sum = 0;
+    for (int i = 0; i < 2; ++i) {
+        uint64_t h = 0;
+        for (int k = 0; k < 3; ++k) {
+            double x = ends[i][k] + 0.0; /* -0 is 0 */
+            uint64_t bits;
+            memcpy(&bits, &x, sizeof bits);
+            h = (h ^ bits) * 0x9e3779b97f4a7c15u;
+            h ^= h >> 29;
+        }
+        sum += h * h; /* no bijection: two segments' ends do not add up to the same but by chance */
+    }
+    return sum * 0xbf58476d1ce4e5b9u;
+}
+
+/* The sides of a face that pass the point, folded: what an even number of faces have in common vanishes. */
+static uint64_t sides_at(v3 point, const v3 p[3]) {
+    uint64_t fold = 0;
+    for (int i = 0; i < 3; ++i) {
+        v3 a = p[i], b = p[(i + 1) % 3];
+        double u, v;
+        if (v3_norm(v3_sub(fct_triangle_closest(point, a, b, b, &u, &v), point)) <= 4 * ROUNDING)
+            fold ^= segment_hash(a, b);
+    }
+    return fold;
+}
+
 /* Whether the ray, as given, meets a face near `point`, and the faces there leave no gap: all rays of a ring
- * around this one meet one of them too. Only what lies before `farthest` counts: at a silhouette the surface
- * behind it is met just as surely. */
+ * around this one meet one of them too, and every side that passes the point belongs to two of them. Where
+ * faces only touch, at the end of another's side or by way of a face without area, which no ray meets,
+ * rounding may open a slit. Only what lies before `farthest` counts: at a silhouette the surface behind it
+ * is met just as surely. */
 static bool surface_covers(const checker *c, const exact_ray *e, v3 point, double farthest) {
     const fct_bvh *bvh = c->obb;
     const fct_tree_view *view = &bvh->view;
     uint32_t height = 0, covered = 0;
+    uint64_t unpaired = 0;
     bool met = false;
     for (uint32_t r = 0; r < view->root_count; ++r) c->stack[height++] = view->roots[r];
     while (height) {
@@ -116,8 +149,10 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         v3 p[3];
         double u, v, at;
         face_corners(bvh, node - view->node_count, p);
+        if (fct_bvh_degenerate(bvh, node - view->node_count)) continue;
         if (v3_norm(v3_sub(fct_triangle_closest(point, p[0], p[1], p[2], &u, &v), point)) > 4 * ROUNDING)
             continue;
+        unpaired ^= sides_at(point, p);
         met = met || (rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
@@ -125,7 +160,7 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
             if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }
-    return met && covered == (1u << AROUND) - 1;
+    return met && !unpaired && covered == (1u << AROUND) - 1;
 }
 
 /* Whether our answer `ours` (distance from e->origin) is wrong given Embree's. Either place may be FCT_NONE.
