@@ -8,6 +8,9 @@
 
 #include <string.h>
 
+/* Light of neighbours that differs by less, as a share of its sum, may be one light and noise. */
+#define ALIKE .04
+
 enum { BORDER_ROUNDS = 2, PROBE_RAYS = 1024 };
 
 typedef struct lighting {
@@ -105,6 +108,41 @@ static bool crosses_border(void *user, uint32_t a, uint32_t b) {
     return difference > .1 * level + .04 * l->s->mean_radiosity;
 }
 
+/* Adds to a vertex's sum what a neighbour of like light on the same flat ground says of it. */
+static void mix(const fct_surface *f, uint32_t a, uint32_t b, float *sums) {
+    const float *x = f->mesh.colors + 3 * (size_t)a, *y = f->mesh.colors + 3 * (size_t)b;
+    double difference = 0, level = 0;
+    for (int c = 0; c < 3; ++c) difference += fabs((double)x[c] - y[c]), level += (double)x[c] + y[c];
+    double apart = level > 0 ? difference / (level * ALIKE) : 0;
+    if (apart >= 1 || !f->flat[a] || !f->flat[b]) return;
+    float weight = (float)((1 - apart * apart) * (1 - apart * apart));
+    for (int c = 0; c < 3; ++c) sums[4 * (size_t)a + (size_t)c] += weight * y[c];
+    sums[4 * (size_t)a + 3] += weight;
+}
+
+/* Evens out the noise of few rays where the eye would see it, on flat ground: neighbours whose light is alike
+ * but for it take each other's mean, those across a border do not. */
+static fct_result even_out(const fct_env *env, fct_surface *f) {
+    const fct_mesh *m = &f->mesh;
+    float *sums = fct_allocate(env, 4 * (size_t)m->vertex_count, sizeof *sums);
+    if (!sums) return fct_fail_memory(env, "the output");
+    for (int pass = 0; pass < 2; ++pass) {
+        memset(sums, 0, 4 * (size_t)m->vertex_count * sizeof *sums);
+        for (size_t i = 0; i < m->face_count; ++i)
+            for (int k = 0; k < 3; ++k) {
+                uint32_t a = m->triangles[3 * i + (size_t)k], b = m->triangles[3 * i + (size_t)(k + 1) % 3];
+                mix(f, a, b, sums);
+                mix(f, b, a, sums);
+            }
+        for (size_t v = 0; v < m->vertex_count; ++v)
+            for (int c = 0; c < 3; ++c)
+                m->colors[3 * v + (size_t)c] =
+                    (m->colors[3 * v + (size_t)c] + sums[4 * v + (size_t)c]) / (1 + sums[4 * v + 3]);
+    }
+    fct_release(env, sums);
+    return FCT_OK;
+}
+
 static void turn_over(fct_mesh *mesh) {
     for (size_t f = 0; f < mesh->face_count; ++f) {
         uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
@@ -149,6 +187,7 @@ fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mes
         result = fct_surface_refine(env, &surface, crosses_border, &l, &added);
         if (added == 0) break;
     }
+    if (result == FCT_OK && s->def.final != FCT_FINAL_NONE) result = even_out(env, &surface);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};
