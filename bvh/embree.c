@@ -45,9 +45,10 @@ static bool count_memory(void *user, ssize_t bytes, bool post) {
     return true;
 }
 
-static fct_result check_device(const fct_env *env, RTCDevice device) {
+/* `made`: what was asked for is there; without it there is an error, whatever the device says. */
+static fct_result check_device(const fct_env *env, RTCDevice device, bool made) {
     enum RTCError error = rtcGetDeviceError(device);
-    if (error == RTC_ERROR_NONE) return FCT_OK;
+    if (made && error == RTC_ERROR_NONE) return FCT_OK;
     if (error == RTC_ERROR_OUT_OF_MEMORY) return fct_fail_memory(env, "Embree");
     return fct_fail(env, FCT_ERROR_INTERNAL, "Embree failed with error %d", (int)error);
 }
@@ -74,11 +75,11 @@ static fct_result build_scene(const fct_bvh *bvh, fct_embree *embree) {
     char config[64];
     snprintf(config, sizeof config, "threads=%u", fct_env_threads(bvh->env));
     embree->device = rtcNewDevice(config);
-    if (!embree->device) return check_device(bvh->env, NULL);
+    if (!embree->device) return check_device(bvh->env, NULL, false);
     rtcSetDeviceMemoryMonitorFunction(embree->device, count_memory, embree);
     embree->scene = rtcNewScene(embree->device);
     RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (!embree->scene || !geometry) return check_device(bvh->env, embree->device);
+    if (!embree->scene || !geometry) return check_device(bvh->env, embree->device, false);
     rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, embree->positions, 0,
                                12, bvh->view.vertex_count);
@@ -88,7 +89,7 @@ static fct_result build_scene(const fct_bvh *bvh, fct_embree *embree) {
     rtcAttachGeometryByID(embree->scene, geometry, 0);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(embree->scene);
-    return check_device(bvh->env, embree->device);
+    return check_device(bvh->env, embree->device, true);
 }
 
 fct_result fct_embree_create(fct_bvh *bvh) {

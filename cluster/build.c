@@ -90,15 +90,27 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     return result;
 }
 
+/* Larger weights would make costs that a float cannot hold. */
+static fct_result check_def(const fct_env *env, const fct_tree_def *def) {
+    if (def->size != sizeof *def)
+        return fct_fail(env, FCT_ERROR_DATA, "fct_tree_def has size %u, this library's is %zu", def->size,
+                        sizeof *def);
+    const double weights[3] = {def->fit_weight, def->direction_weight, def->shape_weight};
+    for (int k = 0; k < 3; ++k)
+        if (!(weights[k] <= 1e30))
+            return fct_fail(env, FCT_ERROR_DATA, "a weight of %g, expected at most 1e30", weights[k]);
+    if (isnan(def->max_cost)) return fct_fail(env, FCT_ERROR_DATA, "the largest cost is no number");
+    return FCT_OK;
+}
+
 fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                           fct_tree_stats *stats, fct_tree **out) {
     *out = NULL;
     fct_tree_def options = def ? *def : fct_tree_def_default();
-    if (options.size != sizeof options)
-        return fct_fail(env, FCT_ERROR_INTERNAL, "fct_tree_def has size %u, this library's is %zu",
-                        options.size, sizeof options);
+    fct_result result = check_def(env, &options);
+    if (result != FCT_OK) return result;
     if (mesh->face_count == 0) return fct_fail(env, FCT_ERROR_DATA, "a mesh without faces has no tree");
-    fct_result result = fct_mesh_validate(env, mesh);
+    result = fct_mesh_validate(env, mesh);
     if (result != FCT_OK) return result;
     fct_tree *tree = fct_tree_new(env);
     if (!tree) return fct_fail_memory(env, "the tree");

@@ -2,8 +2,8 @@
  *
  * Every inner node's children have larger ids and their ranges are the two parts of its own; roots tile the
  * faces. From that follows that each node is reached exactly once: ranges of different subtrees are disjoint,
- * and F - R inner nodes above F leaves are exactly as many as there are. Chunks note the first thing wrong;
- * the first chunk that has one is reported, whatever the threads. O(F).
+ * and F - R inner nodes above F leaves are exactly as many as there are. All numbers are finite. Chunks note
+ * the first thing wrong; the first chunk that has one is reported, whatever the threads. O(F).
  */
 #include <string.h>
 
@@ -23,10 +23,20 @@ typedef struct checker {
     uint32_t *seen; /* bits */
 } checker;
 
+/* By their exponents, for that is done for many at once. */
+static bool all_finite(const void *floats, size_t count) {
+    const uint32_t exponent = 0x7F800000;
+    const uint32_t *bits = floats;
+    uint32_t endless = 0;
+    for (size_t i = 0; i < count; ++i) endless |= (bits[i] & exponent) == exponent;
+    return endless == 0;
+}
+
 static const char *node_fault(const fct_tree_view *view, uint32_t i) {
     const fct_cluster *c = &view->clusters[i];
     uint32_t nodes = view->node_count, faces = view->face_count, place = c->first;
     if (c->count < 2 || c->count > faces || c->first > faces - c->count) return "range outside the faces";
+    if (!all_finite(c, offsetof(fct_cluster, child) / sizeof(float))) return "a number that is not finite";
     if (!(c->cost <= (i ? view->clusters[i - 1].cost : INFINITY))) return "cost above that of a later merge";
     for (int k = 0; k < 2; ++k) {
         uint32_t child = c->child[k];
@@ -58,6 +68,14 @@ static void check_triangles(void *user, size_t begin, size_t end, size_t chunk, 
         else if (view->materials && view->materials[f] >= view->material_count)
             check->faults[chunk] = (fault){"material out of range", (uint32_t)f};
     }
+}
+
+static void check_positions(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    checker *check = user;
+    for (size_t v = begin; v < end && !check->faults[chunk].what; ++v)
+        if (!all_finite(check->view->positions + 3 * v, 3))
+            check->faults[chunk] = (fault){"a position that is not finite", (uint32_t)v};
 }
 
 static fct_result run(const fct_env *env, const char *name, const char *kind, size_t count, checker *check,
@@ -106,6 +124,7 @@ static fct_result check_all(const fct_env *env, const char *name, fct_tree *tree
     fct_result result = run(env, name, "node", view->node_count, check, check_nodes);
     if (result == FCT_OK) result = check_roots(env, name, view);
     if (result == FCT_OK) result = run(env, name, "face at place", view->face_count, check, check_triangles);
+    if (result == FCT_OK) result = run(env, name, "vertex", view->vertex_count, check, check_positions);
     if (result == FCT_OK)
         result = check_permutation(env, name, "the face", view->face_ids, view->face_count, check->seen);
     if (result == FCT_OK)

@@ -15,14 +15,6 @@ typedef struct verifier {
     uint32_t *nodes;
 } verifier;
 
-static bool all_finite(const fct_cluster *c) {
-    float numbers[offsetof(fct_cluster, child) / sizeof(float)];
-    memcpy(numbers, c, sizeof numbers);
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i)
-        if (!isfinite(numbers[i])) return false;
-    return true;
-}
-
 /* Within rounding of a float and of the largest term. */
 static bool alike(double stored, double value, double size) {
     if (size > FLT_MAX) return true; /* held at the end of the range */
@@ -30,7 +22,6 @@ static bool alike(double stored, double value, double size) {
 }
 
 static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
-    if (!all_finite(c)) return "a number that is not finite";
     fct_box box;
     fct_cluster_box(c, &box);
     v3 center = v3_load(box.center),

@@ -56,7 +56,7 @@ typedef struct fct_tree_def {
     fct_cluster_method method;
     fct_cluster_cost cost;
     fct_fit_measure fit_measure;
-    double fit_weight, direction_weight, shape_weight; /* negative: the default of the chosen cost */
+    double fit_weight, direction_weight, shape_weight; /* at most 1e30; negative: the chosen cost's default */
     uint32_t root_count;                               /* stop at this many clusters; at least 1; default 1 */
     double max_cost;      /* no merge above this cost; default infinity. What is left over are roots */
     const char *source;   /* name recorded in the file, or NULL */
@@ -71,7 +71,8 @@ typedef struct fct_tree_stats {
 /* Builds the tree. Any valid mesh with at least one face; disconnected parts are joined by proximity under
  * one root. Where mesh->materials is present, clusters of different materials are merged only after all
  * merges along edges within a material are done. Depth at most 3 log2 F for one root. The mesh is copied. def
- * may be NULL (the defaults), stats too. Errors: DATA (no faces, invalid mesh), MEMORY, CANCELLED. */
+ * may be NULL (the defaults), stats too. Errors: DATA (no faces, invalid mesh, options out of range), MEMORY,
+ * CANCELLED. */
 FCT_API fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                                   fct_tree_stats *stats, fct_tree **out);
 FCT_API void fct_tree_destroy(fct_tree *tree);
@@ -127,9 +128,9 @@ FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, co
 
 /* Writes the hierarchy file: temporary file, fsync, rename. Errors: OUTPUT, MEMORY. */
 FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);
-/* Maps a hierarchy file read-only, validates the header in O(1) and what traversals rely on (links, ranges,
- * indices) in one parallel pass, so that no file can crash a later query; docs/hierarchy-file.md. Errors:
- * INPUT, DATA, MEMORY. */
+/* Maps a hierarchy file read-only, validates the header in O(1) and what queries rely on (links, ranges,
+ * indices, finite numbers) in one pass, so that no file can crash a later query; docs/hierarchy-file.md.
+ * Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out);
 /* Reads everything: checksums, ranges, children, containment of vertices in boxes, areas. Errors: DATA with
  * what is wrong. */

@@ -81,6 +81,38 @@ static void no_faces_is_an_error(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+static void options_out_of_range(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh mesh = make_grid(&env, 3);
+    fct_tree *tree;
+    const double bad[3] = {NAN, INFINITY, 2e30};
+    for (int k = 0; k < 9; ++k) {
+        fct_tree_def def = fct_tree_def_default();
+        *(k % 3 == 0 ? &def.fit_weight : k % 3 == 1 ? &def.direction_weight : &def.shape_weight) = bad[k / 3];
+        assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_ERROR_DATA);
+        assert_null(tree);
+        assert_non_null(strstr(r.text, "at most 1e30"));
+    }
+    fct_tree_def def = fct_tree_def_default();
+    def.max_cost = NAN;
+    assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_ERROR_DATA);
+    def = fct_tree_def_default();
+    def.size = 8;
+    assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_ERROR_DATA);
+    for (int cost = 0; cost < 2; ++cost) { /* the largest there are: still a tree of finite numbers */
+        def = fct_tree_def_default();
+        def.cost = cost ? FCT_COST_MEAN : FCT_COST_INCREMENT;
+        def.fit_weight = def.direction_weight = def.shape_weight = 1e30;
+        assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
+        assert_int_equal(fct_tree_verify(&env, tree), FCT_OK);
+        fct_tree_destroy(tree);
+    }
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+}
+
 static void degenerate_faces(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -266,6 +298,7 @@ static void no_memory_for_odd_shapes(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(one_and_two_faces),
                                        cmocka_unit_test(no_faces_is_an_error),
+                                       cmocka_unit_test(options_out_of_range),
                                        cmocka_unit_test(degenerate_faces),
                                        cmocka_unit_test(extents),
                                        cmocka_unit_test(scattered_triangles),

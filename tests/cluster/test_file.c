@@ -157,6 +157,51 @@ static void damage_is_found(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
+/* The section's bytes of a saved tree, found by their content. */
+static unsigned char *find_bytes(unsigned char *bytes, size_t size, const void *what, size_t length) {
+    for (size_t i = 448; i + length <= size; ++i)
+        if (!memcmp(bytes + i, what, length)) return bytes + i;
+    return NULL;
+}
+
+static void endless_numbers_do_not_open(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 3, &mesh), *back;
+    fct_tree_view view = fct_tree_get(tree);
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    fct_file file;
+    assert_int_equal(fct_file_open(&env, path, &file), FCT_OK);
+    unsigned char *bytes = malloc(file.size);
+    memcpy(bytes, file.data, file.size);
+    const void *section[2] = {view.clusters, view.positions};
+    size_t floats[2] = {view.node_count * sizeof(fct_cluster) / 4, 3 * (size_t)view.vertex_count};
+    const float wrong[3] = {NAN, INFINITY, -INFINITY};
+    for (size_t s = 0; s < 2; ++s) {
+        unsigned char *at = find_bytes(bytes, file.size, section[s], 4 * floats[s]);
+        assert_non_null(at);
+        for (size_t i = 0; i < floats[s]; ++i) {
+            if (s == 0 && i % 33 >= 29) continue; /* children and range */
+            unsigned char old[4];
+            memcpy(old, at + 4 * i, 4);
+            memcpy(at + 4 * i, &wrong[i % 3], 4);
+            assert_int_equal(fct_tree_parse(&env, "file", bytes, file.size, &back), FCT_ERROR_DATA);
+            assert_non_null(strstr(quiet.text, "not finite"));
+            memcpy(at + 4 * i, old, 4);
+        }
+    }
+    assert_int_equal(fct_tree_parse(&env, "file", bytes, file.size, &back), FCT_OK);
+    fct_tree_destroy(back);
+    free(bytes);
+    fct_file_close(&env, &file);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    unlink(path);
+    assert_int_equal(quiet.alive, 0);
+}
+
 static void errors_are_told(void **state) {
     (void)state;
     recorder r = {0};
@@ -202,8 +247,9 @@ static void survives_no_memory(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(comes_back), cmocka_unit_test(one_face_comes_back),
-                                       cmocka_unit_test(damage_is_found), cmocka_unit_test(errors_are_told),
-                                       cmocka_unit_test(survives_no_memory)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(comes_back),      cmocka_unit_test(one_face_comes_back),
+        cmocka_unit_test(damage_is_found), cmocka_unit_test(endless_numbers_do_not_open),
+        cmocka_unit_test(errors_are_told), cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
