@@ -8,6 +8,7 @@
  */
 #include <math.h>
 
+#include "bvh/bvh.h"
 #include "scene/scene.h"
 #include "scene/transform.h"
 
@@ -24,29 +25,6 @@ typedef struct search {
     uint32_t instance;
     fct_closest best;
 } search;
-
-/* Barycentrics (u, v) of the triangle's point nearest to p, by the regions of its corners and sides. */
-static v3 nearest_on_triangle(v3 p, v3 a, v3 b, v3 c, double *u, double *v) {
-    v3 ab = v3_sub(b, a), ac = v3_sub(c, a), ap = v3_sub(p, a), bp = v3_sub(p, b), cp = v3_sub(p, c);
-    double d1 = v3_dot(ab, ap), d2 = v3_dot(ac, ap), d3 = v3_dot(ab, bp), d4 = v3_dot(ac, bp),
-           d5 = v3_dot(ab, cp), d6 = v3_dot(ac, cp);
-    double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
-    if (d1 <= 0 && d2 <= 0)
-        *u = 0, *v = 0;
-    else if (d3 >= 0 && d4 <= d3)
-        *u = 1, *v = 0;
-    else if (d6 >= 0 && d5 <= d6)
-        *u = 0, *v = 1;
-    else if (vc <= 0 && d1 >= 0 && d3 <= 0)
-        *u = d1 / (d1 - d3), *v = 0;
-    else if (vb <= 0 && d2 >= 0 && d6 <= 0)
-        *u = 0, *v = d2 / (d2 - d6);
-    else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-        *v = (d4 - d3) / ((d4 - d3) + (d5 - d6)), *u = 1 - *v;
-    else
-        *u = vb / (va + vb + vc), *v = vc / (va + vb + vc);
-    return v3_mad(v3_mad(a, *u, ab), *v, ac);
-}
 
 static double box_distance(const fct_cluster *cluster, v3 p) {
     fct_box box;
@@ -67,7 +45,7 @@ static void try_triangle(search *s, const fct_tree_view *view, const float *to_w
     for (int k = 0; k < 3; ++k)
         corner[k] = fct_transform_point(
             to_world, v3_load(view->positions + 3 * (size_t)view->triangles[3 * (size_t)place + k]));
-    v3 nearest = nearest_on_triangle(s->point, corner[0], corner[1], corner[2], &u, &v);
+    v3 nearest = fct_triangle_closest(s->point, corner[0], corner[1], corner[2], &u, &v);
     double distance = v3_norm(v3_sub(nearest, s->point));
     uint32_t face = view->face_ids[place];
     if (!(distance <= s->distance)) return;

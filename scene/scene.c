@@ -268,6 +268,8 @@ fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_me
     fct_scene_frame frame;
     fct_result result = set_transform(env, name, transform, &probe, &frame);
     if (result == FCT_OK && !tree) result = fct_mesh_validate(env, mesh);
+    if (result == FCT_OK && !tree && mesh->face_count == 0)
+        result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\" has no faces", name);
     for (uint32_t f = 0; result == FCT_OK && face_materials && f < mesh->face_count; ++f)
         if (face_materials[f] >= scene->material_count)
             result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\": face %u has material %u of %u", name, f,

@@ -5,6 +5,7 @@
  */
 #include "scene/transform.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "base/env.h"
@@ -51,6 +52,8 @@ fct_transform_kind fct_transform_set(const float m[12], fct_instance *instance, 
     }
     if (!all_finite(instance->to_model, 12) || !all_finite(instance->normal_matrix, 9))
         return FCT_TRANSFORM_SINGULAR;
+    for (int j = 0; j < 3; ++j)
+        if (v3_norm(cofactor[j]) < (double)FLT_MIN) return FCT_TRANSFORM_SINGULAR;
     instance->uniform_scale = (float)rotation_scale(column);
     instance->mirrored = det < 0;
     return FCT_TRANSFORM_GOOD;

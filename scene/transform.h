@@ -10,8 +10,8 @@ extern const float fct_transform_identity[12];
 typedef enum fct_transform_kind {
     FCT_TRANSFORM_GOOD,
     FCT_TRANSFORM_NOT_FINITE,
-    FCT_TRANSFORM_SINGULAR /* |det R| is below 1e-6 of the product of the columns' lengths, or the inverse
-                              overflows a float */
+    FCT_TRANSFORM_SINGULAR /* |det R| is below 1e-6 of the product of the columns' lengths, or the inverse or
+                              the normal matrix is beyond a float, too large or too small */
 } fct_transform_kind;
 
 /* Fills to_world, to_model, normal_matrix, uniform_scale and mirrored. `inverse` receives to_model in double:

@@ -12,6 +12,8 @@
 
 #include "scene/scene.h"
 
+#define PAD 0x1p-21f /* of the scene's largest extent */
+
 typedef struct entry {
     float key;
     uint32_t instance;
@@ -155,11 +157,14 @@ static uint32_t collect(const fct_volume *volumes, uint32_t root, uint32_t slots
     return count;
 }
 
-static void set_slot(fct_scene_node *node, uint32_t slot, const fct_volume *volume, uint32_t child) {
+/* Boxes are widened by `pad`, for a ray that runs in the plane of a box's side never enters the bare box. */
+static void set_slot(fct_scene_node *node, uint32_t slot, const fct_volume *volume, float pad,
+                     uint32_t child) {
     node->child[slot] = child;
     for (int c = 0; c < 3; ++c) {
-        node->bounds[2 * c][slot] = volume ? volume->bounds.lower[c] : INFINITY;
-        node->bounds[2 * c + 1][slot] = volume ? volume->bounds.upper[c] : -INFINITY;
+        node->bounds[2 * c][slot] = volume ? nextafterf(volume->bounds.lower[c] - pad, -INFINITY) : INFINITY;
+        node->bounds[2 * c + 1][slot] =
+            volume ? nextafterf(volume->bounds.upper[c] + pad, INFINITY) : -INFINITY;
     }
 }
 
@@ -175,17 +180,20 @@ fct_result fct_scene_build_nodes(const fct_env *env, uint32_t count, const fct_v
         return fct_fail_memory(env, "the volumes of a scene");
     }
     uint32_t node_count = 1;
+    float size = 0;
+    for (int c = 0; c < 3; ++c) size = fmaxf(size, volumes[0].bounds.upper[c] - volumes[0].bounds.lower[c]);
+    const float pad = PAD * size;
     origins[0] = 0;
     for (uint32_t n = 0; n < node_count; ++n) {
         uint32_t slots[FCT_SCENE_WIDTH], used = collect(volumes, origins[n], slots);
         for (uint32_t k = 0; k < FCT_SCENE_WIDTH; ++k) {
             if (k >= used) {
-                set_slot(nodes + n, k, NULL, FCT_NONE);
+                set_slot(nodes + n, k, NULL, 0, FCT_NONE);
                 continue;
             }
             const fct_volume *volume = volumes + slots[k];
             uint32_t child = volume->instance != FCT_NONE ? FCT_SCENE_LEAF | volume->instance : node_count;
-            set_slot(nodes + n, k, volume, child);
+            set_slot(nodes + n, k, volume, pad, child);
             if (volume->instance == FCT_NONE) origins[node_count++] = slots[k];
         }
     }

@@ -154,6 +154,69 @@ static void rays_agree_with_brute_force(void **unused) {
     }
 }
 
+/* Along every edge of a cube in the plane of one of its sides: the bounds of the instance are met as surely
+ * as the model's own. */
+static void rays_in_the_plane_of_a_side_hit(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 8, 12, 0, &mesh), FCT_OK);
+    for (int k = 0; k < 24; ++k) mesh.positions[k] = (float)(k / 3 >> k % 3 & 1);
+    static const uint32_t sides[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    memcpy(mesh.triangles, sides, sizeof sides);
+    fct_material material = {.name = "m"};
+    fct_scene *scene;
+    uint32_t id;
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    float far_away[12] = {1, 0, 0, 40, 0, 1, 0, 0, 0, 0, 1, 0};
+    assert_int_equal(fct_scene_add_object(scene, "cube", &mesh, NULL, NULL, id, NULL), FCT_OK);
+    assert_int_equal(fct_scene_add_instance(scene, "other", 0, far_away, FCT_NONE), FCT_OK);
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    const fct_bvh *model = fct_scene_get(scene).models[0].bvh;
+    for (int k = 0; k < 24; ++k) {
+        int along = k % 3, side = (along + 1 + k / 3 % 2) % 3;
+        fct_ray ray = {{.5f, .5f, .5f}, 1e-3f, {0, 0, 0}, INFINITY};
+        ray.origin[along] = -2, ray.direction[along] = 1;
+        ray.origin[side] = (float)(k / 6 % 2);
+        ray.direction[side] = k < 12 ? 0.0f : -0.0f;
+        fct_scene_hit hit;
+        fct_hit expected;
+        assert_true(fct_bvh_closest_hit(model, &ray, &expected, NULL));
+        assert_true(fct_scene_closest_hit(scene, &ray, &hit, NULL));
+        assert_true(hit.t == expected.t && hit.instance == 0);
+        assert_true(fct_scene_any_hit(scene, &ray, NULL));
+    }
+    fct_scene_destroy(scene);
+    fct_mesh_release(&env, &mesh);
+}
+
+/* Where areas cannot be told any more, and where there is nothing to place. */
+static void what_has_no_area_is_refused(void **unused) {
+    (void)unused;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_material material = {.name = "m"};
+    fct_mesh mesh = make_grid(&env, 2), none = {0};
+    fct_scene *scene;
+    uint32_t id, labels[1] = {0};
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    float small[12] = {1e-25f, 0, 0, 0, 0, 1e-25f, 0, 0, 0, 0, 1e-25f, 0};
+    assert_int_equal(fct_scene_add_object(scene, "small", &mesh, NULL, small, id, NULL), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "singular"));
+    for (int k = 0; k < 12; ++k) small[k] *= 1e10f;
+    assert_int_equal(fct_scene_add_object(scene, "larger", &mesh, NULL, small, id, NULL), FCT_OK);
+    assert_int_equal(fct_scene_add_object(scene, "none", &none, NULL, NULL, id, NULL), FCT_ERROR_DATA);
+    assert_int_equal(fct_scene_add_object(scene, "none", &none, NULL, NULL, id, labels), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "no faces"));
+    assert_int_equal(fct_scene_get(scene).object_count, 1);
+    fct_scene_destroy(scene);
+    fct_mesh_release(&env, &mesh);
+    assert_int_equal(r.alive, 0);
+}
+
 static void useless_rays_hit_nothing(void **unused) {
     (void)unused;
     fct_env env = fct_env_default();
@@ -315,6 +378,8 @@ static void volumes_hold_every_instance_once(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_agree_with_brute_force),
+        cmocka_unit_test(rays_in_the_plane_of_a_side_hit),
+        cmocka_unit_test(what_has_no_area_is_refused),
         cmocka_unit_test(useless_rays_hit_nothing),
         cmocka_unit_test(closest_points_agree_with_brute_force),
         cmocka_unit_test(instances_say_what_their_transforms_do),
