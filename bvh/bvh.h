@@ -162,5 +162,8 @@ typedef struct fct_near {
     uint32_t place;
 } fct_near;
 bool fct_bvh_near(const fct_bvh *bvh, v3 point, double max_distance, fct_near *out, fct_visits *visits);
+/* Among all faces within max_distance, that whose normal is closest to `normal`, then the nearest, then the
+ * lowest id. Faces without area agree with nothing. */
+bool fct_bvh_facing(const fct_bvh *bvh, v3 point, v3 normal, double max_distance, fct_near *out);
 
 #endif

@@ -17,6 +17,9 @@ typedef struct search {
     double u, v;
     uint32_t place;
     fct_visits visits;
+    /* Where set, faces within the first best2 compete by how well they agree with this unit normal. */
+    const v3 *normal;
+    double agreement, facing2; /* cosine and squared distance of the best */
 } search;
 
 static void set_best(search *s, double best2) {
@@ -54,6 +57,21 @@ static uint32_t near_oriented(const fct_oriented_node *node, const float centere
     return f8_le(sum, f8_set(limit2));
 }
 
+/* A face within reach: takes it if it agrees better with the wanted normal than those before. */
+static void consider_facing(search *s, const v3 p[3], double d2, double u, double v, uint32_t place) {
+    if (!(d2 <= s->best2)) return;
+    v3 n = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+    double agreement = v3_norm2(n) > 0 ? v3_dot(n, *s->normal) : -2;
+    const uint32_t *ids = s->bvh->view.face_ids;
+    if (s->place != FCT_NONE) {
+        if (agreement < s->agreement) return;
+        bool tie = agreement == s->agreement;
+        if (tie && (d2 > s->facing2 || (d2 == s->facing2 && ids[place] > ids[s->place]))) return;
+    }
+    s->agreement = agreement, s->facing2 = d2;
+    s->u = u, s->v = v, s->place = place;
+}
+
 static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     const float *rows = fct_leaf_vertices(leaf);
     const uint8_t *corners = fct_leaf_corners(leaf) + 24 * (number / 8) + number % 8;
@@ -67,6 +85,10 @@ static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     v3 q = fct_triangle_closest(s->point, p[0], p[1], p[2], &u, &v);
     double d2 = v3_norm2(v3_sub(q, s->point));
     uint32_t place = leaf->first + number;
+    if (s->normal) {
+        consider_facing(s, p, d2, u, v, place);
+        return;
+    }
     const uint32_t *ids = s->bvh->view.face_ids;
     if (!(d2 < s->best2 || (d2 == s->best2 && (s->place == FCT_NONE || ids[place] < ids[s->place])))) return;
     s->u = u, s->v = v, s->place = place;
@@ -171,6 +193,16 @@ static void place_point(search *s) {
     }
 }
 
+static void give(const search *s, double distance2, fct_near *out) {
+    const fct_tree_view *view = &s->bvh->view;
+    const uint32_t *t = view->triangles + 3 * (size_t)s->place;
+    v3 a = v3_load(view->positions + 3 * (size_t)t[0]), b = v3_load(view->positions + 3 * (size_t)t[1]),
+       c = v3_load(view->positions + 3 * (size_t)t[2]);
+    double scale = s->bvh->scale;
+    *out = (fct_near){.distance2 = distance2 / scale / scale, .u = s->u, .v = s->v, .place = s->place};
+    out->point = v3_add(v3_scale(a, 1 - s->u - s->v), v3_add(v3_scale(b, s->u), v3_scale(c, s->v)));
+}
+
 bool fct_bvh_near(const fct_bvh *bvh, v3 point, double max_distance, fct_near *out, fct_visits *visits) {
     search s = {.bvh = bvh, .point = v3_scale(point, bvh->scale), .place = FCT_NONE};
     double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
@@ -185,12 +217,20 @@ bool fct_bvh_near(const fct_bvh *bvh, v3 point, double max_distance, fct_near *o
         visits->triangles += s.visits.triangles;
     }
     if (s.place == FCT_NONE) return false;
-    const fct_tree_view *view = &bvh->view;
-    const uint32_t *t = view->triangles + 3 * (size_t)s.place;
-    v3 a = v3_load(view->positions + 3 * (size_t)t[0]), b = v3_load(view->positions + 3 * (size_t)t[1]),
-       c = v3_load(view->positions + 3 * (size_t)t[2]);
-    *out = (fct_near){.distance2 = s.best2 / bvh->scale / bvh->scale, .u = s.u, .v = s.v, .place = s.place};
-    out->point = v3_add(v3_scale(a, 1 - s.u - s.v), v3_add(v3_scale(b, s.u), v3_scale(c, s.v)));
+    give(&s, s.best2, out);
+    return true;
+}
+
+bool fct_bvh_facing(const fct_bvh *bvh, v3 point, v3 normal, double max_distance, fct_near *out) {
+    search s = {.bvh = bvh, .point = v3_scale(point, bvh->scale), .place = FCT_NONE, .normal = &normal};
+    double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
+    if (bvh->embree || !(size < INFINITY) || !(max_distance >= 0)) return false;
+    place_point(&s);
+    double reach = max_distance * bvh->scale;
+    set_best(&s, reach * reach);
+    run_search(&s);
+    if (s.place == FCT_NONE) return false;
+    give(&s, s.facing2, out);
     return true;
 }
 
