@@ -7,6 +7,7 @@
  */
 #include "cluster/file.h"
 
+#include <inttypes.h>
 #include <string.h>
 
 #include <xxhash.h>
@@ -293,6 +294,11 @@ fct_result fct_tree_check_sums(const fct_env *env, const fct_tree *tree) {
         if (XXH3_64bits(tree->file.data + s->offset, s->size) != s->checksum)
             return fct_fail(env, FCT_ERROR_DATA, "the checksum of the section of %s is wrong",
                             section_names[i]);
+        uint64_t end = i + 1 < SECTIONS ? h->sections[i + 1].offset : h->file_size;
+        for (uint64_t at = s->offset + s->size; at < end; ++at)
+            if (tree->file.data[at])
+                return fct_fail(env, FCT_ERROR_DATA, "byte %" PRIu64 ", after the section of %s, is not zero",
+                                at, section_names[i]);
     }
     return FCT_OK;
 }
