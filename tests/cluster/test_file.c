@@ -16,8 +16,8 @@ static fct_tree *build_small(const fct_env *env, uint32_t n, fct_mesh *mesh) {
     mesh->material_names = fct_allocate_zero(env, 2, sizeof *mesh->material_names);
     mesh->material_count = 2;
     for (int i = 0; i < 2; ++i) {
-        mesh->material_names[i] = fct_allocate(env, 8, 1);
-        snprintf(mesh->material_names[i], 8, "name %d", i);
+        mesh->material_names[i] = fct_allocate(env, 16, 1);
+        snprintf(mesh->material_names[i], 16, "name %d", i);
     }
     for (uint32_t f = 0; f < mesh->face_count; ++f) mesh->materials[f] = f % 7 == 0;
     for (uint32_t v = 0; v < 3 * mesh->vertex_count; ++v) mesh->colors[v] = (float)v;
