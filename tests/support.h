@@ -15,6 +15,13 @@
 #include "base/env.h"
 #include "facetree/mesh.h"
 
+/* Instrumented code is ten times slower: tests of figures skip their large cases. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SANITIZED 1
+#else
+#define SANITIZED 0
+#endif
+
 /* The last message, and an allocator that fails when `allocations` reaches fail_at (0: never) and counts what
  * is alive. */
 typedef struct recorder {
