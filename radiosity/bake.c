@@ -6,6 +6,9 @@
 #include "radiosity/reference.h"
 
 #define DEFAULT_ERROR 2e-5
+/* Diagonals of bounds whose parts have areas that floats can tell. */
+#define LEAST_SIZE 1e-15
+#define MOST_SIZE  1e18
 
 enum { PASSES = 5, REFERENCE_SAMPLES = 256 };
 
@@ -40,7 +43,7 @@ static fct_result solve(fct_bake *bake) {
     if (result != FCT_OK) return result;
     /* the threshold starts sixteen times larger and is halved with each pass: early passes know little of the
      * light */
-    double power = emitted_power(&s->elements), last = s->def.error * power, change = 0;
+    double power = emitted_power(&s->elements), last = s->def.error * power;
     for (int pass = 0; pass < PASSES && power > 0; ++pass) {
         double epsilon = last * (1 << (PASSES - 1 - pass));
         double start = fct_seconds();
@@ -49,7 +52,7 @@ static fct_result solve(fct_bake *bake) {
         if (result != FCT_OK) return result;
         start = fct_seconds();
         uint32_t most = pass + 1 < PASSES ? 4 : 100;
-        result = fct_links_solve(&s->elements, &s->links, 1e-3, most, &change, &stats->passes);
+        result = fct_links_solve(&s->elements, &s->links, 1e-3, most, &stats->passes);
         stats->seconds_solve += fct_seconds() - start;
         if (result != FCT_OK) return result;
     }
@@ -72,18 +75,34 @@ static fct_result solve(fct_bake *bake) {
     return FCT_OK;
 }
 
+/* Areas are floats in the hierarchies: where they end or vanish, so would the light. What is a single point
+ * is as dark as it should be. */
+static fct_result check_extents(const fct_env *env, const fct_scene_view *view) {
+    for (uint32_t m = 0; m <= view->model_count; ++m) {
+        fct_bounds b = m < view->model_count ? fct_bvh_bounds(view->models[m].bvh) : view->bounds;
+        double size = v3_norm(v3_sub(v3_load(b.upper), v3_load(b.lower)));
+        if (size != 0 && !(size >= LEAST_SIZE && size <= MOST_SIZE))
+            return fct_fail(env, FCT_ERROR_DATA, "%s is %g across, light needs %g to %g",
+                            m < view->model_count ? view->models[m].name : "the scene", size, LEAST_SIZE,
+                            MOST_SIZE);
+    }
+    return FCT_OK;
+}
+
 fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                            fct_bake **out) {
     *out = NULL;
     if (def->size != sizeof *def || !(def->error > 0) || !(def->max_edge >= 0))
-        return fct_fail(env, FCT_ERROR_DATA, "bake: error must be positive and max_edge not negative");
+        return fct_fail(env, FCT_ERROR_DATA, "error must be positive and max_edge not negative");
+    fct_scene_view view = fct_scene_get(scene);
+    fct_result result = check_extents(env, &view);
+    if (result != FCT_OK) return result;
     fct_bake *bake = fct_allocate_zero(env, 1, sizeof *bake);
     if (!bake) return fct_fail_memory(env, "a bake");
     fct_solution *s = &bake->solution;
     s->env = env, s->scene = scene, s->def = *def;
     s->max_edge = def->max_edge > 0 ? def->max_edge : fct_surface_default_edge(scene);
     s->fineness = fmin(fmax(sqrt(DEFAULT_ERROR / def->error), .25), 16);
-    fct_result result = FCT_OK;
     if (def->method == FCT_BAKE_FACE) {
         result = fct_lamps_create(env, scene, &s->lamps);
         if (result == FCT_OK) result = fct_elements_create(env, scene, s->max_edge / 4, &s->elements);
@@ -94,7 +113,7 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
         }
     } else {
         bake->stats.converged = true;
-        s->elements.view = fct_scene_get(scene);
+        s->elements.view = view;
     }
     if (result != FCT_OK) {
         fct_bake_destroy(bake);

@@ -414,8 +414,14 @@ uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool ba
     const fct_instance *in = &set->view.instances[instance];
     if (back && !set->view.materials[in->material].two_sided) return FCT_NONE;
     uint32_t id = set->roots[instance] + (back ? set->root_counts[instance] : 0);
-    for (uint32_t last = id + set->root_counts[instance]; id < last; ++id)
-        if (place - set->ranges[id].first < set->ranges[id].count) break;
+    for (uint32_t last = id + set->root_counts[instance] - 1;
+         id < last;) { /* roots tile the places in order */
+        uint32_t middle = id + (last - id + 1) / 2;
+        if (set->ranges[middle].first <= place)
+            id = middle;
+        else
+            last = middle - 1;
+    }
     float w = 1 - u - v;
     for (;;) {
         const fct_element_range *r = &set->ranges[id];

@@ -2,8 +2,8 @@
  *
  * Input: elements with the radiosities known so far. Output: links so fine that none is uncertain by more
  * than epsilon. Pairs are worked through in rounds: each round judges all its pairs in parallel (visibility
- * rays included) and then splits in order, so that the result does not depend on threads. Source:
- * radiosity.md of the design's study; Hanrahan, Salzman, Aupperle 1991 for the scheme.
+ * rays included) and then splits in order, so that the result does not depend on threads. Derived in
+ * docs/radiosity.md; Hanrahan, Salzman, Aupperle 1991 for the scheme.
  */
 #include "radiosity/link.h"
 
@@ -232,7 +232,7 @@ fct_result fct_links_refine(fct_elements *set, fct_links *links, double epsilon,
                             double done) {
     const fct_env *env = set->env;
     fct_link *pairs = links->items;
-    size_t pair_count = links->count, pair_capacity = links->capacity;
+    size_t pair_count = links->count;
     links->items = NULL;
     links->count = links->capacity = 0;
     fct_result result = FCT_OK;
@@ -255,9 +255,8 @@ fct_result fct_links_refine(fct_elements *set, fct_links *links, double epsilon,
         fct_release(env, r.verdicts);
         fct_release(env, r.rays);
         fct_release(env, pairs);
-        pairs = next, pair_count = next_count, pair_capacity = next_capacity;
+        pairs = next, pair_count = next_count;
     }
-    (void)pair_capacity;
     fct_release(env, pairs);
     return result == FCT_OK ? sort_by_receiver(set, links) : result;
 }
@@ -331,14 +330,14 @@ static double largest_reflectance(const fct_elements *set) {
 }
 
 fct_result fct_links_solve(fct_elements *set, fct_links *links, double tolerance, uint32_t most,
-                           double *change, uint32_t *sweeps) {
+                           uint32_t *sweeps) {
     size_t chunks = fct_chunk_count(set->count, 128);
     double *sums = fct_allocate(set->env, 2 * chunks, sizeof *sums);
     if (!sums) return fct_fail_memory(set->env, "a sweep");
     double rho = largest_reflectance(set), bound = rho > 0 ? tolerance * (1 - rho) / rho : HUGE_VAL;
     sweep s = {.set = set, .links = links, .change = sums, .norm = sums + chunks};
-    *change = 1;
-    for (uint32_t k = 0; k<most && * change> bound; ++k, ++*sweeps) {
+    double change = HUGE_VAL;
+    for (uint32_t k = 0; k < most && !(change <= bound); ++k, ++*sweeps) {
         fct_parallel_for(set->env, set->count, 128, sweep_chunk, &s);
         for (size_t id = 0; id < set->count; ++id) {
             fct_element *e = &set->items[id];
@@ -348,7 +347,7 @@ fct_result fct_links_solve(fct_elements *set, fct_links *links, double tolerance
         }
         fct_elements_pull(set);
         double norm = fct_sum(s.norm, chunks);
-        *change = norm > 0 ? sqrt(fct_sum(s.change, chunks) / norm) : 0;
+        change = norm > 0 ? sqrt(fct_sum(s.change, chunks) / norm) : 0;
     }
     fct_release(set->env, sums);
     return FCT_OK;

@@ -33,9 +33,9 @@ fct_result fct_links_refine(fct_elements *set, fct_links *links, double epsilon,
                             double done);
 
 /* Gathers and pulls until the change is below tolerance x (1 - rho_max) / rho_max of the solution, or `most`
- * sweeps are done; *change receives the last relative change. Errors: MEMORY. */
+ * sweeps are done; *sweeps grows by those done. Errors: MEMORY. */
 fct_result fct_links_solve(fct_elements *set, fct_links *links, double tolerance, uint32_t most,
-                           double *change, uint32_t *sweeps);
+                           uint32_t *sweeps);
 
 /* Irradiance that the links bring to a point with a normal on leaf `leaf`. */
 void fct_links_irradiance(const fct_elements *set, const fct_links *links, uint32_t leaf, v3 point, v3 normal,

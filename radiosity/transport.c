@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { DIRECT_POINTS = 4, MOST_ROUNDS = 8 };
+enum { DIRECT_POINTS = 4, MOST_ROUNDS = 8, MOST_SWEEPS = 1000 };
 /* A leaf partly in full shadow may reach under a wall into a room without light: it is split so much sooner.
  */
 #define DARK_WEIGHT 16
@@ -104,8 +104,8 @@ static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32
     g->chunk_rays[chunk] += (uint64_t)(end - begin) * g->rays;
 }
 
-/* Irradiance of leaf l from its direct light and kept hits; halves, if not NULL, receives that of even and
- * odd rays. */
+/* Irradiance of leaf l from its direct light and kept hits; halves, if not NULL, receives that of the
+ * first and of the second half of the rays. */
 static void leaf_irradiance(const gathering *g, size_t l, double total[3], double halves[2]) {
     const uint32_t *hits = g->hits + l * g->rays;
     double sums[2][3] = {{0, 0, 0}, {0, 0, 0}};
@@ -173,8 +173,9 @@ static fct_result iterate(gathering *g, size_t leaf_count, double tolerance) {
         for (int c = 0; c < 3; ++c) rho = fmax(rho, set->view.materials[k].reflectance[c]);
     double bound = rho > 0 ? tolerance * (1 - rho) / rho : HUGE_VAL;
     sweep s = {.g = g, .change = sums, .norm = sums + chunks, .irradiance = irradiance};
+    fct_result result = FCT_OK;
     out->change = 1;
-    for (out->sweeps = 0; out->sweeps < 1000; ++out->sweeps) {
+    for (out->sweeps = 0; out->sweeps < MOST_SWEEPS && result == FCT_OK; ++out->sweeps) {
         fct_parallel_for(set->env, leaf_count, 64, sweep_chunk, &s);
         for (size_t l = 0; l < leaf_count; ++l) {
             fct_element *e = &set->items[g->leaves[l]];
@@ -187,10 +188,11 @@ static fct_result iterate(gathering *g, size_t leaf_count, double tolerance) {
             ++out->sweeps;
             break;
         }
+        result = fct_progress(set->env, "iteration", out->sweeps / (double)MOST_SWEEPS);
     }
     fct_release(set->env, sums);
     fct_release(set->env, irradiance);
-    return FCT_OK;
+    return result;
 }
 
 /* Emitted = absorbed + escaped, each counted on its own: what surfaces take in, and what their rays carry out
@@ -276,10 +278,7 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     if (!out->stored || !out->direct || !leaves) goto done;
     size_t count = list_leaves(set, 0, leaves);
     g.leaves = leaves;
-    g.rays = def->rays ? def->rays
-                       : (uint32_t)(def->fineness * (count < 4096    ? 512
-                                                     : count < 16384 ? 128
-                                                                     : 64));
+    g.rays = (uint32_t)(def->fineness * (count < 4096 ? 512 : count < 16384 ? 128 : 64));
     g.hits = fct_allocate(env, count * g.rays, sizeof *g.hits);
     g.chunk_rays = fct_allocate_zero(env, fct_chunk_count(count, 16), sizeof *g.chunk_rays);
     if (!g.hits || !g.chunk_rays) goto done;

@@ -25,11 +25,10 @@ typedef struct fct_transport {
 } fct_transport;
 
 typedef struct fct_transport_def {
-    uint32_t rays; /* per leaf; 0: from the number of leaves */
     uint64_t seed;
     double epsilon;   /* leaves across which direct light varies by more than this power are split */
     double tolerance; /* of the iteration */
-    double fineness;  /* factor on the number of rays where it is left open */
+    double fineness;  /* factor on the number of rays, which goes by the number of leaves */
 } fct_transport_def;
 
 /* Splits leaves at shadow borders, gathers, solves; radiosities in `set` are then the solution. Errors:

@@ -50,7 +50,8 @@ typedef struct fct_bake_stats {
 
 typedef struct fct_bake fct_bake;
 
-/* Solves (FACE) or prepares (REFERENCE). The scene must outlive the bake. Errors: MEMORY, CANCELLED. */
+/* Solves (FACE) or prepares (REFERENCE). The scene must outlive the bake. Errors: DATA (an error that is not
+ * positive, a negative max_edge, a scene or a model that is not 1e-15 to 1e18 across), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 FCT_API void fct_bake_destroy(fct_bake *bake);
@@ -58,7 +59,8 @@ FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
 
 /* The lit mesh of one instance, in world space, colours = radiosity per vertex. Large flat triangles are
  * tessellated and vertices on creases are doubled; source_faces tells the face of the mesh as it was added.
- * Errors: MEMORY, CANCELLED. */
+ * Of a two-sided instance it is the side that the solution finds brighter as a whole, and triangles wind so
+ * that this side is in front. Errors: MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
 /* All instances in one mesh, instance after instance; face_counts, if not NULL, receives instance_count
  * numbers of faces. */

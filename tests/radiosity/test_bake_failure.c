@@ -166,10 +166,50 @@ static void senseless_options_are_refused(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* Where areas are beyond a float an error is told, not darkness or a search without end. */
+static void sizes_that_floats_cannot_tell_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        float size;
+        fct_result result;
+    } cases[] = {{1e-30F, FCT_ERROR_DATA}, {1e-17F, FCT_ERROR_DATA}, {1e-12F, FCT_OK},
+                 {1e15F, FCT_OK},          {1e20F, FCT_ERROR_DATA},  {1e30F, FCT_ERROR_DATA}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        fct_bake *bake;
+        fct_material light = {.name = "light", .emission = {1, 1, 1}};
+        uint32_t id;
+        assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+        assert_int_equal(fct_scene_add_material(scene, &light, &id), FCT_OK);
+        fct_mesh square = make_grid(&env, 1);
+        for (int i = 0; i < 12; ++i) square.positions[i] *= cases[k].size;
+        assert_int_equal(fct_scene_add_object(scene, "square", &square, NULL, NULL, id, NULL), FCT_OK);
+        fct_mesh_release(&env, &square);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_bake_def def = coarse();
+        def.max_edge = 0;
+        assert_int_equal(fct_bake_create(&env, scene, &def, &bake), cases[k].result);
+        if (bake) {
+            double area = (double)cases[k].size * (double)cases[k].size;
+            assert_true(fabs(fct_bake_get_stats(bake).power_emitted - 3 * area) < 1e-3 * area);
+        } else {
+            assert_non_null(strstr(r.text, "across"));
+        }
+        fct_bake_destroy(bake);
+        fct_scene_destroy(scene);
+        assert_int_equal(r.alive, 0);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_allocation_may_fail),     cmocka_unit_test(a_cancelled_bake_leaves_nothing),
-        cmocka_unit_test(threads_do_not_show),           cmocka_unit_test(darkness_is_a_result),
+        cmocka_unit_test(sizes_that_floats_cannot_tell_are_refused),
+        cmocka_unit_test(every_allocation_may_fail),
+        cmocka_unit_test(a_cancelled_bake_leaves_nothing),
+        cmocka_unit_test(threads_do_not_show),
+        cmocka_unit_test(darkness_is_a_result),
         cmocka_unit_test(senseless_options_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
