@@ -19,7 +19,7 @@ typedef struct fct_candidate {
     double error; /* quadric error, at least 0 */
     double area;
     double resistance[6]; /* of the quadric to moves: xx xy xz yy yz zz */
-    double key; /* error plus the regularisation, which decides between equals */
+    double key;           /* error plus the regularisation, which decides between equals */
 } fct_candidate;
 
 /* False where too many wedges meet. Reads rings, changes nothing. */

@@ -1,6 +1,7 @@
 /* simplify/state.h: what one run of the simplifier holds.
  *
- * Topology lives on points: places in space, which input vertices with equal coordinates share. Attributes
+ * Topology lives on points: places in space, which input vertices with equal coordinates share where their
+ * faces meet along a side. Attributes
  * live on wedges: the distinct attribute values that meet at a point. A point with one value has one wedge;
  * on a crease or a texture seam it has several, which move together, so that a seam cannot open into a crack.
  * A mesh without attributes has exactly one wedge a point, of the same number.
@@ -112,6 +113,8 @@ static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
 
 /* topology.c: points, wedges, rings and edges of the mesh. */
 fct_result fct_simplify_topology(fct_simplifier *s);
+/* weld.c: point_of, by place on entry, becomes the points; point_count with it. */
+fct_result fct_simplify_weld(fct_simplifier *s);
 /* channels.c: which attributes there are, their scales, and the wedges' values. */
 void fct_simplify_channels(fct_simplifier *s);
 fct_result fct_simplify_attributes(fct_simplifier *s);

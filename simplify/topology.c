@@ -1,9 +1,10 @@
 /* simplify/topology.c: from an indexed mesh to points, wedges, rings and edges.
  *
- * Vertices with equal coordinates become one point (equal bits, with -0 read as 0); wedges are the distinct
- * (point, attributes). Faces with two corners at one point are left out here and for good; faces of no area
- * with three distinct points stay, for they hold their neighbours together. Linear in corners (expected, for
- * the hash tables); the numbering follows the input's order.
+ * Vertices with equal coordinates (equal bits, with -0 read as 0) become one point where their faces meet
+ * along a side (weld.c); wedges are the distinct (point, attributes). Faces with two corners at one point are
+ * left out here and for good; faces of no area with three distinct points stay, for they hold their
+ * neighbours together. Linear in corners (expected, for the hash tables); the numbering follows the input's
+ * order.
  */
 #include "simplify/state.h"
 
@@ -82,6 +83,7 @@ static fct_result make_points(fct_simplifier *s) {
     memset(s->point_of, 0xff, mesh->vertex_count * sizeof *s->point_of);
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) s->point_of[mesh->triangles[c]] = 0;
     fct_result result = number_keys(s, position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
+    if (result == FCT_OK) result = fct_simplify_weld(s);
     if (result != FCT_OK) return result;
 
     uint32_t count = s->point_count;

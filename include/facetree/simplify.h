@@ -60,11 +60,12 @@ typedef struct fct_simplify_stats {
 } fct_simplify_stats;
 
 /* Simplifies; the result's arrays are those of the input, its faces in the input's order. Vertices with equal
- * coordinates move together whatever their attributes, so doubled creases and seams do not crack; doubles
- * with equal attributes become one vertex. Vertices that no face uses, and faces with two corners at one
- * place, are dropped. Colours stay within the range of the input's. A point of more than 512 faces keeps its
- * place. Same bits on every run and for every thread count. stats may be NULL. Any valid mesh, with no faces
- * too. Errors: DATA (invalid mesh; a negative or NaN option), MEMORY, CANCELLED. */
+ * coordinates move together whatever their attributes where open sides of their faces coincide, so doubled
+ * creases and seams do not crack; doubles with equal attributes become one vertex. Bodies that only touch are
+ * simplified on their own. Vertices that no face uses, and faces with two corners at one place, are dropped.
+ * Colours stay within the range of the input's. A point of more than 512 faces keeps its place. Same bits on
+ * every run and for every thread count. stats may be NULL. Any valid mesh, with no faces too. Errors: DATA
+ * (invalid mesh; a negative or NaN option), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 
