@@ -90,6 +90,8 @@ fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_
 
 /* ---- Models ---- */
 
+#define MOST_ROOTS 64
+
 static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model *own) {
     const fct_env *env = scene->env;
     fct_model model = {
@@ -137,6 +139,20 @@ static fct_result add_part(fct_scene *scene, const char *name, const fct_mesh *m
         return result;
     }
     return add_model(scene, name, &own);
+}
+
+/* The model of a tree that came from outside. One of very many roots is built anew: whoever opens a model
+ * meets all its roots at once, and links between them grow with their square. */
+static fct_result add_tree(fct_scene *scene, const char *name, fct_tree *tree) {
+    fct_scene_model own = {.tree = tree};
+    if (fct_tree_get(tree).root_count <= MOST_ROOTS) return add_model(scene, name, &own);
+    fct_mesh mesh;
+    fct_result result = fct_tree_mesh(scene->env, tree, &mesh);
+    fct_tree_destroy(tree);
+    if (result != FCT_OK) return result;
+    result = add_part(scene, name, &mesh, NULL, mesh.face_count);
+    fct_mesh_release(scene->env, &mesh);
+    return result;
 }
 
 void fct_scene_sort_faces(const uint32_t *labels, uint32_t face_count, uint32_t label_count, uint32_t *starts,
@@ -188,12 +204,11 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
         result = split_by_label(scene, name, mesh, labels, label_count, parts);
     } else {
         parts->labels = fct_allocate_zero(env, 1, sizeof *parts->labels);
-        fct_scene_model own = {.tree = tree};
         if (!parts->labels) {
-            release_model(env, &own);
+            if (tree) fct_tree_destroy(tree);
             return fct_fail_memory(env, "a model");
         }
-        result = tree ? add_model(scene, name, &own) : add_part(scene, name, mesh, NULL, mesh->face_count);
+        result = tree ? add_tree(scene, name, tree) : add_part(scene, name, mesh, NULL, mesh->face_count);
         parts->count = 1;
     }
     if (result != FCT_OK) {
