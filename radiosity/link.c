@@ -225,6 +225,7 @@ static fct_result sort_by_receiver(const fct_elements *set, fct_links *links) {
     fct_release(set->env, links->items);
     links->items = sorted;
     links->capacity = links->count;
+    links->element_count = set->count;
     return FCT_OK;
 }
 
@@ -286,6 +287,7 @@ static double add_link(const fct_elements *set, const fct_link *link, const fct_
 static double gather(const fct_elements *set, const fct_links *links, uint32_t id, const fct_element *leaf,
                      v3 point, v3 normal, double irradiance[3]) {
     double row = 0;
+    while (id != FCT_NONE && id >= links->element_count) id = set->items[id].parent;
     for (; id != FCT_NONE; id = set->items[id].parent)
         for (uint32_t k = links->first[id]; k < links->first[id + 1]; ++k)
             row += add_link(set, &links->items[k], leaf, point, normal, irradiance);

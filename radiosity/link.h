@@ -16,8 +16,8 @@ typedef struct fct_link {
 typedef struct fct_links {
     fct_link *items;
     size_t count, capacity;
-    uint32_t *first; /* element -> its links as receiver, once sorted; count of elements + 1 */
-    size_t first_capacity;
+    uint32_t *first; /* element -> its links as receiver, once sorted; element_count + 1 */
+    size_t first_capacity, element_count; /* elements when the links were sorted; later ones have none */
     double *rows; /* per element: sum of a leaf's form factors; above 1 they are scaled down */
     size_t row_capacity;
     uint64_t rays;
@@ -37,7 +37,7 @@ fct_result fct_links_refine(fct_elements *set, fct_links *links, double epsilon,
 fct_result fct_links_solve(fct_elements *set, fct_links *links, double tolerance, uint32_t most,
                            uint32_t *sweeps);
 
-/* Irradiance that the links bring to a point with a normal on leaf `leaf`. */
+/* Irradiance that the links bring to a point with a normal on leaf `leaf`, which may be newer than they. */
 void fct_links_irradiance(const fct_elements *set, const fct_links *links, uint32_t leaf, v3 point, v3 normal,
                           double irradiance[3]);
 

@@ -247,6 +247,27 @@ static void blocked_squares(void **state) {
 
 /* A long room cut in two by a wall 4 cm thick that stands on its one floor: light in one part, none in the
  * other. */
+/* The blocker's shadow splits elements after the links are made; without a lamp there are no links at all. */
+static void the_bare_solution_lights_elements_newer_than_its_links(void **state) {
+    (void)state;
+    for (int lit = 0; lit < 2; ++lit) {
+        fixture f;
+        begin(&f);
+        static const float blocker[12] = {.5, 0, 0, 0, 0, .5, 0, 0, 0, 0, .5, .5F};
+        add_square(&f, "receiver", 16, identity, material(&f, .5F, 0));
+        add_square(&f, "lamp", 1, above, material(&f, 0, (float)lit));
+        add_square(&f, "blocker", 1, blocker, material(&f, 0, 0));
+        assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+        fct_bake_def def = fct_bake_def_default();
+        def.final = FCT_FINAL_NONE, def.error = 1e-3;
+        fct_bake *b;
+        assert_int_equal(fct_bake_create(&f.env, f.scene, &def, &b), FCT_OK);
+        double mean = mean_radiosity(&f, b, 0, 0, NULL);
+        if (fabs(mean - lit * .5 * .099506) > .2 * .5 * .099506) fail_msg("mean %g", mean);
+        end(&f, b);
+    }
+}
+
 static void no_light_leaks_under_a_wall(void **state) {
     (void)state;
     if (SANITIZED) skip();
@@ -328,6 +349,7 @@ static void lamp_near_a_wall_is_stable(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(furnace_is_even),
+        cmocka_unit_test(the_bare_solution_lights_elements_newer_than_its_links),
         cmocka_unit_test(furnace_of_a_scanned_head_is_even),
         cmocka_unit_test(sphere_spreads_its_light_evenly),
         cmocka_unit_test(open_hemisphere_loses_half),
