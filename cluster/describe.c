@@ -74,12 +74,16 @@ static void store_areas(const sums *s, fct_cluster *out) {
     for (int i = 0; i < 6; ++i) out->moment[i] = (float)(s->moment[i] * factor);
 }
 
-/* Takes the frame if its box is smaller than the cluster's. */
+/* Takes the frame if its box is smaller than the cluster's. Nothing but the box is written: other threads
+ * read the rest. */
 static void try_rotation(const fct_soup *soup, const float rotation[4], fct_cluster *out) {
     fct_cluster other = *out;
     memcpy(other.box_rotation, rotation, sizeof other.box_rotation);
     fct_box_fit(soup, out->first, out->count, &other);
-    if (fct_box_area(&other) < fct_box_area(out)) *out = other;
+    if (!(fct_box_area(&other) < fct_box_area(out))) return;
+    memcpy(out->box_center, other.box_center, sizeof out->box_center);
+    memcpy(out->box_rotation, other.box_rotation, sizeof out->box_rotation);
+    memcpy(out->box_half, other.box_half, sizeof out->box_half);
 }
 
 /* All but cost and links; first and count are set. */
