@@ -5,7 +5,6 @@ find_package(OpenMesh REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(JANSSON REQUIRED IMPORTED_TARGET jansson)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
-pkg_check_modules(TINYOBJ REQUIRED IMPORTED_TARGET tinyobjloader)
 find_package(PNG REQUIRED)
 
 set(FACETREE_base_LIBRARIES PkgConfig::XXHASH)
