@@ -208,12 +208,16 @@ static fct_result resolve_materials(reader *r) {
     return result;
 }
 
-/* The mesh's colours, normals and names stay behind: a scene's light is made of materials. */
+/* The mesh's colours, normals and names stay behind: a scene's light is made of materials. Their ids are the
+ * scene's by now, of which there may be more than the mesh names. */
 static fct_result add_object(reader *r, const char *name, const uint32_t *faces, uint32_t count) {
     fct_mesh part;
     fct_result result = fct_mesh_extract(r->env, &r->mesh, faces, count, &part, NULL);
     if (result != FCT_OK) return result;
-    result = fct_scene_add_object(r->scene, name, &part, NULL, NULL, 0, part.materials);
+    uint32_t *materials = part.materials;
+    part.materials = NULL;
+    result = fct_scene_add_object(r->scene, name, &part, NULL, NULL, 0, materials);
+    fct_release(r->env, materials);
     fct_mesh_release(r->env, &part);
     return result;
 }

@@ -358,6 +358,13 @@ static void reads_obj_with_materials(void **unused) {
     assert_true(v.instances[0].material == 0 && v.instances[1].material == 1 && v.instances[2].material == 1);
     fct_scene_destroy(scene);
 
+    write_text("unused.obj", "mtllib box.mtl\n" QUAD "usemtl lamp\nf 1 2 3\n"); /* as many libraries are */
+    assert_int_equal(load(&env, "unused.obj", &scene), FCT_OK);
+    v = fct_scene_get(scene);
+    assert_int_equal(v.instance_count, 1);
+    assert_string_equal(v.materials[v.instances[0].material].name, "lamp");
+    fct_scene_destroy(scene);
+
     write_text("plain.obj", QUAD "o one\nf 1 2 3\no two\nf 1 3 4\n"); /* no materials: a grey mesh */
     assert_int_equal(load(&env, "plain.obj", &scene), FCT_OK);
     assert_int_equal(fct_scene_get(scene).instance_count, 1);
