@@ -5,6 +5,7 @@
 #include "bvh/bvh.h"
 
 static void backends_agree(const fct_env *env, const fct_mesh *mesh, size_t count, const char *name) {
+    if (SANITIZED) count /= 10;
     fct_tree *tree;
     fct_bvh *obb, *embree;
     fct_tree_def def = fct_tree_def_default();
@@ -68,7 +69,7 @@ static void real_models_have_no_unexplained_difference(void **state) {
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
         char path[512];
         snprintf(path, sizeof path, "%s/%s.obj", FACETREE_DATA, names[i]);
-        if (!file_exists(path)) continue;
+        if (!file_exists(path) || (SANITIZED && i > 0)) continue;
         fct_mesh mesh;
         assert_int_equal(fct_mesh_load(&env, path, &mesh), FCT_OK);
         backends_agree(&env, &mesh, 100000, names[i]);
