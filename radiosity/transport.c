@@ -7,6 +7,9 @@ enum { DIRECT_POINTS = 4, MOST_ROUNDS = 8, MOST_SWEEPS = 1000 };
 /* A leaf partly in full shadow may reach under a wall into a room without light: it is split so much sooner.
  */
 #define DARK_WEIGHT 16
+/* |S| / A of a leaf below which it is bent, and the share of the scene's area that is too small to matter. */
+#define BENT            .95
+#define LEAST_BENT_AREA 2e-6
 /* Kept hits that are no leaf. */
 #define HIT_NOTHING FCT_NONE
 #define HIT_BLACK   (FCT_NONE - 1)
@@ -230,6 +233,20 @@ static size_t list_leaves(const fct_elements *set, size_t from, uint32_t *leaves
     return n;
 }
 
+/* A bent leaf has sides that see different light, and what a ray finds on it is their mean: it is split down
+ * to a size that does not depend on the triangles. */
+static fct_result split_bent(fct_elements *set) {
+    const double least = LEAST_BENT_AREA * set->items[0].area;
+    for (size_t id = 0; id < set->count; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->child_count || e->kind != FCT_ELEMENT_CLUSTER || e->area < least) continue;
+        if (v3_norm(e->vector) > BENT * e->area) continue;
+        fct_result result = fct_elements_split(set, (uint32_t)id);
+        if (result != FCT_OK) return result;
+    }
+    return FCT_OK;
+}
+
 /* Leaves that a border of direct light crosses are split, and their parts looked at in turn. */
 static fct_result split_by_direct(gathering *g, const fct_transport_def *def) {
     fct_elements *set = g->set;
@@ -269,7 +286,8 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     *out = (fct_transport){0};
     gathering g = {.set = set, .lamps = lamps, .out = out, .seed = def->seed};
     uint32_t *leaves = NULL;
-    fct_result result = split_by_direct(&g, def);
+    fct_result result = split_bent(set);
+    if (result == FCT_OK) result = split_by_direct(&g, def);
     if (result != FCT_OK) goto done;
     result = FCT_ERROR_MEMORY;
     out->stored = fct_allocate_zero(env, 3 * set->count, sizeof *out->stored);
