@@ -92,7 +92,7 @@ for place in 200 $((size / 3)) $((size / 2)) $((size - 20)); do
 done
 
 # accepted FILE [COMMAND-NOT]: every command takes it.
-accepted() {
+accepted() { # FILE [exit code of bake]
     local file=$1 faces
     expect 0 info "$file" --json
     faces=$(value faces)
@@ -107,7 +107,7 @@ accepted() {
     expect 0 closest odd.fct --points points.txt
     expect 0 simplify "$file" --faces $((faces / 2)) -o odd.ply
     expect 0 compare "$file" odd.fct --samples 3
-    expect 0 bake "$file" -o baked.ply
+    expect "${2:-0}" bake "$file" -o baked.ply
     rm -f odd.* baked.ply
 }
 triangle 0 '1 2 3' >one.obj
@@ -130,7 +130,7 @@ grid 24 >flat.off
 accepted flat.off
 for power in -30 30; do
     sphere 8 | awk -v p=$power 'NF == 3 && NR > 2 { printf "%.9g %.9g %.9g\n", $1 * 10 ^ p, $2 * 10 ^ p, $3 * 10 ^ p; next } { print }' >extent$power.off
-    accepted extent$power.off
+    accepted extent$power.off 65 # areas of such faces are beyond a float: there is no light to speak of
 done
 { sphere 6; } >twice.off # every face a second time, turned over
 awk 'NR == 2 { $2 *= 2; print; next } NF == 4 { print; print $1, $3, $2, $4; next } { print }' twice.off >duplicate.off
