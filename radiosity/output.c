@@ -50,6 +50,29 @@ static uint32_t lamp_rays(const fct_solution *s, uint32_t least) {
     return (uint32_t)fmin(fmax(least * s->fineness, least), 64);
 }
 
+/* Barycentrics of the point on the face at `place`, or of the nearest point of its plane within it. */
+static void place_point(const fct_solution *s, uint32_t instance, uint32_t place, const float point[3],
+                        float uv[2]) {
+    const fct_instance *in = &s->elements.view.instances[instance];
+    fct_tree_view t = fct_tree_get(s->elements.view.models[in->model].tree);
+    v3 p[3];
+    for (int k = 0; k < 3; ++k) {
+        const float *x = t.positions + 3 * (size_t)t.triangles[3 * (size_t)place + (size_t)k],
+                    *m = in->to_world;
+        double w[3];
+        for (int r = 0; r < 3; ++r)
+            w[r] = (double)m[4 * r] * x[0] + (double)m[4 * r + 1] * x[1] + (double)m[4 * r + 2] * x[2] +
+                   m[4 * r + 3];
+        p[k] = v3_make(w[0], w[1], w[2]);
+    }
+    v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(v3_load(point), p[0]), n = v3_cross(e, f);
+    double scale = v3_norm2(n);
+    double u = scale > 0 ? v3_dot(v3_cross(d, f), n) / scale : 1 / 3.,
+           v = scale > 0 ? v3_dot(v3_cross(e, d), n) / scale : 1 / 3.;
+    u = fmin(fmax(u, 0), 1), v = fmin(fmax(v, 0), 1 - u);
+    uv[0] = (float)u, uv[1] = (float)v;
+}
+
 static void vertex_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     lighting *l = user;
     const fct_solution *s = l->s;
@@ -66,8 +89,10 @@ static void vertex_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
             continue;
         }
         if (s->def.final == FCT_FINAL_NONE) {
+            float uv[2];
+            place_point(s, l->instance, f->places[i], point, uv);
             uint32_t leaf =
-                fct_elements_locate(&s->elements, l->instance, l->back, f->places[i], 1 / 3.F, 1 / 3.F);
+                fct_elements_locate(&s->elements, l->instance, l->back, f->places[i], uv[0], uv[1]);
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
         } else {
             uint64_t seed = fct_hash3(s->def.seed + 1, l->instance, i);

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { DIRECT_POINTS = 4, MOST_ROUNDS = 8, MOST_SWEEPS = 1000 };
+enum { DIRECT_POINTS = 4, BARE_POINTS = 4, MOST_ROUNDS = 8, MOST_SWEEPS = 1000 };
 /* A leaf partly in full shadow may reach under a wall into a room without light: it is split so much sooner.
  */
 #define DARK_WEIGHT 16
@@ -38,6 +38,7 @@ typedef struct gathering {
     const uint32_t *leaves;
     uint32_t *hits;
     float *spread; /* per leaf: how much direct light varies over its points, power */
+    float *bare;   /* per leaf: the part of it that no other surface coincides with and is hit in its stead */
     uint64_t *chunk_rays;
     uint32_t rays;
     uint64_t seed;
@@ -81,12 +82,29 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
     g->chunk_rays[chunk] += rays;
 }
 
+/* Whether a ray that comes down on the point meets its face, or another that lies in the very same place. */
+static bool is_bare(const fct_elements *set, uint32_t instance, const fct_element_point *p) {
+    fct_ray ray = {.t_min = 0, .t_max = 2};
+    fct_scene_hit hit;
+    for (int c = 0; c < 3; ++c) {
+        ray.origin[c] = p->position[c] + p->offset * p->normal[c];
+        ray.direction[c] = -p->offset * p->normal[c];
+    }
+    if (!fct_scene_closest_hit(set->scene, &ray, &hit, NULL)) return true;
+    return hit.instance == instance && hit.place == p->place;
+}
+
 static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     gathering *g = user;
     (void)thread;
     for (size_t l = begin; l < end; ++l) {
         uint32_t id = g->leaves[l];
         uint64_t seed = fct_hash2(g->seed ^ 0x6761746865720001u, id);
+        uint32_t instance = g->set->items[id].instance, bare = 0;
+        for (int k = 0; k < BARE_POINTS; ++k)
+            bare +=
+                is_bare(g->set, instance, &g->set->points[(size_t)id * FCT_ELEMENT_POINTS + 4 * (size_t)k]);
+        g->bare[l] = (float)bare / BARE_POINTS;
         for (uint32_t k = 0; k < g->rays; ++k) {
             double plane[2], place[2];
             fct_plane_point(k, seed, plane);
@@ -205,7 +223,7 @@ static void balance(gathering *g, size_t leaf_count) {
     double weight = 0, noise = 0, level = 0;
     for (size_t l = 0; l < leaf_count; ++l) {
         const fct_element *e = &g->set->items[g->leaves[l]];
-        double irradiance[3], halves[2], lost = 0, dark = 0;
+        double irradiance[3], halves[2], lost = 0, dark = 0, area = e->area * g->bare[l];
         leaf_irradiance(g, l, irradiance, halves);
         for (uint32_t k = 0; k < g->rays; ++k) {
             lost += g->hits[l * g->rays + k] == HIT_NOTHING;
@@ -213,9 +231,9 @@ static void balance(gathering *g, size_t leaf_count) {
         }
         for (int c = 0; c < 3; ++c) {
             double b = e->emission[c] + e->reflectance[c] * irradiance[c];
-            out->emitted += e->emission[c] * e->area;
-            out->absorbed += (1 - e->reflectance[c]) * irradiance[c] * e->area + b * e->area * dark / g->rays;
-            out->escaped += b * e->area * lost / g->rays;
+            out->emitted += e->emission[c] * area;
+            out->absorbed += (1 - e->reflectance[c]) * irradiance[c] * area + b * area * dark / g->rays;
+            out->escaped += b * area * lost / g->rays;
         }
         weight += e->area;
         level += e->area * (halves[0] + halves[1]) * (halves[0] + halves[1]) / 4;
@@ -299,7 +317,8 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     g.rays = (uint32_t)(def->fineness * (count < 4096 ? 512 : count < 16384 ? 128 : 64));
     g.hits = fct_allocate(env, count * g.rays, sizeof *g.hits);
     g.chunk_rays = fct_allocate_zero(env, fct_chunk_count(count, 16), sizeof *g.chunk_rays);
-    if (!g.hits || !g.chunk_rays) goto done;
+    g.bare = fct_allocate(env, count, sizeof *g.bare);
+    if (!g.hits || !g.chunk_rays || !g.bare) goto done;
     result = fct_parallel_for_progress(env, "direct light", count, 16, direct_chunk, &g);
     if (result != FCT_OK) goto done;
     result = fct_parallel_for_progress(env, "gathering", count, 16, hit_chunk, &g);
@@ -311,6 +330,7 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     fct_elements_pull(set);
 done:
     fct_release(env, g.hits);
+    fct_release(env, g.bare);
     fct_release(env, g.chunk_rays);
     fct_release(env, leaves);
     if (result != FCT_OK) fct_transport_release(env, out);

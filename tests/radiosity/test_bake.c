@@ -135,6 +135,26 @@ static void furnace_of_a_scanned_head_is_even(void **state) {
     end(&f, b);
 }
 
+/* Every face twice, in the same place: rays meet one of the two, and power is counted once (bake() checks the
+ * balance). */
+static void coincident_faces_share_one_light(void **state) {
+    (void)state;
+    fixture f;
+    begin(&f);
+    fct_mesh sphere = make_sphere(&f.env, 10), twice;
+    turn_inside_out(&sphere);
+    assert_int_equal(fct_mesh_create(&f.env, sphere.vertex_count, 2 * sphere.face_count, 0, &twice), FCT_OK);
+    memcpy(twice.positions, sphere.positions, 12 * (size_t)sphere.vertex_count);
+    for (int k = 0; k < 2; ++k)
+        memcpy(twice.triangles + 3 * (size_t)(k ? sphere.face_count : 0), sphere.triangles,
+               12 * (size_t)sphere.face_count);
+    fct_mesh_release(&f.env, &sphere);
+    add(&f, "twice", &twice, identity, material(&f, .5F, 1), NULL);
+    fct_bake *b = bake(&f, FCT_FINAL_GATHER);
+    expect_radiosity(&f, b, 0, 2, .01);
+    end(&f, b);
+}
+
 static void sphere_spreads_its_light_evenly(void **state) {
     (void)state;
     if (SANITIZED) skip();
@@ -351,6 +371,7 @@ int main(void) {
         cmocka_unit_test(furnace_is_even),
         cmocka_unit_test(the_bare_solution_lights_elements_newer_than_its_links),
         cmocka_unit_test(furnace_of_a_scanned_head_is_even),
+        cmocka_unit_test(coincident_faces_share_one_light),
         cmocka_unit_test(sphere_spreads_its_light_evenly),
         cmocka_unit_test(open_hemisphere_loses_half),
         cmocka_unit_test(concentric_spheres_exchange),
