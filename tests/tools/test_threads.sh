@@ -1,6 +1,7 @@
 # tests/tools/test_threads.sh: the same bytes for every number of threads, and from run to run.
 source "$(dirname "$0")/support.sh"
-sphere 24 | awk 'NF == 3 && NR > 2 { r = 1 + .05 * sin(40 * $1) * sin(31 * $2) * cos(23 * $3); print r * $1, r * $2, r * $3; next } { print }' >bumpy.off
+[ "$scale" = 1 ] && rings=24 error=1e-4 || rings=8 error=1e-3 # instrumented code is slow
+sphere $rings | awk 'NF == 3 && NR > 2 { r = 1 + .05 * sin(40 * $1) * sin(31 * $2) * cos(23 * $3); print r * $1, r * $2, r * $3; next } { print }' >bumpy.off
 cube 4 | awk 'NF == 4 { print $1, $2, $4, $3; next } { print }' >room.off
 cube 1 >lamp.off
 cat >scene.json <<'END'
@@ -14,7 +15,7 @@ END
 for threads in 1 2 5; do
     expect 0 cluster bumpy.off -o $threads.fct --threads $threads --quiet
     expect 0 simplify bumpy.off --ratio .1 -o $threads.ply --threads $threads --quiet
-    expect 0 bake scene.json -o $threads.glb --error 1e-4 --threads $threads --quiet
+    expect 0 bake scene.json -o $threads.glb --error $error --threads $threads --quiet
     expect 0 simplify $threads.glb --ratio .2 -o $threads-lit.ply --threads $threads --quiet
     expect 0 compare bumpy.off 1.ply --threads $threads
     cp out $threads.txt
@@ -25,9 +26,9 @@ for threads in 2 5; do
         check "$threads threads make the same $file as one" cmp -s 1$file $threads$file
     done
 done
-expect 0 bake scene.json -o again.glb --error 1e-4 --quiet
+expect 0 bake scene.json -o again.glb --error $error --quiet
 check "a second run makes the same bytes" cmp -s 1.glb again.glb
-expect 0 bake scene.json -o seed.glb --error 1e-4 --seed 7 --quiet
+expect 0 bake scene.json -o seed.glb --error $error --seed 7 --quiet
 check "another seed makes others" test "$(cmp -s 1.glb seed.glb; echo $?)" = 1
 if [ -e "$data/stanford-bunny.obj" ] && [ "$scale" = 1 ]; then
     for threads in 1 2; do
