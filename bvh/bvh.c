@@ -28,7 +28,7 @@ bool fct_bvh_degenerate(const fct_bvh *bvh, uint32_t place) {
 static void unscale_normal(const fct_bvh *bvh, v3 n, float out[3]) {
     double unit = 1 / bvh->scale, largest = fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) * unit * unit;
     double factor = unit * unit;
-    if (largest > 0x1p126 || largest < 0x1p-100) factor *= ldexp(1, -ilogb(largest));
+    if (largest > 0x1p126 || (largest > 0 && largest < 0x1p-100)) factor *= ldexp(1, -ilogb(largest));
     v3_store(out, v3_scale(n, factor));
 }
 

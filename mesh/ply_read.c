@@ -380,7 +380,7 @@ static fct_result read_records(reader *r) {
 
 static fct_result read_element(reader *r, const fct_ply_element *element) {
     r->element = element;
-    r->properties = r->h.properties + element->first_property;
+    r->properties = r->h.properties ? r->h.properties + element->first_property : NULL;
     r->target.kind = fct_ply_kind_of(element);
     if (r->target.kind != FCT_PLY_OTHER && (r->seen >> r->target.kind & 1))
         return fct_fail(r->t.env, FCT_ERROR_DATA, "%s: element %.*s is declared twice", r->t.name,
