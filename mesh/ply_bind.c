@@ -79,7 +79,8 @@ fct_ply_kind fct_ply_kind_of(const fct_ply_element *element) {
 
 fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const fct_ply_element *element,
                         fct_soup *soup, float **vertex_texcoords, fct_ply_target *out) {
-    const fct_ply_property *properties = header->properties + element->first_property;
+    const fct_ply_property *properties =
+        element->property_count ? header->properties + element->first_property : NULL;
     size_t count = element->property_count;
     *out = (fct_ply_target){.kind = fct_ply_kind_of(element),
                             .indices = FCT_PLY_NOWHERE,
