@@ -100,10 +100,12 @@ static void extents(const fct_soup *soup, size_t begin, size_t end, const float 
     }
 }
 
-void fct_box_fit(const fct_soup *soup, size_t first, size_t count, fct_cluster *cluster) {
+/* False where its numbers leave the range of a float. */
+static bool fit_along(const fct_soup *soup, size_t first, size_t count, fct_cluster *cluster) {
     float axes[3][3];
     expand(cluster->box_rotation, axes);
     double low[3], high[3], size = 0;
+    bool within = true;
     extents(soup, 3 * first, 3 * (first + count), (const float(*)[3])axes, low, high);
     /* from a corner, for axes are orthonormal to float rounding only, and the model may be far from 0 */
     v3 origin = {(double)soup->corner[0][3 * first], (double)soup->corner[1][3 * first],
@@ -120,7 +122,18 @@ void fct_box_fit(const fct_soup *soup, size_t first, size_t count, fct_cluster *
         double middle = v3_dot(center, a[k]), half = greater(high[k] - middle, middle - low[k]);
         half += 16 * DBL_EPSILON * size; /* whatever order of operations checks it */
         cluster->box_half[k] = nextafterf((float)half, INFINITY);
+        within = within && isfinite(cluster->box_half[k]) && isfinite(cluster->box_center[k]);
     }
+    return within;
+}
+
+void fct_box_fit(const fct_soup *soup, size_t first, size_t count, fct_cluster *cluster) {
+    if (fit_along(soup, first, count, cluster)) return;
+    /* Across more than half the range of floats a turned box may not have one: the world's axes do. */
+    static const float world[4] = {0, 0, 0, 1};
+    memcpy(cluster->box_rotation, world, sizeof world);
+    if (fit_along(soup, first, count, cluster)) return;
+    for (int k = 0; k < 3; ++k) cluster->box_half[k] = fminf(cluster->box_half[k], FLT_MAX);
 }
 
 void fct_box_turn(const fct_soup *soup, size_t first, size_t count, v3 frame[3]) {

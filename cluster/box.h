@@ -18,7 +18,8 @@ void fct_soup_face(const fct_soup *soup, size_t place, const float *positions, c
 void fct_box_rotation(const v3 frame[3], float rotation[4]);
 
 /* Sets center and half extents from the rotation, exactly and rounded outwards, so that every corner of the
- * faces [first, first + count) is inside. */
+ * faces [first, first + count) is inside. Where such a box would leave the range of a float, the rotation
+ * becomes none. */
 void fct_box_fit(const fct_soup *soup, size_t first, size_t count, fct_cluster *cluster);
 
 /* Turns the frame (t, b, normal) about its normal so that the box about a sample of at most 64 corners has

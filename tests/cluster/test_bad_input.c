@@ -1,5 +1,7 @@
 /* Inputs that break other programs: each gives a tree that keeps every promise, in about the time of a good
  * mesh of its size, with either method. */
+#include <float.h>
+
 #include "check_tree.h"
 
 #include "facetree/cluster.h"
@@ -153,6 +155,12 @@ static void extents(void **state) {
     fct_mesh needle = make_sphere(&env, 12);
     for (uint32_t k = 0; k < needle.vertex_count; ++k) needle.positions[3 * k] *= 1e12f;
     check(&needle, ALWAYS);
+    fct_mesh whole = make_sphere(&env, 12); /* as large as floats go, its bulk along a diagonal */
+    for (uint32_t v = 0; v < whole.vertex_count; ++v) {
+        float *p = whole.positions + 3 * v, along = p[0] < 0 ? -1 : 1;
+        for (int k = 0; k < 3; ++k) p[k] = v % 2 ? along * FLT_MAX : p[k] * 1e37f;
+    }
+    check(&whole, ALWAYS);
 }
 
 static void scattered_triangles(void **state) {
