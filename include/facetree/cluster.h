@@ -80,8 +80,12 @@ FCT_API void fct_tree_destroy(fct_tree *tree);
 /* Pointers into the tree, valid as long as it lives. */
 typedef struct fct_tree_view {
     uint32_t face_count, vertex_count, node_count, root_count;
-    uint32_t depth;              /* of the deepest leaf; a single root leaf has depth 0 */
-    double mean_depth;           /* over the leaves */
+    uint32_t depth;    /* of the deepest leaf; a single root leaf has depth 0 */
+    double mean_depth; /* over the leaves */
+    /* Of the mesh, by its dual graph: edges with one face, with three or more, and parts that edges connect.
+     */
+    uint32_t boundary_edges, nonmanifold_edges, component_count;
+    fct_bounds bounds;           /* of all vertices; empty where there are none */
     const fct_cluster *clusters; /* node_count inner nodes */
     const uint32_t *roots;       /* root_count node ids, ascending */
     const uint32_t *face_ids;    /* place -> input face */
