@@ -100,7 +100,8 @@ static void find_pairs(void *user, size_t begin, size_t end, size_t chunk, uint3
     rounds *r = user;
     for (size_t e = begin; e < end; ++e) {
         const link *l = &r->links[e];
-        if (l->cost == INFINITY) continue;
+        const uint8_t *frozen = r->work->frozen;
+        if (l->cost == INFINITY || (frozen && (frozen[r->slots[l->a]] || frozen[r->slots[l->b]]))) continue;
         uint64_t key = link_key(r, (uint32_t)e);
         if (atomic_load_explicit(&r->best[l->a], memory_order_relaxed) != key ||
             atomic_load_explicit(&r->best[l->b], memory_order_relaxed) != key)

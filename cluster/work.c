@@ -62,11 +62,11 @@ static fct_result take_dual(const fct_env *env, const fct_mesh *mesh, fct_work *
     return result;
 }
 
-fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out) {
+fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
+                                  const fct_tree_def *def, fct_work *out) {
     uint32_t faces = mesh->face_count;
-    fct_bounds bounds = mesh_bounds(mesh);
     *out = (fct_work){.env = env, .face_count = faces, .materials = mesh->materials};
-    out->metric = fct_metric_make(def, &bounds);
+    out->metric = fct_metric_make(def, bounds);
     out->records = fct_allocate(env, faces, sizeof *out->records);
     bool directions = def->cost == FCT_COST_MEAN;
     if (directions) out->directions = fct_allocate(env, faces, sizeof *out->directions);
@@ -83,6 +83,11 @@ fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_t
         result = take_dual(env, mesh, out);
     if (result != FCT_OK) fct_work_release(out);
     return result;
+}
+
+fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out) {
+    fct_bounds bounds = mesh_bounds(mesh);
+    return fct_work_create_within(env, mesh, &bounds, def, out);
 }
 
 void fct_work_release(fct_work *work) {
