@@ -333,6 +333,10 @@ fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32
     fct_result result = check_def(env, &options);
     if (result == FCT_OK) result = fct_labels_check(env, mesh, labels, count);
     if (result != FCT_OK) return result;
+    if (mesh->face_count == 0) {
+        if (stats) *stats = done;
+        return FCT_OK;
+    }
     refiner *r = fct_allocate_zero(env, 1, sizeof *r);
     if (!r) return fct_fail_memory(env, "refining a partition");
     r->mesh = mesh;

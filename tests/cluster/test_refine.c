@@ -1,6 +1,6 @@
 /* Refinement of partitions: the deviation of normals falls, clusters stay in as many pieces as they were and
  * keep their last face, borders stay short; on made shapes, on odd meshes, and without memory. */
-#include "support.h"
+#include "check_tree.h"
 
 #include "base/vec.h"
 #include "facetree/cluster.h"
@@ -88,8 +88,8 @@ static void fill_labels(const fct_mesh *mesh, uint32_t count, uint32_t *labels) 
     fct_tree *tree;
     assert_int_equal(fct_tree_build(&env, mesh, NULL, NULL, &tree), FCT_OK);
     uint32_t *nodes = malloc(4 * (size_t)count);
-    assert_int_equal(fct_tree_partition(tree, count, nodes), count);
-    fct_tree_labels(tree, nodes, count, labels);
+    assert_int_equal(cut_tree(tree, count, nodes), count);
+    assert_int_equal(fct_tree_labels(&env, tree, nodes, count, labels), FCT_OK);
     free(nodes);
     fct_tree_destroy(tree);
 }
@@ -322,6 +322,8 @@ static void bad_options_and_labels(void **state) {
     fct_mesh_release(&env, &mesh);
     fct_mesh none = {0};
     assert_int_equal(fct_partition_refine(&env, &none, 0, NULL, NULL, NULL), FCT_OK);
+    assert_int_equal(fct_labels_quality(&env, &none, NULL, 0, &q), FCT_OK);
+    assert_true(q.connected && q.mean_fit == 0);
     assert_int_equal(r.alive, 0);
 }
 
@@ -350,6 +352,10 @@ static void failures_leave_the_labels(void **state) {
         fct_partition_quality q;
         fct_result measured = fct_labels_quality(&env, &mesh, labels, 12, &q);
         assert_true(measured == FCT_OK || measured == FCT_ERROR_MEMORY);
+        float planes[48];
+        r.allocations = 0;
+        measured = fct_labels_planes(&env, &mesh, labels, 12, planes);
+        assert_true(nth > 2 ? measured == FCT_OK : measured == FCT_ERROR_MEMORY);
         assert_int_equal(r.alive, 0);
     }
     result = FCT_ERROR_CANCELLED;
@@ -376,8 +382,8 @@ static void quality_is_that_of_the_cut(void **state) {
     uint32_t nodes[50], *labels = malloc(4 * (size_t)mesh.face_count);
     for (uint32_t k = 1; k <= 50; k += 7) {
         fct_partition_quality a, b;
-        assert_int_equal(fct_tree_partition(tree, k, nodes), k);
-        fct_tree_labels(tree, nodes, k, labels);
+        assert_int_equal(cut_tree(tree, k, nodes), k);
+        assert_int_equal(fct_tree_labels(&env, tree, nodes, k, labels), FCT_OK);
         assert_int_equal(fct_tree_quality(&env, tree, nodes, k, &a), FCT_OK);
         assert_int_equal(fct_labels_quality(&env, &mesh, labels, k, &b), FCT_OK);
         assert_true(fabs(a.mean_fit - b.mean_fit) <= 1e-9 * a.mean_fit);
@@ -387,6 +393,14 @@ static void quality_is_that_of_the_cut(void **state) {
         assert_true(fabs(a.mean_irregularity - b.mean_irregularity) <= 1e-6 * a.mean_irregularity);
         assert_true(b.box_area <= 1.01 * a.box_area && b.box_area >= 0.94 * a.box_area);
         assert_int_equal(a.connected, b.connected);
+        float planes[4 * 50];
+        assert_int_equal(fct_labels_planes(&env, &mesh, labels, k, planes), FCT_OK);
+        for (uint32_t i = 0; i < k && k > 1; ++i) {
+            fct_cluster cluster;
+            fct_tree_cluster(tree, nodes[i], &cluster);
+            for (int c = 0; c < 4; ++c)
+                assert_true(fabs((double)(planes[4 * i + (uint32_t)c] - cluster.plane[c])) < 1e-5);
+        }
         account sums = account_of(&mesh, labels, k);
         assert_true(fabs(b.mean_normal_deviation - sums.deviation / sums.area) <= 1e-9);
         assert_true(fabs(b.mean_irregularity - sums.squares / (4 * pi * sums.area)) <= 1e-6);
