@@ -223,8 +223,9 @@ static int run(tool *t, void *options) {
         code = TOOL_MEMORY;
         goto done;
     }
-    count = fct_tree_partition(tree, count, nodes);
-    fct_tree_labels(tree, nodes, count, labels);
+    code = tool_result(t, fct_tree_partition(&t->env, tree, count, nodes, &count));
+    if (code == TOOL_DONE) code = tool_result(t, fct_tree_labels(&t->env, tree, nodes, count, labels));
+    if (code != TOOL_DONE) goto done;
     refinement refined;
     if (o->refine.sweep_count > 0) code = refine(t, tree, &o->refine, labels, count, &refined);
     if (code == TOOL_DONE) code = write_output(t, tree, labels, count);
