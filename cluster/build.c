@@ -84,6 +84,7 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     }
     fct_work_release(&work);
     if (result == FCT_OK) result = copy_source(env, def, tree);
+    if (result == FCT_OK) fct_tree_measure_bounds(tree);
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};
