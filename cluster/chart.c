@@ -171,6 +171,7 @@ fct_result fct_tree_charts(const fct_env *env, const fct_tree *tree, const fct_c
     fct_charter c = {.view = view, .def = def ? *def : fct_chart_def_default()};
     fct_chart_stats found = {0};
     fct_result result = check_def(env, &c.def);
+    if (result == FCT_OK) result = fct_tree_check(env, tree);
     if (result != FCT_OK) return result;
     c.labels = fct_allocate(env, view->face_count, sizeof *c.labels);
     if (!c.labels) return fct_fail_memory(env, "charts");

@@ -156,7 +156,8 @@ fct_result fct_tree_cut_at_distance(const fct_env *env, const fct_tree *tree, do
     if (!(max_distance >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "expected a distance of at least 0, found %g", max_distance);
     distance_cut cut = {.tree = tree, .max_distance = max_distance, .nodes = nodes};
-    fct_result result = fct_cut_tree(env, tree, "cut", near_plane, &cut, nodes, count);
+    fct_result result = fct_tree_check(env, tree);
+    if (result == FCT_OK) result = fct_cut_tree(env, tree, "cut", near_plane, &cut, nodes, count);
     if (result != FCT_OK || !largest) return result;
     size_t chunks = fct_chunk_count(*count, GRAIN);
     cut.largest = fct_allocate(env, chunks, sizeof *cut.largest);

@@ -240,6 +240,7 @@ fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct
     fct_packer p = {.view = &tree->view, .def = def ? *def : fct_meshlet_def_default()};
     *out = (fct_meshlets){0};
     fct_result result = check_def(env, &p.def);
+    if (result == FCT_OK) result = fct_tree_check(env, tree);
     if (result == FCT_OK) result = make_pieces(env, tree, &p);
     uint32_t *numbers = result == FCT_OK ? fct_allocate(env, p.count, 2 * sizeof *numbers) : NULL;
     if (result == FCT_OK && !numbers) result = fct_fail_memory(env, "meshlets");
