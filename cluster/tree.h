@@ -53,4 +53,11 @@ fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, ui
 /* view->bounds from the positions. */
 void fct_tree_measure_bounds(fct_tree *tree);
 
+/* Of the mesh's dual graph; components are the parts that edges connect. */
+typedef struct fct_edge_counts {
+    uint32_t boundary, nonmanifold, components;
+} fct_edge_counts;
+/* Counts them anew. Errors: MEMORY, CANCELLED. */
+fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, fct_edge_counts *out);
+
 #endif

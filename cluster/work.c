@@ -51,6 +51,7 @@ static fct_result take_dual(const fct_env *env, const fct_mesh *mesh, fct_work *
     face_job job = {work, mesh, dual.perimeters};
     fct_parallel_for(env, mesh->face_count, 1 << 14, make_records, &job);
     work->edge_count = dual.edge_count;
+    work->boundary_edges = dual.boundary_edges, work->nonmanifold_edges = dual.nonmanifold_edges;
     work->edges = fct_allocate(env, dual.edge_count, sizeof *work->edges);
     if (work->edges)
         for (uint32_t e = 0; e < dual.edge_count; ++e)

@@ -40,6 +40,7 @@ typedef struct fct_work {
     /* live edges */
     fct_edge *edges;
     uint32_t edge_count;
+    uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
 } fct_work;
 
 /* The greatest height of a cluster of `count` faces: 3 log2 n - 1, so that a join of parts keeps the whole
