@@ -50,6 +50,30 @@ static inline f8 f8_copysign(f8 a, f8 s) {
     f8 sign = _mm256_set1_ps(-0.0f);
     return _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, s));
 }
+static inline f8 f8_sqrt(f8 a) {
+    return _mm256_sqrt_ps(a);
+}
+/* a_i < b_i ? x_i : y_i */
+static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
+    return _mm256_blendv_ps(y, x, _mm256_cmp_ps(a, b, _CMP_LT_OQ));
+}
+/* Rows to columns of an 8 x 8 matrix. */
+static inline void f8_transpose(f8 m[8]) {
+    f8 a[8], b[8];
+    for (int i = 0; i < 8; i += 2) {
+        a[i] = _mm256_unpacklo_ps(m[i], m[i + 1]);
+        a[i + 1] = _mm256_unpackhi_ps(m[i], m[i + 1]);
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int k = 0; k < 2; ++k) {
+            b[i + 2 * k] = _mm256_shuffle_ps(a[i + k], a[i + 2 + k], 0x44);
+            b[i + 2 * k + 1] = _mm256_shuffle_ps(a[i + k], a[i + 2 + k], 0xEE);
+        }
+    for (int i = 0; i < 4; ++i) {
+        m[i] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x20);
+        m[i + 4] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x31);
+    }
+}
 /* Bit i: a_i <= b_i. */
 static inline uint32_t f8_le(f8 a, f8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
@@ -124,6 +148,19 @@ static inline f8 f8_abs(f8 a) {
 }
 static inline f8 f8_copysign(f8 a, f8 s) {
     FCT_F8(__builtin_copysignf(a.v[i], s.v[i]));
+}
+static inline f8 f8_sqrt(f8 a) {
+    FCT_F8(__builtin_sqrtf(a.v[i]));
+}
+static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
+    FCT_F8(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
+}
+static inline void f8_transpose(f8 m[8]) {
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < i; ++k) {
+            float t = m[i].v[k];
+            m[i].v[k] = m[k].v[i], m[k].v[i] = t;
+        }
 }
 static inline uint32_t f8_le(f8 a, f8 b) {
     FCT_M8(a.v[i] <= b.v[i]);
