@@ -1,6 +1,7 @@
-/* base/file.c: see file.h. The only file that opens files. */
+/* base/file.c: see file.h. With output.c the only file that opens files. */
 #define _GNU_SOURCE
 #include "base/file.h"
+#include "base/output.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -95,67 +96,34 @@ static fct_result write_directly(const fct_env *env, const char *path,
     return result;
 }
 
-/* Creates a new file beside `target` and writes its name into `temporary`. The process id and a count make
- * the name; O_EXCL makes it ours. */
-static int create_beside(const char *target, char *temporary, size_t size) {
-    for (int i = 0; i < 1000; ++i) {
-        if ((size_t)snprintf(temporary, size, "%s.%ld-%d.tmp", target, (long)getpid(), i) >= size) {
-            errno = ENAMETOOLONG;
-            return -1;
-        }
-        int descriptor = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (descriptor >= 0 || errno != EEXIST) return descriptor;
-    }
-    return -1;
-}
-
-/* A rename is on the disk only when its folder is. Folders that cannot be synchronised (some network file
- * systems) are left alone. */
-static void synchronise_folder(const char *target) {
-    char folder[PATH_MAX];
-    snprintf(folder, sizeof folder, "%s", target);
-    char *slash = strrchr(folder, '/');
-    if (!slash)
-        strcpy(folder, ".");
-    else
-        slash[slash == folder] = 0;
-    int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor < 0) return;
-    (void)!fsync(descriptor);
-    close(descriptor);
-}
-
 fct_result fct_file_write_atomic(const fct_env *env, const char *path,
                                  fct_result (*produce)(void *user, FILE *stream), void *user) {
     if (!strcmp(path, "-")) return finish(env, "standard output", stdout, produce(user, stdout));
-    char target[PATH_MAX], temporary[PATH_MAX];
     struct stat status;
-    bool exists = stat(path, &status) == 0;
-    if (exists && S_ISDIR(status.st_mode)) return fail_output(env, path, EISDIR);
-    if (exists && !S_ISREG(status.st_mode)) return write_directly(env, path, produce, user);
-    if (exists && access(path, W_OK)) return fail_output(env, path, errno);
-    if (!exists || !realpath(path, target)) {
-        if ((size_t)snprintf(target, sizeof target, "%s", path) >= sizeof target)
-            return fail_output(env, path, ENAMETOOLONG);
-    }
-    int descriptor = create_beside(target, temporary, sizeof temporary);
-    if (descriptor < 0) return fail_output(env, path, errno);
-    if (exists) (void)!fchmod(descriptor, status.st_mode & 07777);
-    FILE *stream = fdopen(descriptor, "wb");
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
+        return write_directly(env, path, produce, user);
+    fct_output output;
+    fct_result result = fct_output_open(env, path, 0, &output);
+    if (result != FCT_OK) return result;
+    int descriptor = dup(output.descriptor);
+    FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "wb");
     if (!stream) {
-        fct_result failed = fail_output(env, path, errno);
-        close(descriptor);
-        unlink(temporary);
-        return failed;
+        result = fail_output(env, path, errno);
+        if (descriptor >= 0) close(descriptor);
+        fct_output_abandon(&output);
+        return result;
     }
     setvbuf(stream, NULL, _IOFBF, 1 << 18);
-    fct_result result = finish(env, path, stream, produce(user, stream));
-    if (result == FCT_OK && fsync(descriptor)) result = fail_output(env, path, errno);
+    result = finish(env, path, stream, produce(user, stream));
     if (fclose(stream) && result == FCT_OK) result = fail_output(env, path, errno);
-    if (result == FCT_OK && rename(temporary, target)) result = fail_output(env, path, errno);
-    if (result != FCT_OK)
-        unlink(temporary);
-    else
-        synchronise_folder(target);
+    if (result == FCT_OK) return fct_output_finish(&output);
+    fct_output_abandon(&output);
     return result;
+}
+
+void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use) {
+    if (!file->mapped || file->data == empty || !size) return;
+    static const int advices[] = {MADV_RANDOM, MADV_NORMAL, MADV_WILLNEED};
+    uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), begin = offset / page * page;
+    (void)!madvise((char *)file->data + begin, offset + size - begin, advices[use]);
 }

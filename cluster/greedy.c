@@ -139,7 +139,11 @@ static fct_result run(greedy *g) {
         }
         uint32_t e = fct_heap_pop(&g->heap);
         if (e == FCT_NONE) break;
-        contract(g, e);
+        uint32_t a = g->edges[e].a, b = g->edges[e].b;
+        if (work->frozen && (work->frozen[a] || work->frozen[b]))
+            work->frozen[a] = work->frozen[b] = 1; /* the cheapest partner is, so it stays the cheapest */
+        else
+            contract(g, e);
     }
     uint32_t kept = 0;
     for (uint32_t e = 0; e < work->edge_count; ++e)

@@ -243,7 +243,9 @@ static fct_result join_parts(joiner *j, const fct_mesh *mesh, part *scratch, uin
                                    work->heights[f]};
     fct_result result = bound_parts(j, mesh);
     if (result != FCT_OK) return result;
-    split_all(j, scratch, (int)(3 * log2(work->face_count)));
+    uint64_t faces = 0; /* more than slots, where slots begin as clusters */
+    for (uint32_t i = 0; i < j->part_count; ++i) faces += j->parts[i].count;
+    split_all(j, scratch, (int)(3 * log2((double)faces)));
     for (uint32_t node = j->node_count; node-- > 0;) {
         uint32_t a = slot_of(j, slots, j->nodes[node].child[0]),
                  b = slot_of(j, slots, j->nodes[node].child[1]);

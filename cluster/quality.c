@@ -1,50 +1,58 @@
 /* cluster/quality.c: how good a partition is, measured from the triangles alone.
  *
- * Everything is summed in double per cluster over its contiguous faces; borders and connectedness come from
- * the dual graph of the mesh in the tree's order. Area weights; a cluster without area weighs nothing.
- * O(F log F), parallel over clusters.
+ * A cluster is a range of a list of faces: for nodes of a tree the places themselves, for labels a counting
+ * sort of the faces. Sums are in double per cluster; borders and connectedness come from the dual graph. Area
+ * weights; a cluster without area weighs nothing. Boxes are the tree's, or for labels along the principal
+ * axes of the surface, turned about the normal to the best of eight angles. O(F log F), parallel over
+ * clusters.
  */
 #include <string.h>
 
 #include "base/eigen.h"
 #include "base/parallel.h"
+#include "cluster/labels.h"
 #include "cluster/tree.h"
 #include "facetree/dual.h"
 
+enum { TURNS = 8 };
+static const double pi = 3.14159265358979323846;
+
 typedef struct piece {
+    uint32_t first, count;                            /* range of the list */
     double area, fit, direction, deviation, box_area; /* fit, direction, deviation times area */
     double perimeter;
 } piece;
 
 typedef struct judge {
-    const fct_tree *tree;
-    const uint32_t *nodes;
+    const fct_mesh *mesh;
+    const fct_tree *tree;   /* NULL where boxes are to be fitted */
+    const uint32_t *nodes;  /* of the tree */
+    const uint32_t *labels; /* by face of the mesh */
+    uint32_t *faces;        /* the list; NULL: face i at place i */
+    uint32_t *parents;      /* union-find over faces */
     piece *pieces;
-    uint32_t *labels;  /* by place */
-    uint32_t *parents; /* union-find over places */
+    uint32_t count;
 } judge;
 
-static uint32_t first_of(const fct_tree_view *view, uint32_t node) {
-    return node < view->node_count ? view->clusters[node].first : node - view->node_count;
-}
-
-static uint32_t count_of(const fct_tree_view *view, uint32_t node) {
-    return node < view->node_count ? view->clusters[node].count : 1;
-}
-
-static void load_triangle(const fct_tree_view *view, size_t place, v3 origin, v3 p[3], v3 *vector) {
+static void load_triangle(const judge *j, size_t place, v3 origin, v3 p[3]) {
+    size_t face = j->faces ? j->faces[place] : place;
     for (size_t k = 0; k < 3; ++k)
-        p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]), origin);
-    *vector = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
+        p[k] = v3_sub(v3_load(j->mesh->positions + 3 * (size_t)j->mesh->triangles[3 * face + k]), origin);
 }
 
-/* Sums over the surface of places [first, end); covariance about the centroid. */
-static void sum_surface(const fct_tree_view *view, size_t first, size_t end, piece *out, v3 *s,
-                        double covariance[6], double moment[6]) {
-    v3 origin = v3_load(view->positions + 3 * (size_t)view->triangles[3 * first]), center = {0, 0, 0}, p[3],
-       a;
+static v3 area_vector(const v3 p[3]) {
+    return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
+}
+
+/* Sums over the surface of a piece; covariance about the centroid. */
+static void sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], double moment[6]) {
+    const size_t first = out->first, end = first + out->count;
+    v3 origin = {0, 0, 0}, center = {0, 0, 0}, p[3];
+    load_triangle(j, first, origin, p);
+    origin = p[0];
     for (size_t place = first; place < end; ++place) {
-        load_triangle(view, place, origin, p, &a);
+        load_triangle(j, place, origin, p);
+        v3 a = area_vector(p);
         double area = v3_norm(a);
         if (!(area > 0)) continue;
         out->area += area;
@@ -55,32 +63,60 @@ static void sum_surface(const fct_tree_view *view, size_t first, size_t end, pie
     if (!(out->area > 0)) return;
     origin = v3_mad(origin, 1 / out->area, center);
     for (size_t place = first; place < end; ++place) {
-        load_triangle(view, place, origin, p, &a);
-        double area = v3_norm(a);
+        load_triangle(j, place, origin, p);
+        double area = v3_norm(area_vector(p));
         for (int k = 0; k < 3; ++k) sym3_add_outer(covariance, area / 12, p[k]);
         sym3_add_outer(covariance, area / 12, v3_add(v3_add(p[0], p[1]), p[2]));
     }
 }
 
+/* The least surface area of a box about the piece with one axis along axes[0]. */
+static double fit_box(const judge *j, const piece *range, const v3 axes[3]) {
+    double low[2 * TURNS + 1], high[2 * TURNS + 1], best = INFINITY;
+    v3 along[2 * TURNS + 1], p[3];
+    for (int t = 0; t < TURNS; ++t) {
+        double c = cos(pi * t / (2 * TURNS)), s = sin(pi * t / (2 * TURNS));
+        along[2 * t] = v3_mad(v3_scale(axes[2], c), s, axes[1]);
+        along[2 * t + 1] = v3_mad(v3_scale(axes[1], c), -s, axes[2]);
+    }
+    along[2 * TURNS] = axes[0];
+    for (int i = 0; i <= 2 * TURNS; ++i) low[i] = INFINITY, high[i] = -INFINITY;
+    for (size_t place = range->first; place < (size_t)range->first + range->count; ++place) {
+        load_triangle(j, place, (v3){0, 0, 0}, p);
+        for (int k = 0; k < 3; ++k)
+            for (int i = 0; i <= 2 * TURNS; ++i) {
+                double x = v3_dot(p[k], along[i]);
+                low[i] = x < low[i] ? x : low[i], high[i] = x > high[i] ? x : high[i];
+            }
+    }
+    double height = high[2 * TURNS] - low[2 * TURNS];
+    for (int t = 0; t < TURNS; ++t) {
+        double x = high[2 * t] - low[2 * t], y = high[2 * t + 1] - low[2 * t + 1];
+        best = fmin(best, 2 * (x * y + height * (x + y)));
+    }
+    return best;
+}
+
 static void judge_piece(const judge *j, uint32_t i) {
-    const fct_tree_view *view = &j->tree->view;
-    uint32_t node = j->nodes[i], first = first_of(view, node), count = count_of(view, node);
     piece *out = &j->pieces[i];
-    *out = (piece){0};
+    if (out->count == 0) return;
     double covariance[6] = {0}, moment[6] = {0}, values[3];
     v3 s = {0, 0, 0}, axes[3];
-    sum_surface(view, first, (size_t)first + count, out, &s, covariance, moment);
+    sum_surface(j, out, &s, covariance, moment);
     fct_eigen3(covariance, values, axes);
     v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
     out->fit = fmax(values[0], 0);
     out->direction = fmax(sym3_form(moment, n, n) - 2 * v3_dot(n, s) + out->area, 0);
     out->deviation = 2 * fmax(out->area - v3_norm(s), 0);
+    if (!j->tree) {
+        out->box_area = fit_box(j, out, axes);
+        return;
+    }
     fct_cluster cluster;
-    fct_tree_cluster(j->tree, node, &cluster);
+    fct_tree_cluster(j->tree, j->nodes[i], &cluster);
     const float *h = cluster.box_half;
     out->box_area =
         8 * ((double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0]);
-    for (uint32_t place = first; place < first + count; ++place) j->labels[place] = i;
 }
 
 static void judge_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -97,8 +133,9 @@ static uint32_t find(uint32_t *parents, uint32_t i) {
 }
 
 /* Borders of the clusters, and whether the faces of each hang together. */
-static void walk_dual(const judge *j, const fct_dual *dual, bool *connected, uint32_t count) {
-    uint32_t joined = 0;
+static bool walk_dual(const judge *j, const fct_dual *dual) {
+    uint32_t joined = 0, filled = 0;
+    for (uint32_t i = 0; i < j->count; ++i) filled += j->pieces[i].count > 0;
     for (uint32_t f = 0; f < dual->face_count; ++f) {
         j->pieces[j->labels[f]].perimeter += (double)dual->perimeters[f];
         j->parents[f] = f;
@@ -115,13 +152,13 @@ static void walk_dual(const judge *j, const fct_dual *dual, bool *connected, uin
         else
             j->parents[a] = b;
     }
-    *connected = joined == dual->face_count - count;
+    return joined == dual->face_count - filled;
 }
 
-static double squared_diagonal(const fct_tree_view *view) {
+static double squared_diagonal(const fct_mesh *mesh) {
     v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < 3 * (size_t)view->face_count; ++i) {
-        v3 p = v3_load(view->positions + 3 * (size_t)view->triangles[i]);
+    for (size_t i = 0; i < 3 * (size_t)mesh->face_count; ++i) {
+        v3 p = v3_load(mesh->positions + 3 * (size_t)mesh->triangles[i]);
         lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
         upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
     }
@@ -129,16 +166,16 @@ static double squared_diagonal(const fct_tree_view *view) {
     return squared > 0 ? squared : 1;
 }
 
-static fct_partition_quality mean_of(const judge *j, uint32_t count, bool connected) {
-    double area = 0, unit = squared_diagonal(&j->tree->view);
+static fct_partition_quality mean_of(const judge *j, bool connected) {
+    double area = 0, unit = squared_diagonal(j->mesh);
     fct_partition_quality q = {.connected = connected};
-    for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t i = 0; i < j->count; ++i) {
         const piece *p = &j->pieces[i];
         area += p->area;
         q.mean_fit += p->fit / unit;
         q.mean_direction += p->direction;
         q.mean_normal_deviation += p->deviation;
-        q.mean_irregularity += fmax(p->perimeter, 0) * fmax(p->perimeter, 0) / (4 * 3.14159265358979323846);
+        q.mean_irregularity += fmax(p->perimeter, 0) * fmax(p->perimeter, 0) / (4 * pi);
         q.box_area += p->box_area / unit;
     }
     if (!(area > 0)) return (fct_partition_quality){.box_area = q.box_area, .connected = connected};
@@ -149,6 +186,24 @@ static fct_partition_quality mean_of(const judge *j, uint32_t count, bool connec
     return q;
 }
 
+/* The judge is complete but for parents. */
+static fct_result measure(const fct_env *env, judge *j, fct_partition_quality *out) {
+    fct_dual dual = {0};
+    j->parents = fct_allocate(env, j->mesh->face_count, sizeof *j->parents);
+    fct_result result;
+    if (!j->parents)
+        result = fct_fail_memory(env, "measuring a partition");
+    else
+        result = fct_dual_build(env, j->mesh, &dual);
+    if (result == FCT_OK) {
+        fct_parallel_for(env, j->count, 64, judge_chunk, j);
+        *out = mean_of(j, walk_dual(j, &dual));
+    }
+    fct_dual_release(env, &dual);
+    fct_release(env, j->parents);
+    return result;
+}
+
 fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
                             fct_partition_quality *out) {
     const fct_tree_view *view = &tree->view;
@@ -156,25 +211,62 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
                      .face_count = view->face_count,
                      .positions = (float *)view->positions,
                      .triangles = (uint32_t *)view->triangles};
-    judge j = {.tree = tree, .nodes = nodes};
-    fct_dual dual = {0};
-    j.pieces = fct_allocate(env, count, sizeof *j.pieces);
-    j.labels = fct_allocate(env, view->face_count, sizeof *j.labels);
-    j.parents = fct_allocate(env, view->face_count, sizeof *j.parents);
+    judge j = {.mesh = &mesh, .tree = tree, .nodes = nodes, .count = count};
+    uint32_t *labels = fct_allocate(env, view->face_count, sizeof *labels);
+    j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
     fct_result result;
-    if (!j.pieces || !j.labels || !j.parents)
+    if (labels && j.pieces) {
+        for (uint32_t i = 0; i < count; ++i) {
+            bool leaf = nodes[i] >= view->node_count;
+            piece *p = &j.pieces[i];
+            p->first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
+            p->count = leaf ? 1 : view->clusters[nodes[i]].count;
+            for (uint32_t place = p->first; place < p->first + p->count; ++place) labels[place] = i;
+        }
+        j.labels = labels;
+        result = measure(env, &j, out);
+    } else {
         result = fct_fail_memory(env, "measuring a partition");
-    else
-        result = fct_dual_build(env, &mesh, &dual);
-    if (result == FCT_OK) {
-        fct_parallel_for(env, count, 64, judge_chunk, &j);
-        bool connected;
-        walk_dual(&j, &dual, &connected, count);
-        *out = mean_of(&j, count, connected);
     }
-    fct_dual_release(env, &dual);
+    fct_release(env, labels);
     fct_release(env, j.pieces);
-    fct_release(env, j.labels);
-    fct_release(env, j.parents);
+    return result;
+}
+
+fct_result fct_labels_check(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                            uint32_t count) {
+    fct_result result = fct_mesh_validate(env, mesh);
+    for (uint32_t f = 0; result == FCT_OK && f < mesh->face_count; ++f)
+        if (labels[f] >= count)
+            result = fct_fail(env, FCT_ERROR_DATA, "face %u: label %u is out of range, of %u clusters", f,
+                              labels[f], count);
+    return result;
+}
+
+fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                              uint32_t count, fct_partition_quality *out) {
+    fct_result result = fct_labels_check(env, mesh, labels, count);
+    if (result != FCT_OK) return result;
+    judge j = {.mesh = mesh, .labels = labels, .count = count};
+    j.faces = fct_allocate(env, mesh->face_count, sizeof *j.faces);
+    j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
+    if (j.faces && j.pieces) {
+        uint32_t end = 0;
+        for (uint32_t f = 0; f < mesh->face_count; ++f) ++j.pieces[labels[f]].count;
+        for (uint32_t i = 0; i < count; ++i) {
+            j.pieces[i].first = end;
+            end += j.pieces[i].count;
+            j.pieces[i].count = 0;
+        }
+        for (uint32_t f = 0; f < mesh->face_count; ++f) {
+            piece *p = &j.pieces[labels[f]];
+            j.faces[p->first + p->count++] = f;
+        }
+        result = measure(env, &j, out);
+    } else {
+        result = fct_fail_memory(env, "measuring a partition");
+    }
+    fct_release(env, j.faces);
+    fct_release(env, j.pieces);
     return result;
 }

@@ -57,7 +57,10 @@ static uint64_t tie_key(const rounds *r, uint32_t a, uint32_t b) {
 static void find_best(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     rounds *r = user;
+    const uint8_t *frozen = r->work->frozen;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        r->best[i] = FCT_NONE;
+        if (frozen && frozen[r->now.slots[i]]) continue;
         const fct_neighbor *list = r->now.entries + r->now.starts[i];
         uint32_t best = FCT_NONE, least = UINT32_MAX;
         for (uint32_t k = 0; k < r->now.lengths[i]; ++k) {

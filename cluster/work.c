@@ -85,22 +85,28 @@ static fct_result allocate_clusters(fct_work *work, bool directions) {
     return complete ? FCT_OK : fct_fail_memory(env, "clustering");
 }
 
-fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out) {
-    fct_bounds bounds;
+fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
+                                  const fct_tree_def *def, fct_work *out) {
     *out = (fct_work){.env = env, .face_count = mesh->face_count, .materials = mesh->materials};
+    out->metric = fct_metric_make(def, bounds);
     fct_result result = fct_lists_build(env, mesh, &out->lists);
-    if (result == FCT_OK) result = bound_mesh(env, mesh, &bounds);
     if (result == FCT_OK) result = allocate_clusters(out, def->cost == FCT_COST_MEAN);
     if (result != FCT_OK) {
         fct_work_release(out);
         return result;
     }
-    out->metric = fct_metric_make(def, &bounds);
+    out->boundary_edges = out->lists.boundary_edges, out->nonmanifold_edges = out->lists.nonmanifold_edges;
     face_job job = {.work = out, .mesh = mesh};
     fct_parallel_for(env, mesh->face_count, GRAIN, make_records, &job);
     fct_release(env, out->lists.perimeters);
     out->lists.perimeters = NULL;
     return FCT_OK;
+}
+
+fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out) {
+    fct_bounds bounds;
+    fct_result result = bound_mesh(env, mesh, &bounds);
+    return result == FCT_OK ? fct_work_create_within(env, mesh, &bounds, def, out) : result;
 }
 
 void fct_work_release(fct_work *work) {

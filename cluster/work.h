@@ -24,8 +24,13 @@ typedef struct fct_work {
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
     bool steep;                /* the reserve of height may be used */
     bool balanced;             /* the greedy loop goes by size first, then by cost */
+    uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
     uint32_t stranded;         /* clusters that edges lead to but grafting found no place for */
     const uint32_t *materials; /* of the face of the slot, or NULL */
+    /* Per slot, or NULL. Nonzero: the cluster has neighbours that are not here. It never merges, and a
+     * cluster whose cheapest partner it is waits rather than take the next best (it may become frozen, too).
+     * Only clusters with edges need one. */
+    uint8_t *frozen;
     /* per merge, F - 1 of them */
     uint32_t (*children)[2]; /* build ids */
     float *costs;
@@ -45,6 +50,9 @@ uint32_t fct_height_limit(uint32_t count, bool mild);
 
 /* Records of all faces and the edges of the dual graph. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out);
+/* The same for a piece of a model with these bounds, by which costs are measured. */
+fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
+                                  const fct_tree_def *def, fct_work *out);
 void fct_work_release(fct_work *work);
 
 /* Costs of merging count <= FCT_LANES pairs of slots. */

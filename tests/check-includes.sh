@@ -12,6 +12,7 @@ BEGIN {
         for (j = 1; j <= i; ++j) allowed[chain[i], chain[j]] = 1
     allowed["simplify", "base"] = allowed["simplify", "mesh"] = allowed["simplify", "simplify"] = 1
     allowed["tools", "tools"] = 1
+    folder["partition"] = "cluster" # a second public header of a folder
 }
 function fail(what) {
     print FILENAME ":" FNR ": " what
@@ -28,6 +29,7 @@ function fail(what) {
         from = own[3]
         sub(/\..*/, "", from)
         if (from == "facetree") next
+        if (from in folder) from = folder[from]
         if (target[1] != "facetree") fail("a public header includes a private one: " path)
     }
     if (parts < 2) { fail("an include without its folder: " path); next }
@@ -35,6 +37,7 @@ function fail(what) {
         if (from == "tools" || from == "examples") next
         to = target[2]
         sub(/\..*/, "", to)
+        if (to in folder) to = folder[to]
     } else
         to = target[1]
     if (from == "examples") { fail("an example includes a private header: " path); next }

@@ -80,8 +80,12 @@ FCT_API void fct_tree_destroy(fct_tree *tree);
 /* Pointers into the tree, valid as long as it lives. */
 typedef struct fct_tree_view {
     uint32_t face_count, vertex_count, node_count, root_count;
-    uint32_t depth;              /* of the deepest leaf; a single root leaf has depth 0 */
-    double mean_depth;           /* over the leaves */
+    uint32_t depth;    /* of the deepest leaf; a single root leaf has depth 0 */
+    double mean_depth; /* over the leaves */
+    /* Of the mesh, by its dual graph: edges with one face, with three or more, and parts that edges connect.
+     */
+    uint32_t boundary_edges, nonmanifold_edges, component_count;
+    fct_bounds bounds;           /* of all vertices; empty where there are none */
     const fct_cluster *clusters; /* node_count inner nodes */
     const uint32_t *roots;       /* root_count node ids, ascending */
     const uint32_t *face_ids;    /* place -> input face */
@@ -125,6 +129,38 @@ typedef struct fct_partition_quality {
 } fct_partition_quality;
 FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
                                     uint32_t count, fct_partition_quality *out);
+
+/* The same for any partition of a mesh: labels (face_count, each < count) as fct_tree_labels and
+ * fct_partition_refine leave them. box_area is that of boxes fitted for the occasion. A label without faces
+ * counts for nothing. Errors: DATA (invalid mesh, a label out of range), MEMORY. */
+FCT_API fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                                      uint32_t count, fct_partition_quality *out);
+
+typedef struct fct_refine_def {
+    uint32_t size;
+    uint32_t sweep_count;      /* at most this many; it ends when no face moves; default 4 */
+    double perimeter_weight;   /* of (sum of squared perimeters) beside the deviation of normals, both over
+                                  their   start; 0 to 1e6, default .1 */
+    double irregularity_limit; /* mean irregularity may reach this multiple of its start; at least 1, INFINITY
+                                  for no limit; default 1 */
+} fct_refine_def;
+FCT_API fct_refine_def fct_refine_def_default(void);
+
+typedef struct fct_refine_stats {
+    uint32_t sweeps; /* done */
+    uint64_t moves;  /* faces that changed sides */
+    double seconds_dual, seconds_sweeps;
+} fct_refine_stats;
+
+/* Refines a partition: faces on the borders between clusters change sides, those that gain most first, so
+ * that the squared deviation of normals (L2,1) falls while borders stay short. No cluster loses its last face
+ * or falls into more pieces than it had, and with mesh->materials a face follows only neighbours of its own
+ * material. labels holds face_count entries, each < count, and is changed in place; on failure it is as it
+ * was. The result is a partition and no longer a cut of a tree. def may be NULL (the defaults), stats too.
+ * Same result for every thread count. Errors: DATA (invalid mesh, a label or an option out of range), MEMORY,
+ * CANCELLED. */
+FCT_API fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32_t count,
+                                        const fct_refine_def *def, uint32_t *labels, fct_refine_stats *stats);
 
 /* Writes the hierarchy file: temporary file, fsync, rename. Errors: OUTPUT, MEMORY. */
 FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);

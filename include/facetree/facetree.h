@@ -7,6 +7,7 @@
 #include "facetree/cluster.h"
 #include "facetree/dual.h"
 #include "facetree/mesh.h"
+#include "facetree/partition.h"
 #include "facetree/radiosity.h"
 #include "facetree/scene.h"
 #include "facetree/simplify.h"
