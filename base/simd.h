@@ -1,5 +1,5 @@
-/* base/simd.h: eight floats at a time. The only file with intrinsics: AVX2 where the compiler offers it, else
- * (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the target has.
+/* base/simd.h: eight floats or four doubles at a time. The only file with intrinsics: AVX2 where the compiler
+ * offers it, else (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the target has.
  *
  * Both forms round every operation on its own (no fused multiply-add) and treat NaN alike: min(a, b) is a < b
  * ? a : b, comparisons with NaN are false. So a kernel gives the same bits in both.
@@ -12,9 +12,37 @@
 #if defined(__AVX2__) && !defined(FCT_SCALAR)
 #include <immintrin.h>
 
+typedef __m256d d4;
 typedef __m256 f8;
 typedef __m256i i8;
 
+static inline d4 d4_set(double a) {
+    return _mm256_set1_pd(a);
+}
+static inline d4 d4_load_floats(const float *p) {
+    return _mm256_cvtps_pd(_mm_loadu_ps(p));
+}
+static inline void d4_store(double *p, d4 a) {
+    _mm256_storeu_pd(p, a);
+}
+static inline void d4_store_floats(float *p, d4 a) {
+    _mm_storeu_ps(p, _mm256_cvtpd_ps(a));
+}
+static inline d4 d4_add(d4 a, d4 b) {
+    return _mm256_add_pd(a, b);
+}
+static inline d4 d4_sub(d4 a, d4 b) {
+    return _mm256_sub_pd(a, b);
+}
+static inline d4 d4_mul(d4 a, d4 b) {
+    return _mm256_mul_pd(a, b);
+}
+static inline d4 d4_min(d4 a, d4 b) {
+    return _mm256_min_pd(a, b);
+}
+static inline d4 d4_max(d4 a, d4 b) {
+    return _mm256_max_pd(a, b);
+}
 static inline f8 f8_set(float a) {
     return _mm256_set1_ps(a);
 }
@@ -100,6 +128,9 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
 
 #else
 
+typedef struct d4 {
+    double v[4];
+} d4;
 typedef struct f8 {
     float v[8];
 } f8;
@@ -107,6 +138,10 @@ typedef struct i8 {
     int32_t v[8];
 } i8;
 
+#define FCT_D4(expression)                                                                                   \
+    d4 r;                                                                                                    \
+    for (int i = 0; i < 4; ++i) r.v[i] = (expression);                                                       \
+    return r
 #define FCT_F8(expression)                                                                                   \
     f8 r;                                                                                                    \
     for (int i = 0; i < 8; ++i) r.v[i] = (expression);                                                       \
@@ -116,6 +151,33 @@ typedef struct i8 {
     for (int i = 0; i < 8; ++i) mask |= (uint32_t)(expression) << i;                                         \
     return mask
 
+static inline d4 d4_set(double a) {
+    FCT_D4(a);
+}
+static inline d4 d4_load_floats(const float *p) {
+    FCT_D4((double)p[i]);
+}
+static inline void d4_store(double *p, d4 a) {
+    for (int i = 0; i < 4; ++i) p[i] = a.v[i];
+}
+static inline void d4_store_floats(float *p, d4 a) {
+    for (int i = 0; i < 4; ++i) p[i] = (float)a.v[i];
+}
+static inline d4 d4_add(d4 a, d4 b) {
+    FCT_D4(a.v[i] + b.v[i]);
+}
+static inline d4 d4_sub(d4 a, d4 b) {
+    FCT_D4(a.v[i] - b.v[i]);
+}
+static inline d4 d4_mul(d4 a, d4 b) {
+    FCT_D4(a.v[i] * b.v[i]);
+}
+static inline d4 d4_min(d4 a, d4 b) {
+    FCT_D4(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
+}
+static inline d4 d4_max(d4 a, d4 b) {
+    FCT_D4(a.v[i] > b.v[i] ? a.v[i] : b.v[i]);
+}
 static inline f8 f8_set(float a) {
     FCT_F8(a);
 }
@@ -183,6 +245,7 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
     FCT_F8(index.v[i] & 8 ? high.v[index.v[i] & 7] : low.v[index.v[i] & 7]);
 }
 
+#undef FCT_D4
 #undef FCT_F8
 #undef FCT_M8
 #endif
