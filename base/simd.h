@@ -112,6 +112,33 @@ static inline uint32_t f8_lt(f8 a, f8 b) {
 static inline uint32_t f8_eq(f8 a, f8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_EQ_OQ));
 }
+static inline i8 i8_set(uint32_t a) {
+    return _mm256_set1_epi32((int)a);
+}
+static inline i8 i8_load(const uint32_t *p) {
+    return _mm256_loadu_si256((const __m256i *)(const void *)p);
+}
+static inline i8 i8_shift_right(i8 a, int bits) {
+    return _mm256_srli_epi32(a, bits);
+}
+static inline i8 i8_or(i8 a, i8 b) {
+    return _mm256_or_si256(a, b);
+}
+/* Bit i: a_i == b_i. */
+static inline uint32_t i8_eq(i8 a, i8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b)));
+}
+/* Bit i: a_i < b_i, both below 2^31. */
+static inline uint32_t i8_lt(i8 a, i8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(b, a)));
+}
+/* The least of the eight as unsigned numbers. */
+static inline uint32_t i8_least(i8 a) {
+    __m128i b = _mm_min_epu32(_mm256_castsi256_si128(a), _mm256_extracti128_si256(a, 1));
+    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0x4E));
+    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0xB1));
+    return (uint32_t)_mm_cvtsi128_si32(b);
+}
 static inline i8 i8_load_bytes(const uint8_t *p) {
     return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
 }
@@ -232,6 +259,35 @@ static inline uint32_t f8_lt(f8 a, f8 b) {
 }
 static inline uint32_t f8_eq(f8 a, f8 b) {
     FCT_M8(a.v[i] == b.v[i]);
+}
+static inline i8 i8_set(uint32_t a) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)a;
+    return r;
+}
+static inline i8 i8_load(const uint32_t *p) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)p[i];
+    return r;
+}
+static inline i8 i8_shift_right(i8 a, int bits) {
+    for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] >> bits);
+    return a;
+}
+static inline i8 i8_or(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] |= b.v[i];
+    return a;
+}
+static inline uint32_t i8_eq(i8 a, i8 b) {
+    FCT_M8(a.v[i] == b.v[i]);
+}
+static inline uint32_t i8_lt(i8 a, i8 b) {
+    FCT_M8(a.v[i] < b.v[i]);
+}
+static inline uint32_t i8_least(i8 a) {
+    uint32_t least = UINT32_MAX;
+    for (int i = 0; i < 8; ++i) least = (uint32_t)a.v[i] < least ? (uint32_t)a.v[i] : least;
+    return least;
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     i8 r;

@@ -91,6 +91,15 @@ void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size
     }
 }
 
+/* The next float above one that is not below 0. */
+static float above(float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    bits += bits < 0x7F800000u;
+    memcpy(&value, &bits, sizeof bits);
+    return value;
+}
+
 bool fct_box_set(const fct_extents *e, const float rotation[4], const float axes[3][3], v3 point,
                  fct_cluster *cluster) {
     /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
@@ -108,38 +117,49 @@ bool fct_box_set(const fct_extents *e, const float rotation[4], const float axes
     for (int k = 0; k < 3; ++k) {
         double middle = v3_dot(center, a[k]), half = greater(e->high[k] - middle, middle - e->low[k]);
         half += 16 * DBL_EPSILON * size; /* whatever order of operations checks it */
-        cluster->box_half[k] = nextafterf((float)half, INFINITY);
+        cluster->box_half[k] = above((float)half);
         within = within && isfinite(cluster->box_half[k]) && isfinite(cluster->box_center[k]);
         cluster->box_half[k] = cluster->box_half[k] < FLT_MAX ? cluster->box_half[k] : FLT_MAX;
     }
     return within;
 }
 
-/* Points along the frame's axes, from the first of them, over the size. Returns how many, a multiple of 4. */
+static inline void sample4(const float *x, const float *y, const float *z, const d4 origin[4], d4 f[3][3],
+                           float (*out)[SAMPLES + 4], size_t to) {
+    d4 p[3] = {d4_mul(d4_sub(d4_load_floats(x), origin[0]), origin[3]),
+               d4_mul(d4_sub(d4_load_floats(y), origin[1]), origin[3]),
+               d4_mul(d4_sub(d4_load_floats(z), origin[2]), origin[3])};
+    for (int k = 0; k < 3; ++k) {
+        d4 d = d4_add(d4_mul(p[0], f[k][0]), d4_mul(p[1], f[k][1]));
+        d4_store_floats(out[k] + to, d4_add(d, d4_mul(p[2], f[k][2])));
+    }
+}
+
+/* Points along the frame's axes, from the first of them, over the size; returns how many. What is left of
+ * fours is made up for by points that are there already. */
 static size_t sample(fct_points p, size_t begin, size_t end, double size, const v3 frame[3],
-                     float (*out)[SAMPLES]) {
-    size_t count = end - begin, taken = count < SAMPLES ? count : SAMPLES, padded = (taken + 3) & ~(size_t)3;
-    float spread[3][SAMPLES];
-    fct_points from = {p.x + begin, p.y + begin, p.z + begin};
-    if (count != padded) {
-        for (size_t i = 0; i < padded; ++i) {
-            size_t at = begin + (i < taken ? i * count / taken : 0);
-            spread[0][i] = p.x[at], spread[1][i] = p.y[at], spread[2][i] = p.z[at];
-        }
-        from = (fct_points){spread[0], spread[1], spread[2]};
+                     float (*out)[SAMPLES + 4]) {
+    d4 f[3][3], origin[4] = {d4_set((double)p.x[begin]), d4_set((double)p.y[begin]),
+                             d4_set((double)p.z[begin]), d4_set(1 / size)};
+    for (int k = 0; k < 3; ++k)
+        f[k][0] = d4_set(frame[k].x), f[k][1] = d4_set(frame[k].y), f[k][2] = d4_set(frame[k].z);
+    size_t count = end - begin, to = 0;
+    if (count >= 4 && count <= SAMPLES) {
+        for (; to + 4 <= count; to += 4)
+            sample4(p.x + begin + to, p.y + begin + to, p.z + begin + to, origin, f, out, to);
+        if (to < count) sample4(p.x + end - 4, p.y + end - 4, p.z + end - 4, origin, f, out, to), to += 4;
+        return to;
     }
-    d4 ox = d4_set((double)p.x[begin]), oy = d4_set((double)p.y[begin]), oz = d4_set((double)p.z[begin]);
-    d4 invert = d4_set(1 / size);
-    for (size_t i = 0; i < padded; i += 4) {
-        d4 x = d4_mul(d4_sub(d4_load_floats(from.x + i), ox), invert);
-        d4 y = d4_mul(d4_sub(d4_load_floats(from.y + i), oy), invert);
-        d4 z = d4_mul(d4_sub(d4_load_floats(from.z + i), oz), invert);
-        for (int k = 0; k < 3; ++k) {
-            d4 d = d4_add(d4_mul(x, d4_set(frame[k].x)), d4_mul(y, d4_set(frame[k].y)));
-            d4_store_floats(out[k] + i, d4_add(d, d4_mul(z, d4_set(frame[k].z))));
+    size_t taken = count < SAMPLES ? 4 : SAMPLES, step = count > taken ? count / taken : 1;
+    for (; to < taken; to += 4) {
+        float x[4], y[4], z[4];
+        for (size_t i = 0; i < 4; ++i) {
+            size_t at = begin + (to + i) * step % count;
+            x[i] = p.x[at], y[i] = p.y[at], z[i] = p.z[at];
         }
+        sample4(x, y, z, origin, f, out, to);
     }
-    return padded;
+    return to;
 }
 
 void fct_box_turn(fct_points points, size_t begin, size_t end, double size, v3 frame[3]) {
@@ -147,7 +167,7 @@ void fct_box_turn(fct_points points, size_t begin, size_t end, double size, v3 f
                                      0.70710678f, 0.55557023f, 0.38268343f, 0.19509032f};
     static const float sines[8] = {0,           0.19509032f, 0.38268343f, 0.55557023f,
                                    0.70710678f, 0.83146961f, 0.92387953f, 0.98078528f};
-    float w[3][SAMPLES], areas[8], low_w = INFINITY, high_w = -INFINITY;
+    float w[3][SAMPLES + 4], areas[8], low_w = INFINITY, high_w = -INFINITY;
     size_t count = sample(points, begin, end, size, frame, w);
     f8 c = f8_load(cosines), s = f8_load(sines), low = f8_set(INFINITY), high = f8_set(-INFINITY);
     f8 low_a = low, high_a = high, low_b = low, high_b = high;

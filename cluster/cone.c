@@ -58,5 +58,6 @@ static double arc_sine(double x) {
 
 float fct_cone_angle(float widest) {
     double chord = sqrt((double)widest) + 5e-7;
-    return chord < 2 ? nextafterf((float)(2 * arc_sine(chord / 2)), 4) : pi;
+    float angle = chord < 2 ? (float)(2 * arc_sine(chord / 2) * (1 + 2e-7)) : pi;
+    return angle < pi ? angle : pi;
 }

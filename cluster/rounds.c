@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/simd.h"
 #include "base/sort.h"
 #include "cluster/work.h"
 
@@ -20,13 +21,22 @@ enum { GRAIN = 1 << 12, FEW = 4096, LONG = 32 };
 
 #define MERGED 0x80000000u
 
-/* The live clusters of a round. `face` of an entry is a live number; cost: INFINITY where the merge is not
- * allowed, NaN where it must be priced. Lists longer than LONG are sorted by live number. */
+/* Costs are compared and kept as keys that order like them (fct_float_key). */
+#define OPEN    UINT32_MAX  /* to be priced */
+#define BLOCKED 0xFF800000u /* infinity: the merge is not allowed */
+#define SAME    5           /* low bits of a cost in which equal ones may differ */
+
+/* The live clusters of a round and their lists. Lists longer than LONG are sorted by live number. Arrays of
+ * entries may be read, not written, up to SLACK beyond a list. */
 typedef struct generation {
     uint32_t count;
     uint32_t *slots, *starts, *lengths; /* of live numbers */
-    fct_neighbor *entries;
+    uint32_t *others;                   /* per entry: the live number at the other end */
+    float *shared;
+    uint32_t *keys;
 } generation;
+
+enum { SLACK = 8 };
 
 typedef struct rounds {
     fct_work *work;
@@ -54,23 +64,48 @@ static uint64_t tie_key(const rounds *r, uint32_t a, uint32_t b) {
     return (uint64_t)(31 - (uint32_t)__builtin_clz(faces)) << 32 | link_hash(a, b, r->round);
 }
 
+/* The cheapest of entries whose costs share the key `least`, which one has for certain. */
+static uint32_t break_tie(const rounds *r, uint32_t i, uint32_t least) {
+    const uint32_t *keys = r->now.keys + r->now.starts[i], *others = r->now.others + r->now.starts[i];
+    uint32_t best = FCT_NONE;
+    uint64_t best_key = UINT64_MAX;
+    for (uint32_t k = 0; k < r->now.lengths[i]; ++k) {
+        if (keys[k] >> SAME != least) continue;
+        uint64_t key = tie_key(r, i, others[k]);
+        if (key < best_key) best = others[k], best_key = key;
+    }
+    return best;
+}
+
+/* Lanes from `from` on are all ones. */
+static inline i8 lanes_from(uint32_t from) {
+    static const uint32_t lanes[16] = {0,    0,    0,    0,    0,    0,    0,    0,
+                                       OPEN, OPEN, OPEN, OPEN, OPEN, OPEN, OPEN, OPEN};
+    return i8_load(lanes + 8 - (from < 8 ? from : 8));
+}
+
+static uint32_t best_of(const rounds *r, uint32_t i) {
+    const uint32_t *keys = r->now.keys + r->now.starts[i], length = r->now.lengths[i];
+    uint32_t least = OPEN, at = 0, equal = 0;
+    for (uint32_t k = 0; k < length; k += 8) {
+        i8 lanes = i8_or(i8_shift_right(i8_load(keys + k), SAME), lanes_from(length - k));
+        uint32_t low = i8_least(lanes);
+        if (low > least) continue;
+        uint32_t mask = i8_eq(lanes, i8_set(low)), ties = (uint32_t)__builtin_popcount(mask);
+        equal = low < least ? ties : equal + ties;
+        if (low < least) at = k + (uint32_t)__builtin_ctz(mask);
+        least = low;
+    }
+    if (least >= BLOCKED >> SAME) return FCT_NONE;
+    return equal == 1 ? r->now.others[r->now.starts[i] + at] : break_tie(r, i, least);
+}
+
 static void find_best(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     rounds *r = user;
     const uint8_t *frozen = r->work->frozen;
-    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        r->best[i] = FCT_NONE;
-        if (frozen && frozen[r->now.slots[i]]) continue;
-        const fct_neighbor *list = r->now.entries + r->now.starts[i];
-        uint32_t best = FCT_NONE, least = UINT32_MAX;
-        for (uint32_t k = 0; k < r->now.lengths[i]; ++k) {
-            uint32_t cost = fct_float_key(list[k].cost) >> 5, other = list[k].face;
-            if (cost > least || list[k].cost == INFINITY) continue;
-            if (cost < least || tie_key(r, i, other) < tie_key(r, i, best)) best = other;
-            least = cost;
-        }
-        r->best[i] = best;
-    }
+    for (uint32_t i = (uint32_t)begin; i < end; ++i)
+        r->best[i] = frozen && frozen[r->now.slots[i]] ? FCT_NONE : best_of(r, i);
 }
 
 static inline uint32_t mate_of(const rounds *r, uint32_t i) {
@@ -104,10 +139,26 @@ static uint32_t counts_to_places(uint32_t *counts, size_t chunks) {
     return total;
 }
 
-static const fct_neighbor *entry_of(const generation *g, uint32_t i, uint32_t other) {
-    const fct_neighbor *entry = g->entries + g->starts[i];
-    while (entry->face != other) ++entry;
-    return entry;
+/* The entry of live cluster i that leads to `other`, which is there. */
+static uint32_t entry_of(const generation *g, uint32_t i, uint32_t other) {
+    const uint32_t *others = g->others + g->starts[i];
+    uint32_t low = 0, high = g->lengths[i], mask;
+    while (high - low > LONG) {
+        uint32_t middle = low + (high - low) / 2;
+        if (others[middle] <= other)
+            low = middle;
+        else
+            high = middle;
+    }
+    for (i8 wanted = i8_set(other); (mask = i8_eq(i8_load(others + low), wanted)) == 0;) low += 8;
+    return g->starts[i] + low + (uint32_t)__builtin_ctz(mask);
+}
+
+static float cost_of_key(uint32_t key) {
+    uint32_t bits = key & 0x80000000u ? key & 0x7FFFFFFFu : ~key;
+    float cost;
+    memcpy(&cost, &bits, sizeof cost);
+    return cost;
 }
 
 /* Numbers the clusters of the next round and merges. */
@@ -126,11 +177,11 @@ static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint
         room += r->now.lengths[i];
         r->renumbered[i] = next;
         if (mate != FCT_NONE) {
-            const fct_neighbor *link = entry_of(&r->now, i, mate);
+            uint32_t entry = entry_of(&r->now, i, mate);
             room += r->now.lengths[mate] - 2;
             r->renumbered[i] = r->renumbered[mate] = next | MERGED;
-            pairs[count] = (fct_pair){r->now.slots[i], r->now.slots[mate], link->length};
-            costs[count++] = link->cost;
+            pairs[count] = (fct_pair){r->now.slots[i], r->now.slots[mate], r->now.shared[entry]};
+            costs[count++] = cost_of_key(r->now.keys[entry]);
             if (count == FCT_LANES) {
                 fct_work_merges(r->work, merge, pairs, costs, count);
                 merge += count, count = 0;
@@ -143,106 +194,131 @@ static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint
 
 /* --- Lists --- */
 
-static inline bool before(const fct_neighbor *p, const fct_neighbor *q) {
-    return p->face != q->face ? p->face < q->face : p->length < q->length;
+/* A list being made, with room for SLACK more. */
+typedef struct list {
+    uint32_t *others, *keys;
+    float *shared;
+} list;
+
+static inline bool before(const list *l, size_t p, size_t q) {
+    return l->others[p] != l->others[q] ? l->others[p] < l->others[q] : l->shared[p] < l->shared[q];
 }
 
-static void sift_down(fct_neighbor *list, size_t at, size_t count) {
-    fct_neighbor entry = list[at];
+static void swap(const list *l, size_t p, size_t q) {
+    uint32_t other = l->others[p], key = l->keys[p];
+    float shared = l->shared[p];
+    l->others[p] = l->others[q], l->keys[p] = l->keys[q], l->shared[p] = l->shared[q];
+    l->others[q] = other, l->keys[q] = key, l->shared[q] = shared;
+}
+
+static void sift_down(const list *l, size_t at, size_t count) {
     for (size_t child; (child = 2 * at + 1) < count; at = child) {
-        if (child + 1 < count && before(&list[child], &list[child + 1])) ++child;
-        if (!before(&entry, &list[child])) break;
-        list[at] = list[child];
+        if (child + 1 < count && before(l, child, child + 1)) ++child;
+        if (!before(l, at, child)) break;
+        swap(l, at, child);
     }
-    list[at] = entry;
 }
 
-static void sort_list(fct_neighbor *list, size_t count) {
-    for (size_t i = count / 2; i-- > 0;) sift_down(list, i, count);
+static void sort_list(const list *l, size_t count) {
+    for (size_t i = count / 2; i-- > 0;) sift_down(l, i, count);
     for (size_t i = count; i-- > 1;) {
-        fct_neighbor entry = list[0];
-        list[0] = list[i], list[i] = entry;
-        sift_down(list, 0, i);
+        swap(l, 0, i);
+        sift_down(l, 0, i);
     }
 }
 
 /* Adds up neighbouring doubles; a double stands for a merge, so its cost is open. */
-static uint32_t join_sorted(fct_neighbor *list, uint32_t count) {
+static uint32_t join_sorted(const list *l, uint32_t count) {
     uint32_t to = 0;
     for (uint32_t i = 0; i < count; ++i) {
-        if (to > 0 && list[to - 1].face == list[i].face)
-            list[to - 1].length += list[i].length;
+        if (to > 0 && l->others[to - 1] == l->others[i])
+            l->shared[to - 1] += l->shared[i];
         else
-            list[to++] = list[i];
+            l->others[to] = l->others[i], l->keys[to] = l->keys[i], l->shared[to++] = l->shared[i];
     }
     return to;
 }
 
-/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`. */
-static inline uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, bool join,
-                                     fct_neighbor *list, uint32_t count) {
-    const fct_neighbor *from = r->now.entries + r->now.starts[i], *end = from + r->now.lengths[i];
+/* Place of a live number among the first `count`, or count. */
+static inline uint32_t find(const uint32_t *others, uint32_t count, uint32_t other) {
+    i8 wanted = i8_set(other);
+    for (uint32_t k = 0; k < count; k += 8) {
+        uint32_t mask = i8_eq(i8_load(others + k), wanted),
+                 at = k + (mask ? (uint32_t)__builtin_ctz(mask) : 8);
+        if (mask) return at < count ? at : count;
+    }
+    return count;
+}
+
+/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`; with `join`
+ * doubles are added up. */
+static inline uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, bool join, const list *l,
+                                     uint32_t count) {
+    uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
-        uint32_t number = r->renumbered[from->face], face = number & ~MERGED, at = count;
-        if (face == self) continue;
-        if (join)
-            for (at = 0; at < count && list[at].face != face;) ++at;
+        uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
+        bool changed = (number | own) & MERGED;
+        if (other == self) continue;
+        uint32_t at = join && changed ? find(l->others, count, other) : count;
         if (at < count) {
-            list[at].length += from->length;
+            l->shared[at] += r->now.shared[from];
         } else {
-            bool open = number & MERGED || r->renumbered[i] & MERGED;
-            list[count++] = (fct_neighbor){face, from->length, open ? NAN : from->cost};
+            l->others[count] = other;
+            l->shared[count] = r->now.shared[from];
+            l->keys[count++] = changed ? OPEN : r->now.keys[from];
         }
     }
     return count;
+}
+
+static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+    uint32_t others[LONG + SLACK], keys[LONG + SLACK];
+    float shared[LONG + SLACK];
+    list l = {others, keys, shared};
+    uint32_t count = renumber_list(r, i, next, true, &l, 0);
+    if (mate != FCT_NONE) count = renumber_list(r, mate, next, true, &l, count);
+    for (uint32_t k = 0; k < count; ++k) {
+        r->next.others[place + k] = others[k];
+        r->next.shared[place + k] = shared[k];
+        r->next.keys[place + k] = keys[k];
+    }
+    return count;
+}
+
+static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+    list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
+    uint32_t count = renumber_list(r, i, next, false, &l, 0);
+    if (mate != FCT_NONE) count = renumber_list(r, mate, next, false, &l, count);
+    sort_list(&l, count);
+    return join_sorted(&l, count);
 }
 
 static void join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     rounds *r = user;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint32_t mate = mate_of(r, i), count = 0, length = r->now.lengths[i];
+        uint32_t mate = mate_of(r, i), length = r->now.lengths[i];
         if (mate < i) continue;
-        uint32_t next = r->renumbered[i] & ~MERGED;
+        uint32_t next = r->renumbered[i] & ~MERGED, place = r->next.starts[next];
         if (mate != FCT_NONE) length += r->now.lengths[mate];
-        fct_neighbor *list = r->next.entries + r->next.starts[next];
-        bool few = length <= LONG;
-        count = renumber_list(r, i, next, few, list, count);
-        if (mate != FCT_NONE) count = renumber_list(r, mate, next, few, list, count);
-        if (!few) {
-            sort_list(list, count);
-            count = join_sorted(list, count);
-        }
-        r->next.lengths[next] = count;
+        r->next.lengths[next] =
+            length <= LONG ? join_few(r, i, mate, next, place) : join_many(r, i, mate, next, place);
     }
 }
 
 /* --- Costs --- */
 
-static fct_neighbor *mirror_of(const generation *g, uint32_t i, uint32_t other) {
-    fct_neighbor *list = g->entries + g->starts[i];
-    uint32_t low = 0, high = g->lengths[i];
-    while (high - low > LONG) {
-        uint32_t middle = low + (high - low) / 2;
-        if (list[middle].face <= other)
-            low = middle;
-        else
-            high = middle;
-    }
-    while (list[low].face != other) ++low;
-    return &list[low];
-}
-
 typedef struct price_batch {
     uint32_t count;
     fct_pair pairs[FCT_LANES];
-    fct_neighbor *entries[FCT_LANES], *mirrors[FCT_LANES];
+    uint32_t entries[FCT_LANES], mirrors[FCT_LANES];
 } price_batch;
 
 static void price(const rounds *r, price_batch *batch) {
     float costs[FCT_LANES];
     if (batch->count) fct_work_costs(r->work, batch->pairs, batch->count, costs);
-    for (uint32_t i = 0; i < batch->count; ++i) batch->entries[i]->cost = batch->mirrors[i]->cost = costs[i];
+    for (uint32_t i = 0; i < batch->count; ++i)
+        r->now.keys[batch->entries[i]] = r->now.keys[batch->mirrors[i]] = fct_float_key(costs[i]);
     batch->count = 0;
 }
 
@@ -251,45 +327,51 @@ static bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
 }
 
-/* Prices the edges of the clusters of a chunk to those of higher number. */
+/* Prices the edges of the clusters of a chunk to those of higher number, for both lists. */
 static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     rounds *r = user;
     const generation *now = &r->now;
     price_batch batch = {.count = 0};
-    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        fct_neighbor *entry = now->entries + now->starts[i], *last = entry + now->lengths[i];
-        for (; entry < last; ++entry) {
-            if (entry->face < i || entry->cost == entry->cost) continue;
-            uint32_t a = now->slots[i], b = now->slots[entry->face];
-            fct_neighbor *mirror = mirror_of(now, entry->face, i);
+    for (uint32_t i = (uint32_t)begin; i < end; ++i)
+        for (uint32_t entry = now->starts[i], last = entry + now->lengths[i]; entry < last; ++entry) {
+            uint32_t other = now->others[entry];
+            if (other < i || now->keys[entry] != OPEN) continue;
+            uint32_t a = now->slots[i], b = now->slots[other], mirror = entry_of(now, other, i);
             if (!may_merge(r, a, b)) {
-                entry->cost = mirror->cost = INFINITY;
+                now->keys[entry] = now->keys[mirror] = BLOCKED;
                 continue;
             }
-            batch.pairs[batch.count] = (fct_pair){a, b, entry->length};
+            batch.pairs[batch.count] = (fct_pair){a, b, now->shared[entry]};
             batch.entries[batch.count] = entry, batch.mirrors[batch.count] = mirror;
             if (++batch.count == FCT_LANES) price(r, &batch);
         }
-    }
     price(r, &batch);
 }
 
 /* --- Rounds --- */
 
-static bool allocate_generation(const fct_env *env, uint32_t count, uint32_t room, generation *out) {
+static bool allocate_generation(const fct_env *env, uint32_t count, size_t room, generation *out) {
     out->slots = fct_allocate(env, count, sizeof *out->slots);
     out->starts = fct_allocate(env, count, sizeof *out->starts);
     out->lengths = fct_allocate(env, count, sizeof *out->lengths);
-    out->entries = fct_allocate(env, room, sizeof *out->entries);
-    return out->slots && out->starts && out->lengths && out->entries;
+    out->others = fct_allocate(env, room + SLACK, sizeof *out->others);
+    out->shared = fct_allocate(env, room, sizeof *out->shared);
+    out->keys = fct_allocate(env, room + SLACK, sizeof *out->keys);
+    bool complete = out->slots && out->starts && out->lengths && out->others && out->shared && out->keys;
+    if (!complete) return false;
+    memset(out->others + room, 0, SLACK * sizeof *out->others);
+    memset(out->keys + room, 0, SLACK * sizeof *out->keys);
+    return true;
 }
 
 static void release_generation(const fct_env *env, generation *g) {
     fct_release(env, g->slots);
     fct_release(env, g->starts);
     fct_release(env, g->lengths);
-    fct_release(env, g->entries);
+    fct_release(env, g->others);
+    fct_release(env, g->shared);
+    fct_release(env, g->keys);
     *g = (generation){0};
 }
 
@@ -318,48 +400,56 @@ static fct_result one_round(rounds *r, uint32_t *merges) {
 /* The work's lists become the first generation. */
 static fct_result enter_lists(rounds *r) {
     fct_work *work = r->work;
+    size_t count = work->lists.entry_count;
     r->now = (generation){.count = work->face_count,
                           .slots = fct_allocate(work->env, work->face_count, sizeof *r->now.slots),
                           .starts = work->lists.starts,
                           .lengths = work->lists.counts,
-                          .entries = work->lists.entries};
+                          .others = work->lists.neighbors,
+                          .shared = work->lists.lengths,
+                          .keys = fct_allocate(work->env, count + SLACK, sizeof *r->now.keys)};
     work->lists = (fct_lists){0};
-    if (!r->now.slots) return fct_fail_memory(work->env, "clustering");
+    if (!r->now.slots || !r->now.keys) return fct_fail_memory(work->env, "clustering");
     for (uint32_t s = 0; s < work->face_count; ++s) r->now.slots[s] = s;
+    memset(r->now.keys, 0xFF, (count + SLACK) * sizeof *r->now.keys);
     return FCT_OK;
 }
 
 /* Lists out of the work's edges. */
 static fct_result enter_edges(rounds *r) {
     fct_work *work = r->work;
+    generation *now = &r->now;
     uint32_t live = 0, count = work->face_count - work->merge_count, place = 0;
-    if (work->edge_count > UINT32_MAX / 2 ||
-        !allocate_generation(work->env, count, 2 * work->edge_count, &r->now))
+    size_t room = 2 * (size_t)work->edge_count;
+    if (room > UINT32_MAX || !allocate_generation(work->env, count, room, now))
         return fct_fail_memory(work->env, "clustering");
     for (uint32_t s = 0; s < work->face_count; ++s)
         if (work->nodes[s] != FCT_NONE) {
             r->renumbered[s] = live;
-            r->now.slots[live++] = s;
+            now->slots[live++] = s;
         }
-    r->now.count = live;
-    memset(r->now.lengths, 0, (size_t)live * sizeof *r->now.lengths);
+    now->count = live;
+    memset(now->lengths, 0, (size_t)live * sizeof *now->lengths);
     for (uint32_t e = 0; e < work->edge_count; ++e) {
-        ++r->now.lengths[r->renumbered[work->edges[e].a]];
-        ++r->now.lengths[r->renumbered[work->edges[e].b]];
+        ++now->lengths[r->renumbered[work->edges[e].a]];
+        ++now->lengths[r->renumbered[work->edges[e].b]];
     }
     for (uint32_t i = 0; i < live; ++i) {
-        r->now.starts[i] = place;
-        place += r->now.lengths[i];
-        r->now.lengths[i] = 0;
+        now->starts[i] = place;
+        place += now->lengths[i];
+        now->lengths[i] = 0;
     }
-    for (uint32_t e = 0; e < work->edge_count; ++e) {
-        const fct_edge *edge = &work->edges[e];
-        uint32_t a = r->renumbered[edge->a], b = r->renumbered[edge->b];
-        r->now.entries[r->now.starts[a] + r->now.lengths[a]++] = (fct_neighbor){b, edge->shared, NAN};
-        r->now.entries[r->now.starts[b] + r->now.lengths[b]++] = (fct_neighbor){a, edge->shared, NAN};
+    for (uint32_t e = 0; e < work->edge_count; ++e)
+        for (int k = 0; k < 2; ++k) {
+            const fct_edge *edge = &work->edges[e];
+            uint32_t a = r->renumbered[k ? edge->b : edge->a], b = r->renumbered[k ? edge->a : edge->b];
+            uint32_t entry = now->starts[a] + now->lengths[a]++;
+            now->others[entry] = b, now->shared[entry] = edge->shared, now->keys[entry] = OPEN;
+        }
+    for (uint32_t i = 0; i < live; ++i) {
+        list l = {now->others + now->starts[i], now->keys + now->starts[i], now->shared + now->starts[i]};
+        if (now->lengths[i] > LONG) sort_list(&l, now->lengths[i]);
     }
-    for (uint32_t i = 0; i < live; ++i)
-        if (r->now.lengths[i] > LONG) sort_list(r->now.entries + r->now.starts[i], r->now.lengths[i]);
     fct_release(work->env, work->edges);
     work->edges = NULL, work->edge_count = 0;
     return FCT_OK;
@@ -370,13 +460,14 @@ static fct_result leave(rounds *r) {
     const generation *now = &r->now;
     uint32_t count = 0, place = 0;
     for (uint32_t i = 0; i < now->count; ++i)
-        for (uint32_t k = 0; k < now->lengths[i]; ++k) count += now->entries[now->starts[i] + k].face > i;
+        for (uint32_t k = 0; k < now->lengths[i]; ++k) count += now->others[now->starts[i] + k] > i;
     work->edges = fct_allocate(work->env, count, sizeof *work->edges);
     if (!work->edges) return fct_fail_memory(work->env, "clustering");
     for (uint32_t i = 0; i < now->count; ++i)
-        for (uint32_t k = 0; k < now->lengths[i]; ++k) {
-            const fct_neighbor *n = &now->entries[now->starts[i] + k];
-            if (n->face > i) work->edges[place++] = (fct_edge){now->slots[i], now->slots[n->face], n->length};
+        for (uint32_t entry = now->starts[i]; entry < now->starts[i] + now->lengths[i]; ++entry) {
+            uint32_t other = now->others[entry];
+            if (other > i)
+                work->edges[place++] = (fct_edge){now->slots[i], now->slots[other], now->shared[entry]};
         }
     work->edge_count = count;
     return FCT_OK;
@@ -384,7 +475,7 @@ static fct_result leave(rounds *r) {
 
 static fct_result run(rounds *r) {
     fct_work *work = r->work;
-    fct_result result = work->lists.entries ? enter_lists(r) : enter_edges(r);
+    fct_result result = work->lists.neighbors ? enter_lists(r) : enter_edges(r);
     if (result != FCT_OK) return result;
     fct_parallel_for(work->env, r->now.count, GRAIN, price_edges, r);
     for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
@@ -399,7 +490,7 @@ fct_result fct_work_rounds(fct_work *work, bool across) {
     const fct_env *env = work->env;
     fct_result result = FCT_OK;
     size_t live = work->face_count - work->merge_count, chunks = fct_chunk_count(live, GRAIN);
-    if (live > FEW && (work->lists.entries || work->edge_count > 0)) {
+    if (live > FEW && (work->lists.neighbors || work->edge_count > 0)) {
         rounds r = {.work = work, .across = across};
         r.best = fct_allocate(env, live, sizeof *r.best);
         r.renumbered = fct_allocate(env, work->face_count, sizeof *r.renumbered);

@@ -62,11 +62,8 @@ static void make_records(void *user, size_t begin, size_t end, size_t chunk, uin
         work->counts[f] = 1;
         work->heights[f] = 0;
         work->nodes[f] = (uint32_t)f;
-        for (uint32_t i = 0; i < lists->counts[f]; ++i) {
-            fct_neighbor *n = &lists->entries[lists->starts[f] + i];
-            n->length = (float)((double)n->length * work->metric.scale);
-            n->cost = NAN;
-        }
+        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
+            lists->lengths[i] = (float)((double)lists->lengths[i] * work->metric.scale);
     }
 }
 
@@ -150,18 +147,16 @@ void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float 
 
 fct_result fct_work_list_edges(fct_work *work) {
     const fct_lists *lists = &work->lists;
-    if (!lists->entries) return FCT_OK;
+    if (!lists->neighbors) return FCT_OK;
     uint32_t count = 0;
     for (uint32_t f = 0; f < work->face_count; ++f)
-        for (uint32_t i = 0; i < lists->counts[f]; ++i)
-            count += lists->entries[lists->starts[f] + i].face > f;
+        for (uint32_t i = 0; i < lists->counts[f]; ++i) count += lists->neighbors[lists->starts[f] + i] > f;
     work->edges = fct_allocate(work->env, count, sizeof *work->edges);
     if (!work->edges) return fct_fail_memory(work->env, "clustering");
     for (uint32_t f = 0; f < work->face_count; ++f)
-        for (uint32_t i = 0; i < lists->counts[f]; ++i) {
-            const fct_neighbor *n = &lists->entries[lists->starts[f] + i];
-            if (n->face > f) work->edges[work->edge_count++] = (fct_edge){f, n->face, n->length};
-        }
+        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
+            if (lists->neighbors[i] > f)
+                work->edges[work->edge_count++] = (fct_edge){f, lists->neighbors[i], lists->lengths[i]};
     fct_lists_release(work->env, &work->lists);
     return FCT_OK;
 }

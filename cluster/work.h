@@ -36,8 +36,7 @@ typedef struct fct_work {
     float *costs;
     uint32_t merge_count;
     uint32_t phase_ends[3]; /* merges within materials, across materials, without a shared edge */
-    /* live edges: before the first contraction as lists by face, in the unit model, with costs to be found
-     * (NaN); afterwards once each */
+    /* live edges, in the unit model: before the first contraction as lists by face, afterwards once each */
     fct_lists lists;
     fct_edge *edges;
     uint32_t edge_count;

@@ -18,7 +18,7 @@ static void count_edges(void *user, size_t begin, size_t end, size_t chunk, uint
     uint32_t count = 0;
     for (size_t f = begin; f < end; ++f)
         for (uint32_t i = 0; i < w->lists->counts[f]; ++i)
-            count += w->lists->entries[w->lists->starts[f] + i].face > f;
+            count += w->lists->neighbors[w->lists->starts[f] + i] > f;
     w->places[chunk] = count;
 }
 
@@ -28,11 +28,11 @@ static void write_edges(void *user, size_t begin, size_t end, size_t chunk, uint
     size_t place = w->places[chunk];
     for (size_t f = begin; f < end; ++f)
         for (uint32_t i = 0; i < w->lists->counts[f]; ++i) {
-            const fct_neighbor *n = &w->lists->entries[w->lists->starts[f] + i];
-            if (n->face < f) continue;
+            size_t entry = w->lists->starts[f] + i;
+            if (w->lists->neighbors[entry] < f) continue;
             w->dual->edges[2 * place] = (uint32_t)f;
-            w->dual->edges[2 * place + 1] = n->face;
-            w->dual->lengths[place++] = n->length;
+            w->dual->edges[2 * place + 1] = w->lists->neighbors[entry];
+            w->dual->lengths[place++] = w->lists->lengths[entry];
         }
 }
 

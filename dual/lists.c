@@ -245,16 +245,21 @@ static uint32_t first_connection(const builder *b, size_t face) {
     return low;
 }
 
+typedef struct neighbor {
+    uint32_t face;
+    float length;
+} neighbor;
+
 /* Puts a neighbour into a list in order, or adds to the one that is there. */
-static uint32_t insert(fct_neighbor *list, uint32_t count, uint32_t face, float length) {
+static uint32_t insert(neighbor *list, uint32_t count, uint32_t face, float length) {
     uint32_t i = count;
     while (i > 0 && list[i - 1].face > face) --i;
     if (i > 0 && list[i - 1].face == face) {
         list[i - 1].length += length;
         return count;
     }
-    memmove(list + i + 1, list + i, (count - i) * sizeof *list);
-    list[i] = (fct_neighbor){face, length, 0};
+    for (uint32_t k = count; k > i; --k) list[k] = list[k - 1];
+    list[i] = (neighbor){face, length};
     return count + 1;
 }
 
@@ -265,7 +270,7 @@ static void write_lists(void *user, size_t begin, size_t end, size_t chunk, uint
     uint32_t at = first_connection(b, begin);
     for (size_t f = begin; f < end; ++f) {
         const uint32_t *t = b->mesh->triangles + 3 * f;
-        fct_neighbor list[9];
+        neighbor list[9];
         uint32_t count = 0, start = (uint32_t)(3 * f) + at;
         double perimeter = 0;
         for (size_t k = 0; k < 3; ++k) {
@@ -276,7 +281,10 @@ static void write_lists(void *user, size_t begin, size_t end, size_t chunk, uint
         }
         for (; at < b->connection_count && b->sorted[at].from == f; ++at)
             count = insert(list, count, b->sorted[at].to, b->sorted[at].length);
-        memcpy(lists->entries + start, list, count * sizeof *list);
+        for (uint32_t k = 0; k < count; ++k)
+            lists->neighbors[start + k] = list[k].face, lists->lengths[start + k] = list[k].length;
+        for (uint32_t unused = start + count; unused < 3 * (uint32_t)(f + 1) + at; ++unused)
+            lists->neighbors[unused] = 0;
         lists->starts[f] = start, lists->counts[f] = count;
         lists->perimeters[f] = (float)perimeter;
     }
@@ -290,9 +298,13 @@ static fct_result fill_lists(const fct_env *env, builder *b) {
     lists->starts = fct_allocate(env, faces, sizeof *lists->starts);
     lists->counts = fct_allocate(env, faces, sizeof *lists->counts);
     lists->perimeters = fct_allocate(env, faces, sizeof *lists->perimeters);
-    lists->entries = fct_allocate(env, room, sizeof *lists->entries);
-    if (room > UINT32_MAX || !lists->starts || !lists->counts || !lists->perimeters || !lists->entries)
+    lists->entry_count = (uint32_t)room;
+    lists->neighbors = fct_allocate(env, room + FCT_LISTS_SLACK, sizeof *lists->neighbors);
+    lists->lengths = fct_allocate(env, room, sizeof *lists->lengths);
+    if (room > UINT32_MAX || !lists->starts || !lists->counts || !lists->perimeters || !lists->neighbors ||
+        !lists->lengths)
         return fct_fail_memory(env, "the dual graph");
+    memset(lists->neighbors + room, 0, FCT_LISTS_SLACK * sizeof *lists->neighbors);
     fct_parallel_for(env, faces, GRAIN, write_lists, b);
     return fct_progress(env, "dual graph", 1);
 }
@@ -329,7 +341,8 @@ fct_result fct_lists_build(const fct_env *env, const fct_mesh *mesh, fct_lists *
 void fct_lists_release(const fct_env *env, fct_lists *lists) {
     fct_release(env, lists->starts);
     fct_release(env, lists->counts);
-    fct_release(env, lists->entries);
+    fct_release(env, lists->neighbors);
+    fct_release(env, lists->lengths);
     fct_release(env, lists->perimeters);
     *lists = (fct_lists){0};
 }

@@ -5,17 +5,15 @@
 #include "base/env.h"
 #include "facetree/dual.h"
 
-typedef struct fct_neighbor {
-    uint32_t face;
-    float length; /* shared border, in the mesh's unit */
-    float cost;   /* for the owner of the lists; not set here */
-} fct_neighbor;
+enum { FCT_LISTS_SLACK = 8 };
 
 typedef struct fct_lists {
-    uint32_t face_count;
-    uint32_t *starts, *counts; /* face f has entries[starts[f]] and counts[f] - 1 more, by ascending face */
-    fct_neighbor *entries;
-    float *perimeters; /* as in fct_dual, and what follows too */
+    uint32_t face_count, entry_count;
+    uint32_t *starts,
+        *counts; /* face f has entries starts[f] to starts[f] + counts[f] - 1, by ascending neighbour */
+    uint32_t *neighbors; /* entry_count, some of them unused, and FCT_LISTS_SLACK more that may be read */
+    float *lengths;      /* of the shared border, in the mesh's unit */
+    float *perimeters;   /* as in fct_dual, and what follows too */
     uint32_t boundary_edges, nonmanifold_edges;
 } fct_lists;
 
