@@ -17,7 +17,7 @@
 #include "base/sort.h"
 #include "cluster/work.h"
 
-enum { GRAIN = 1 << 12, FEW = 4096, LONG = 32 };
+enum { GRAIN = 1 << 12, FEW = 4096, LONG = 16 };
 
 #define MERGED 0x80000000u
 
@@ -36,7 +36,7 @@ typedef struct generation {
     uint32_t *keys;
 } generation;
 
-enum { SLACK = 8 };
+enum { SLACK = 8, QUEUE = 256 };
 
 typedef struct rounds {
     fct_work *work;
@@ -239,34 +239,35 @@ static uint32_t join_sorted(const list *l, uint32_t count) {
     return to;
 }
 
-/* Place of a live number among the first `count`, or count. */
-static inline uint32_t find(const uint32_t *others, uint32_t count, uint32_t other) {
-    i8 wanted = i8_set(other);
-    for (uint32_t k = 0; k < count; k += 8) {
-        uint32_t mask = i8_eq(i8_load(others + k), wanted),
-                 at = k + (mask ? (uint32_t)__builtin_ctz(mask) : 8);
-        if (mask) return at < count ? at : count;
+/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`. */
+static uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, const list *l, uint32_t count) {
+    uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
+    for (; from < end; ++from) {
+        uint32_t number = r->renumbered[r->now.others[from]];
+        if ((number & ~MERGED) == self) continue;
+        l->others[count] = number & ~MERGED;
+        l->shared[count] = r->now.shared[from];
+        l->keys[count++] = (number | own) & MERGED ? OPEN : r->now.keys[from];
     }
     return count;
 }
 
-/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`; with `join`
- * doubles are added up. */
-static inline uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, bool join, const list *l,
-                                     uint32_t count) {
+/* The same for a list of at most LONG, adding up doubles. Without branches but the loop's, for which way
+ * they go could not be foretold. */
+static inline uint32_t renumber_few(const rounds *r, uint32_t i, uint32_t self, const list *l,
+                                    uint32_t count) {
     uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
         uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
-        bool changed = (number | own) & MERGED;
-        if (other == self) continue;
-        uint32_t at = join && changed ? find(l->others, count, other) : count;
-        if (at < count) {
-            l->shared[at] += r->now.shared[from];
-        } else {
-            l->others[count] = other;
-            l->shared[count] = r->now.shared[from];
-            l->keys[count++] = changed ? OPEN : r->now.keys[from];
-        }
+        i8 wanted = i8_set(other);
+        uint32_t low = i8_eq(i8_load(l->others), wanted), high = i8_eq(i8_load(l->others + 8), wanted);
+        uint32_t there = (low | high << 8) & ((1u << count) - 1),
+                 at = (uint32_t)__builtin_ctz(there | 1u << count);
+        float sum = l->shared[at];
+        l->others[at] = other;
+        l->shared[at] = (there ? sum : 0) + r->now.shared[from];
+        l->keys[at] = (number | own) & MERGED ? OPEN : r->now.keys[from];
+        count += !there && other != self;
     }
     return count;
 }
@@ -275,8 +276,10 @@ static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t ne
     uint32_t others[LONG + SLACK], keys[LONG + SLACK];
     float shared[LONG + SLACK];
     list l = {others, keys, shared};
-    uint32_t count = renumber_list(r, i, next, true, &l, 0);
-    if (mate != FCT_NONE) count = renumber_list(r, mate, next, true, &l, count);
+    memset(others, 0xFF, sizeof others);
+    memset(shared, 0, sizeof shared);
+    uint32_t count = renumber_few(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = renumber_few(r, mate, next, &l, count);
     for (uint32_t k = 0; k < count; ++k) {
         r->next.others[place + k] = others[k];
         r->next.shared[place + k] = shared[k];
@@ -287,8 +290,8 @@ static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t ne
 
 static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
     list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
-    uint32_t count = renumber_list(r, i, next, false, &l, 0);
-    if (mate != FCT_NONE) count = renumber_list(r, mate, next, false, &l, count);
+    uint32_t count = renumber_list(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = renumber_list(r, mate, next, &l, count);
     sort_list(&l, count);
     return join_sorted(&l, count);
 }
@@ -308,23 +311,39 @@ static void join_lists(void *user, size_t begin, size_t end, size_t chunk, uint3
 
 /* --- Costs --- */
 
-typedef struct price_batch {
+/* Edges to be priced: first all are found, then their costs, so that neither loop waits for the other's
+ * branches. */
+typedef struct price_queue {
     uint32_t count;
-    fct_pair pairs[FCT_LANES];
-    uint32_t entries[FCT_LANES], mirrors[FCT_LANES];
-} price_batch;
-
-static void price(const rounds *r, price_batch *batch) {
-    float costs[FCT_LANES];
-    if (batch->count) fct_work_costs(r->work, batch->pairs, batch->count, costs);
-    for (uint32_t i = 0; i < batch->count; ++i)
-        r->now.keys[batch->entries[i]] = r->now.keys[batch->mirrors[i]] = fct_float_key(costs[i]);
-    batch->count = 0;
-}
+    uint32_t clusters[QUEUE + 8], entries[QUEUE + 8];
+} price_queue;
 
 static bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
     const uint32_t *materials = r->work->materials;
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
+}
+
+static void price_queued(const rounds *r, price_queue *queue) {
+    const generation *now = &r->now;
+    fct_pair pairs[FCT_LANES];
+    float costs[FCT_LANES];
+    uint32_t entries[FCT_LANES], mirrors[FCT_LANES], count = 0;
+    for (uint32_t q = 0; q < queue->count; ++q) {
+        uint32_t i = queue->clusters[q], entry = queue->entries[q], other = now->others[entry];
+        uint32_t a = now->slots[i], b = now->slots[other], mirror = entry_of(now, other, i);
+        pairs[count] = (fct_pair){a, b, now->shared[entry]};
+        entries[count] = entry, mirrors[count] = mirror;
+        if (may_merge(r, a, b))
+            ++count;
+        else
+            now->keys[entry] = now->keys[mirror] = BLOCKED;
+        if (count < FCT_LANES && q + 1 < queue->count) continue;
+        if (count) fct_work_costs(r->work, pairs, count, costs);
+        for (uint32_t k = 0; k < count; ++k)
+            now->keys[entries[k]] = now->keys[mirrors[k]] = fct_float_key(costs[k]);
+        count = 0;
+    }
+    queue->count = 0;
 }
 
 /* Prices the edges of the clusters of a chunk to those of higher number, for both lists. */
@@ -332,21 +351,22 @@ static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint
     (void)chunk, (void)thread;
     rounds *r = user;
     const generation *now = &r->now;
-    price_batch batch = {.count = 0};
-    for (uint32_t i = (uint32_t)begin; i < end; ++i)
-        for (uint32_t entry = now->starts[i], last = entry + now->lengths[i]; entry < last; ++entry) {
-            uint32_t other = now->others[entry];
-            if (other < i || now->keys[entry] != OPEN) continue;
-            uint32_t a = now->slots[i], b = now->slots[other], mirror = entry_of(now, other, i);
-            if (!may_merge(r, a, b)) {
-                now->keys[entry] = now->keys[mirror] = BLOCKED;
-                continue;
+    price_queue queue = {.count = 0};
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        i8 self = i8_set(i);
+        uint32_t start = now->starts[i], length = now->lengths[i];
+        for (uint32_t k = 0; k < length; k += 8) {
+            uint32_t within = length - k < 8 ? (1u << (length - k)) - 1 : 0xFF;
+            uint32_t mask = within & i8_lt(self, i8_load(now->others + start + k));
+            for (; mask; mask &= mask - 1) {
+                uint32_t entry = start + k + (uint32_t)__builtin_ctz(mask);
+                queue.clusters[queue.count] = i, queue.entries[queue.count] = entry;
+                queue.count += now->keys[entry] == OPEN; /* others write the keys of the lanes left out */
             }
-            batch.pairs[batch.count] = (fct_pair){a, b, now->shared[entry]};
-            batch.entries[batch.count] = entry, batch.mirrors[batch.count] = mirror;
-            if (++batch.count == FCT_LANES) price(r, &batch);
+            if (queue.count >= QUEUE) price_queued(r, &queue);
         }
-    price(r, &batch);
+    }
+    price_queued(r, &queue);
 }
 
 /* --- Rounds --- */
