@@ -77,6 +77,8 @@ static fct_result build_obb(fct_bvh *bvh) {
 
 fct_result fct_bvh_create(const fct_env *env, const fct_tree *tree, fct_backend backend, fct_bvh **out) {
     *out = NULL;
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
     fct_bvh *bvh = fct_allocate_zero(env, 1, sizeof *bvh);
     if (!bvh) return fct_fail_memory(env, "a ray structure");
     bvh->env = env;
@@ -84,7 +86,7 @@ fct_result fct_bvh_create(const fct_env *env, const fct_tree *tree, fct_backend 
     bvh->view = fct_tree_get(tree);
     bvh->backend = backend;
     measure(bvh);
-    fct_result result = backend == FCT_BACKEND_EMBREE ? fct_embree_create(bvh) : build_obb(bvh);
+    result = backend == FCT_BACKEND_EMBREE ? fct_embree_create(bvh) : build_obb(bvh);
     if (result == FCT_OK)
         *out = bvh;
     else

@@ -67,6 +67,16 @@ static fct_result copy_source(const fct_env *env, const fct_tree_def *def, fct_t
     return FCT_OK;
 }
 
+/* Of the mesh's edges; what contraction along them leaves over is a part each, unless heights forbade one. */
+static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts, bool complete,
+                              fct_tree *tree) {
+    fct_edge_counts all = *counts;
+    fct_result result = complete ? FCT_OK : fct_tree_count_edges(env, &tree->view, &all);
+    tree->view.boundary_edges = all.boundary, tree->view.nonmanifold_edges = all.nonmanifold;
+    tree->view.component_count = all.components;
+    return result;
+}
+
 static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                         fct_tree_stats *stats, fct_tree *tree) {
     fct_work work;
@@ -76,6 +86,9 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     double dual = fct_seconds();
     result = make_parts(env, mesh, def, &work);
     work.phase_ends[1] = work.merge_count;
+    const fct_edge_counts counts = {work.boundary_edges, work.nonmanifold_edges,
+                                    mesh->face_count - work.merge_count};
+    const bool complete = work.stranded == 0 && (work.edge_count == 0 || !mesh->materials);
     if (result == FCT_OK) result = fct_work_join(&work, mesh);
     work.phase_ends[2] = work.merge_count;
     if (result == FCT_OK) {
@@ -84,6 +97,8 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     }
     fct_work_release(&work);
     if (result == FCT_OK) result = copy_source(env, def, tree);
+    if (result == FCT_OK) fct_tree_measure_bounds(tree);
+    if (result == FCT_OK) result = take_counts(env, &counts, complete, tree);
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};

@@ -1,201 +1,57 @@
-/* cluster/file.c: the hierarchy file, byte by byte in docs/hierarchy-file.md.
- *
- * A header of 448 bytes with counts, options and a table of ten sections; the sections follow in the table's
- * order, each at a multiple of 64. Nodes come first, root first, so that a coarse computation touches the
- * beginning of the file. Opening checks the header's checksum, bounds and the tree's structure, but not the
- * sections' checksums: those are fct_tree_verify's.
- */
-#include "cluster/file.h"
-
+/* cluster/file.c: opening a hierarchy file. O(1) but for the names of materials: the header and its checksum,
+ * counts, and the places of the sections, which follow from the counts. What the sections hold is looked at
+ * when it is used (walk.c, structure.c), their checksums by fct_tree_verify. */
 #include <inttypes.h>
 #include <string.h>
 
-#include <xxhash.h>
+#include "cluster/format.h"
 
-enum {
-    VERSION = 1,
-    ORDER_MARK = 0x01020304,
-    ALIGNMENT = 64,
-};
-
-typedef enum section_kind {
-    NODES,
-    ROOTS,
-    FACE_IDS,
-    VERTEX_IDS,
-    TRIANGLES,
-    POSITIONS,
-    COLORS,
-    MATERIALS,
-    MATERIAL_NAMES,
-    SOURCE,
-    SECTIONS
-} section_kind;
-
-static const char *const section_names[SECTIONS] = {"nodes",     "roots",     "face ids", "vertex ids",
-                                                    "triangles", "positions", "colors",   "materials",
-                                                    "names",     "source"};
-
-typedef struct section {
-    uint32_t kind, reserved;
-    uint64_t offset, size, checksum;
-} section;
-
-typedef struct header {
-    unsigned char magic[8];
-    uint32_t version, order_mark;
-    uint64_t file_size;
-    uint64_t checksum; /* XXH3-64 of the header with this field zero */
-    uint32_t face_count, vertex_count, node_count, root_count, depth, material_count;
-    double mean_depth;
-    uint64_t source_hash;
-    uint32_t method, cost, fit_measure, wanted_roots;
-    double fit_weight, direction_weight, shape_weight, max_cost;
-    uint32_t section_count, flags;
-    section sections[SECTIONS];
-} header;
-
-enum { HAS_COLORS = 1, HAS_MATERIALS = 2, HAS_NAMES = 4 };
-
-_Static_assert(sizeof(header) == 448 && sizeof(fct_cluster) == 132, "the file's layout is these structs'");
-
-static const unsigned char magic[8] = {0x89, 'F', 'C', 'T', '\r', '\n', 0x1A, '\n'};
-
-static uint64_t header_checksum(const header *h) {
-    header copy = *h;
-    copy.checksum = 0;
-    return XXH3_64bits(&copy, sizeof copy);
-}
-
-/* Sizes of the sections that follow from the counts; names and source are free. */
-static void expected_sizes(const header *h, uint64_t sizes[SECTIONS]) {
-    uint64_t faces = h->face_count, vertices = h->vertex_count;
-    sizes[NODES] = (uint64_t)h->node_count * sizeof(fct_cluster);
-    sizes[ROOTS] = 4 * (uint64_t)h->root_count;
-    sizes[FACE_IDS] = 4 * faces;
-    sizes[VERTEX_IDS] = 4 * vertices;
-    sizes[TRIANGLES] = 12 * faces;
-    sizes[POSITIONS] = 12 * vertices;
-    sizes[COLORS] = h->flags & HAS_COLORS ? 12 * vertices : 0;
-    sizes[MATERIALS] = h->flags & HAS_MATERIALS ? 4 * faces : 0;
-}
-
-typedef struct saver {
-    const fct_tree_view *view;
-    header h;
-    const void *data[SECTIONS];
-    char *names;
-} saver;
-
-static fct_result gather_names(const fct_env *env, saver *s, uint64_t *size) {
-    *size = 0;
-    for (uint32_t i = 0; s->view->material_names && i < s->view->material_count; ++i)
-        *size += strlen(s->view->material_names[i]) + 1;
-    char *to = s->names = fct_allocate(env, *size, 1);
-    if (!to) return fct_fail_memory(env, "a hierarchy file");
-    for (uint32_t i = 0; s->view->material_names && i < s->view->material_count; ++i) {
-        size_t length = strlen(s->view->material_names[i]) + 1;
-        memcpy(to, s->view->material_names[i], length);
-        to += length;
-    }
-    return FCT_OK;
-}
-
-static void fill_header(saver *s, uint64_t names_size) {
-    const fct_tree_view *view = s->view;
-    header *h = &s->h;
-    *h = (header){.version = VERSION,
-                  .order_mark = ORDER_MARK,
-                  .face_count = view->face_count,
-                  .vertex_count = view->vertex_count,
-                  .node_count = view->node_count,
-                  .root_count = view->root_count,
-                  .depth = view->depth,
-                  .material_count = view->material_count,
-                  .mean_depth = view->mean_depth,
-                  .source_hash = view->source_hash,
-                  .method = view->def.method,
-                  .cost = view->def.cost,
-                  .fit_measure = view->def.fit_measure,
-                  .wanted_roots = view->def.root_count,
-                  .fit_weight = view->def.fit_weight,
-                  .direction_weight = view->def.direction_weight,
-                  .shape_weight = view->def.shape_weight,
-                  .max_cost = view->def.max_cost,
-                  .section_count = SECTIONS};
-    memcpy(h->magic, magic, sizeof magic);
-    h->flags = (view->colors ? HAS_COLORS : 0u) | (view->materials ? HAS_MATERIALS : 0u) |
-               (view->material_names ? HAS_NAMES : 0u);
-    uint64_t sizes[SECTIONS], offset = sizeof *h;
-    expected_sizes(h, sizes);
-    sizes[MATERIAL_NAMES] = names_size;
-    sizes[SOURCE] = strlen(view->source) + 1;
-    const void *data[SECTIONS] = {view->clusters,  view->roots,     view->face_ids, view->vertex_ids,
-                                  view->triangles, view->positions, view->colors,   view->materials,
-                                  s->names,        view->source};
-    for (uint32_t i = 0; i < SECTIONS; ++i) {
-        s->data[i] = data[i];
-        h->sections[i] = (section){i, 0, offset, sizes[i], XXH3_64bits(sizes[i] ? data[i] : "", sizes[i])};
-        offset = (offset + sizes[i] + ALIGNMENT - 1) & ~(uint64_t)(ALIGNMENT - 1);
-    }
-    h->file_size = offset;
-    h->checksum = header_checksum(h);
-}
-
-static fct_result write_sections(void *user, FILE *stream) {
-    static const char zeros[ALIGNMENT];
-    const saver *s = user;
-    fwrite(&s->h, sizeof s->h, 1, stream);
-    for (uint32_t i = 0; i < SECTIONS; ++i) {
-        uint64_t size = s->h.sections[i].size;
-        if (size) fwrite(s->data[i], 1, size, stream);
-        fwrite(zeros, 1, -size & (ALIGNMENT - 1), stream);
-    }
-    return FCT_OK;
-}
-
-fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path) {
-    saver s = {.view = &tree->view};
-    uint64_t names_size = 0;
-    fct_result result = gather_names(env, &s, &names_size);
-    if (result != FCT_OK) return result;
-    fill_header(&s, names_size);
-    result = fct_file_write_atomic(env, path, write_sections, &s);
-    fct_release(env, s.names);
-    return result;
-}
-
-/* NULL, or what is wrong with the header of a file of `size` bytes. */
-static const char *header_fault(const header *h, size_t size) {
-    if (h->order_mark != ORDER_MARK) return "written with another byte order, or damaged";
-    if (h->version != VERSION) return "a version this library does not read";
-    if (h->checksum != header_checksum(h)) return "damaged header";
-    if (h->file_size != size) return "truncated or with something appended";
-    if (h->section_count != SECTIONS) return "wrong number of sections";
-    if (h->face_count == 0 || h->face_count >= INT32_MAX || h->vertex_count >= INT32_MAX) return "bad counts";
+static const char *counts_fault(const fct_format_header *h) {
+    if (h->face_count == 0 || h->face_count >= INT32_MAX || h->vertex_count == 0 ||
+        h->vertex_count >= INT32_MAX)
+        return "bad counts";
     if (h->root_count == 0 || h->root_count > h->face_count || h->node_count != h->face_count - h->root_count)
         return "counts of nodes and roots do not fit the faces";
+    if (h->cut_count && (h->cut_count < h->root_count || h->cut_count > h->face_count))
+        return "the cut's size does not fit the faces";
+    if (h->depth > h->node_count || (h->face_count > 1 && h->depth > 3 * log2(h->face_count)) ||
+        !(h->mean_depth >= 0 && h->mean_depth <= h->depth))
+        return "bad depth";
+    for (int k = 0; k < 3; ++k)
+        if (!isfinite(h->bounds.lower[k]) || !isfinite(h->bounds.upper[k]) ||
+            h->bounds.lower[k] > h->bounds.upper[k])
+            return "bad bounds";
     if (h->method > FCT_CLUSTER_ROUNDS || h->cost > FCT_COST_MEAN || h->fit_measure > FCT_FIT_POINTS)
         return "unknown options";
-    uint64_t sizes[SECTIONS], offset = sizeof *h;
-    expected_sizes(h, sizes);
-    for (uint32_t i = 0; i < SECTIONS; ++i) {
-        const section *s = &h->sections[i];
-        if (s->kind != i || s->offset != offset || s->size > size - offset) return "bad section table";
-        if (i < MATERIAL_NAMES && s->size != sizes[i]) return "section sizes do not fit the counts";
-        offset = (offset + s->size + ALIGNMENT - 1) & ~(uint64_t)(ALIGNMENT - 1);
-        if (offset > size) return "bad section table";
-    }
     return NULL;
 }
 
-/* Pointers to the names in their section, which must hold exactly as many strings. */
-static fct_result read_names(const fct_env *env, const char *name, const header *h, const char *data,
+/* NULL, or what is wrong with the head of a file of `size` bytes at `data`, of which *h is the header. */
+static const char *head_fault(const fct_format_header *h, const void *data, size_t size) {
+    if (h->order_mark != FCT_FORMAT_ORDER_MARK) return "written with another byte order, or damaged";
+    if (h->file_size != size) return "truncated, with something appended, or damaged";
+    if (h->head_size < sizeof *h || h->head_size > size) return "damaged header";
+    if (h->checksum != fct_format_head_checksum(data, h->head_size)) return "damaged header";
+    const char *fault = counts_fault(h);
+    if (fault) return fault;
+    if (h->source_size > size || h->names_size > size) return "bad sizes of names";
+    fct_format_header expected = *h;
+    fct_format_place(&expected);
+    for (int i = 0; i < FCT_SECTION_COUNT; ++i) expected.sections[i].checksum = h->sections[i].checksum;
+    return memcmp(h, &expected, sizeof expected) ? "bad section table" : NULL;
+}
+
+/* The source and pointers to the names, whose section must hold exactly as many strings. */
+static fct_result read_names(const fct_env *env, const char *name, const fct_format_header *h,
                              fct_tree *tree) {
-    if (!(h->flags & HAS_NAMES)) return FCT_OK;
-    const section *s = &h->sections[MATERIAL_NAMES];
-    const char *text = data + s->offset, *end = text + s->size;
-    if (h->material_count > s->size) return fct_fail(env, FCT_ERROR_DATA, "%s: names are missing", name);
+    const char *source = (const char *)tree->file.data + sizeof *h, *text = source + h->source_size;
+    const char *end = text + h->names_size;
+    if (h->source_size == 0 || source[h->source_size - 1])
+        return fct_fail(env, FCT_ERROR_DATA, "%s: the source's name has no end", name);
+    tree->view.source = source;
+    if (!(h->flags & FCT_FORMAT_NAMES)) return FCT_OK;
+    if (h->material_count > h->names_size)
+        return fct_fail(env, FCT_ERROR_DATA, "%s: names are missing", name);
     const char **names = fct_allocate(env, h->material_count, sizeof *names);
     if (!names) return fct_fail_memory(env, "material names");
     tree->names = (char **)names;
@@ -209,19 +65,27 @@ static fct_result read_names(const fct_env *env, const char *name, const header 
     return FCT_OK;
 }
 
-static void fill_view(const header *h, const char *data, fct_tree *tree) {
+static const void *section_data(const fct_tree *tree, const fct_format_header *h, fct_section section) {
+    return tree->file.data + h->sections[section].offset;
+}
+
+static void fill_view(const fct_format_header *h, fct_tree *tree) {
     fct_tree_view *view = &tree->view;
     view->face_count = h->face_count, view->vertex_count = h->vertex_count;
     view->node_count = h->node_count, view->root_count = h->root_count;
+    view->depth = h->depth, view->mean_depth = h->mean_depth;
+    view->boundary_edges = h->boundary_edges, view->nonmanifold_edges = h->nonmanifold_edges;
+    view->component_count = h->component_count;
+    view->bounds = h->bounds;
     view->material_count = h->material_count;
-    view->clusters = (const fct_cluster *)(data + h->sections[NODES].offset);
-    view->roots = (const uint32_t *)(data + h->sections[ROOTS].offset);
-    view->face_ids = (const uint32_t *)(data + h->sections[FACE_IDS].offset);
-    view->vertex_ids = (const uint32_t *)(data + h->sections[VERTEX_IDS].offset);
-    view->triangles = (const uint32_t *)(data + h->sections[TRIANGLES].offset);
-    view->positions = (const float *)(data + h->sections[POSITIONS].offset);
-    if (h->flags & HAS_COLORS) view->colors = (const float *)(data + h->sections[COLORS].offset);
-    if (h->flags & HAS_MATERIALS) view->materials = (const uint32_t *)(data + h->sections[MATERIALS].offset);
+    view->roots = section_data(tree, h, FCT_SECTION_ROOTS);
+    view->clusters = section_data(tree, h, FCT_SECTION_NODES);
+    view->face_ids = section_data(tree, h, FCT_SECTION_FACE_IDS);
+    view->vertex_ids = section_data(tree, h, FCT_SECTION_VERTEX_IDS);
+    view->triangles = section_data(tree, h, FCT_SECTION_TRIANGLES);
+    view->positions = section_data(tree, h, FCT_SECTION_POSITIONS);
+    if (h->flags & FCT_FORMAT_COLORS) view->colors = section_data(tree, h, FCT_SECTION_COLORS);
+    if (h->flags & FCT_FORMAT_MATERIALS) view->materials = section_data(tree, h, FCT_SECTION_MATERIALS);
     view->source_hash = h->source_hash;
     view->def = (fct_tree_def){.size = sizeof(fct_tree_def),
                                .method = (fct_cluster_method)h->method,
@@ -233,26 +97,38 @@ static void fill_view(const header *h, const char *data, fct_tree *tree) {
                                .root_count = h->wanted_roots,
                                .max_cost = h->max_cost,
                                .source_hash = h->source_hash};
+    tree->cut_ids = section_data(tree, h, FCT_SECTION_CUT_IDS);
+    tree->cut = section_data(tree, h, FCT_SECTION_CUT);
+    tree->cut_count = h->cut_count;
+    atomic_init(&tree->unchecked, true);
+}
+
+static fct_result keep_path(const fct_env *env, const char *name, fct_tree *tree) {
+    tree->path = fct_allocate(env, strlen(name) + 1, 1);
+    if (!tree->path) return fct_fail_memory(env, "a hierarchy");
+    strcpy(tree->path, name);
+    return FCT_OK;
 }
 
 /* tree->file holds the bytes. */
 static fct_result read_file(const fct_env *env, const char *name, fct_tree *tree) {
-    const char *data = (const char *)tree->file.data;
-    if (tree->file.size < sizeof magic || memcmp(data, magic, sizeof magic))
+    const unsigned char *data = tree->file.data;
+    size_t size = tree->file.size;
+    fct_file_advise(&tree->file, 0, size, FCT_FILE_SPARSE);
+    if (size < sizeof fct_format_magic || memcmp(data, fct_format_magic, sizeof fct_format_magic))
         return fct_fail(env, FCT_ERROR_DATA, "%s: no hierarchy file", name);
-    if (tree->file.size < sizeof(header))
-        return fct_fail(env, FCT_ERROR_DATA, "%s: truncated in the header", name);
-    header h;
-    memcpy(&h, data, sizeof h);
-    const char *fault = header_fault(&h, tree->file.size);
+    fct_format_header h = {0};
+    memcpy(&h, data, size < sizeof h ? size : sizeof h);
+    if (h.order_mark == FCT_FORMAT_ORDER_MARK && h.version != FCT_FORMAT_VERSION)
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "%s: version %u of the hierarchy file, expected %d: build it anew from its mesh",
+                        name, h.version, FCT_FORMAT_VERSION);
+    if (size < sizeof h) return fct_fail(env, FCT_ERROR_DATA, "%s: truncated in the header", name);
+    const char *fault = head_fault(&h, data, size);
     if (fault) return fct_fail(env, FCT_ERROR_DATA, "%s: %s", name, fault);
-    fill_view(&h, data, tree);
-    const section *source = &h.sections[SOURCE];
-    if (source->size == 0 || data[source->offset + source->size - 1])
-        return fct_fail(env, FCT_ERROR_DATA, "%s: the source's name has no end", name);
-    tree->view.source = data + source->offset;
-    fct_result result = read_names(env, name, &h, data, tree);
-    return result == FCT_OK ? fct_tree_check_structure(env, name, tree) : result;
+    fill_view(&h, tree);
+    fct_result result = read_names(env, name, &h, tree);
+    return result == FCT_OK ? keep_path(env, name, tree) : result;
 }
 
 static fct_result finish(fct_tree *tree, fct_result result, fct_tree **out) {
@@ -286,19 +162,37 @@ fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out) {
     return finish(tree, result, out);
 }
 
+static fct_result check_gap(const fct_env *env, const fct_tree *tree, const char *after, uint64_t begin,
+                            uint64_t end) {
+    for (uint64_t at = begin; at < end; ++at)
+        if (tree->file.data[at])
+            return fct_fail(env, FCT_ERROR_DATA, "%s: byte %" PRIu64 ", after the %s, is not zero",
+                            tree->path, at, after);
+    return FCT_OK;
+}
+
 fct_result fct_tree_check_sums(const fct_env *env, const fct_tree *tree) {
     if (!tree->file.data) return FCT_OK;
-    const header *h = (const header *)tree->file.data;
-    for (uint32_t i = 0; i < SECTIONS; ++i) {
-        const section *s = &h->sections[i];
-        if (XXH3_64bits(tree->file.data + s->offset, s->size) != s->checksum)
-            return fct_fail(env, FCT_ERROR_DATA, "the checksum of the section of %s is wrong",
-                            section_names[i]);
-        uint64_t end = i + 1 < SECTIONS ? h->sections[i + 1].offset : h->file_size;
-        for (uint64_t at = s->offset + s->size; at < end; ++at)
-            if (tree->file.data[at])
-                return fct_fail(env, FCT_ERROR_DATA, "byte %" PRIu64 ", after the section of %s, is not zero",
-                                at, section_names[i]);
+    fct_format_header header;
+    const fct_format_header *h = &header;
+    memcpy(&header, tree->file.data, sizeof header);
+    if (head_fault(h, tree->file.data, tree->file.size))
+        return fct_fail(env, FCT_ERROR_DATA, "%s: changed since it was opened", tree->path);
+    uint64_t *hashes = fct_allocate(env, fct_format_block_count(h->file_size), sizeof *hashes);
+    if (!hashes) return fct_fail_memory(env, "verifying");
+    fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_WHOLE);
+    fct_result result = check_gap(env, tree, "head", h->head_size, h->sections[0].offset);
+    for (int i = 0; i < FCT_SECTION_COUNT && result == FCT_OK; ++i) {
+        const fct_format_section *s = &h->sections[i];
+        const char *name = fct_format_section_name(i);
+        fct_format_hash_blocks(env, tree->file.data + s->offset, s->size, hashes);
+        if (fct_format_fold(hashes, fct_format_block_count(s->size)) != s->checksum)
+            result = fct_fail(env, FCT_ERROR_DATA, "%s: the checksum of the section of %s is wrong",
+                              tree->path, name);
+        else
+            result = check_gap(env, tree, name, s->offset + s->size,
+                               i + 1 < FCT_SECTION_COUNT ? h->sections[i + 1].offset : h->file_size);
     }
-    return FCT_OK;
+    fct_release(env, hashes);
+    return result;
 }

@@ -44,8 +44,8 @@ fct_result fct_tree_parse(const fct_env *env, const char *name, const void *data
                           fct_tree **out);
 
 /* Whether links, ranges, permutations and indices are such that no traversal can leave the arrays or run in
- * circles, and the depth is the one told; O(F), parallel. `name` stands in messages. Errors: DATA, MEMORY. */
-fct_result fct_tree_check_structure(const fct_env *env, const char *name, fct_tree *tree);
+ * circles, and the depth is the one told; O(F), parallel. Errors: DATA, MEMORY. */
+fct_result fct_tree_check_structure(const fct_env *env, const fct_tree *tree);
 
 /* The sections' checksums, if the tree came from a file. Errors: DATA, MEMORY. */
 fct_result fct_tree_check_sums(const fct_env *env, const fct_tree *tree);

@@ -6,6 +6,7 @@
  * axes of the surface, turned about the normal to the best of eight angles. O(F log F), parallel over
  * clusters.
  */
+#include <float.h>
 #include <string.h>
 
 #include "base/eigen.h"
@@ -32,6 +33,7 @@ typedef struct judge {
     uint32_t *parents;      /* union-find over faces */
     piece *pieces;
     uint32_t count;
+    float *planes; /* count x 4, where they are asked for */
 } judge;
 
 static void load_triangle(const judge *j, size_t place, v3 origin, v3 p[3]) {
@@ -44,8 +46,9 @@ static v3 area_vector(const v3 p[3]) {
     return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
 }
 
-/* Sums over the surface of a piece; covariance about the centroid. */
-static void sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], double moment[6]) {
+/* Sums over the surface of a piece; covariance about the centroid, which is returned (the first corner of a
+ * piece without area). */
+static v3 sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], double moment[6]) {
     const size_t first = out->first, end = first + out->count;
     v3 origin = {0, 0, 0}, center = {0, 0, 0}, p[3];
     load_triangle(j, first, origin, p);
@@ -60,13 +63,32 @@ static void sum_surface(const judge *j, piece *out, v3 *s, double covariance[6],
         center = v3_mad(center, area / 3, v3_add(v3_add(p[0], p[1]), p[2]));
         sym3_add_outer(moment, 1 / area, a);
     }
-    if (!(out->area > 0)) return;
+    if (!(out->area > 0)) return origin;
     origin = v3_mad(origin, 1 / out->area, center);
     for (size_t place = first; place < end; ++place) {
         load_triangle(j, place, origin, p);
         double area = v3_norm(area_vector(p));
         for (int k = 0; k < 3; ++k) sym3_add_outer(covariance, area / 12, p[k]);
         sym3_add_outer(covariance, area / 12, v3_add(v3_add(p[0], p[1]), p[2]));
+    }
+    return origin;
+}
+
+/* The least-squares plane of a piece's surface, its normal along S. */
+static void judge_plane(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const judge *j = user;
+    for (size_t i = begin; i < end; ++i) {
+        float *plane = j->planes + 4 * i;
+        piece sums = j->pieces[i];
+        memset(plane, 0, 4 * sizeof *plane);
+        if (sums.count == 0) continue;
+        double covariance[6] = {0}, moment[6] = {0}, values[3];
+        v3 s = {0, 0, 0}, axes[3], center = sum_surface(j, &sums, &s, covariance, moment);
+        fct_eigen3(covariance, values, axes);
+        v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
+        v3_store(plane, n);
+        plane[3] = (float)fmax(fmin(-v3_dot(n, center), (double)FLT_MAX), -(double)FLT_MAX);
     }
 }
 
@@ -212,9 +234,10 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
                      .positions = (float *)view->positions,
                      .triangles = (uint32_t *)view->triangles};
     judge j = {.mesh = &mesh, .tree = tree, .nodes = nodes, .count = count};
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
     uint32_t *labels = fct_allocate(env, view->face_count, sizeof *labels);
     j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
-    fct_result result;
     if (labels && j.pieces) {
         for (uint32_t i = 0; i < count; ++i) {
             bool leaf = nodes[i] >= view->node_count;
@@ -243,29 +266,44 @@ fct_result fct_labels_check(const fct_env *env, const fct_mesh *mesh, const uint
     return result;
 }
 
+/* Groups the faces by label. The judge has mesh, labels and count. Errors: MEMORY. */
+static fct_result group_faces(const fct_env *env, judge *j) {
+    j->faces = fct_allocate(env, j->mesh->face_count, sizeof *j->faces);
+    j->pieces = fct_allocate_zero(env, j->count, sizeof *j->pieces);
+    if (!j->faces || !j->pieces) return fct_fail_memory(env, "measuring a partition");
+    uint32_t end = 0;
+    for (uint32_t f = 0; f < j->mesh->face_count; ++f) ++j->pieces[j->labels[f]].count;
+    for (uint32_t i = 0; i < j->count; ++i) {
+        j->pieces[i].first = end;
+        end += j->pieces[i].count;
+        j->pieces[i].count = 0;
+    }
+    for (uint32_t f = 0; f < j->mesh->face_count; ++f) {
+        piece *p = &j->pieces[j->labels[f]];
+        j->faces[p->first + p->count++] = f;
+    }
+    return FCT_OK;
+}
+
 fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                               uint32_t count, fct_partition_quality *out) {
     fct_result result = fct_labels_check(env, mesh, labels, count);
     if (result != FCT_OK) return result;
     judge j = {.mesh = mesh, .labels = labels, .count = count};
-    j.faces = fct_allocate(env, mesh->face_count, sizeof *j.faces);
-    j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
-    if (j.faces && j.pieces) {
-        uint32_t end = 0;
-        for (uint32_t f = 0; f < mesh->face_count; ++f) ++j.pieces[labels[f]].count;
-        for (uint32_t i = 0; i < count; ++i) {
-            j.pieces[i].first = end;
-            end += j.pieces[i].count;
-            j.pieces[i].count = 0;
-        }
-        for (uint32_t f = 0; f < mesh->face_count; ++f) {
-            piece *p = &j.pieces[labels[f]];
-            j.faces[p->first + p->count++] = f;
-        }
-        result = measure(env, &j, out);
-    } else {
-        result = fct_fail_memory(env, "measuring a partition");
-    }
+    result = group_faces(env, &j);
+    if (result == FCT_OK) result = measure(env, &j, out);
+    fct_release(env, j.faces);
+    fct_release(env, j.pieces);
+    return result;
+}
+
+fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels, uint32_t count,
+                             float *planes) {
+    fct_result result = fct_labels_check(env, mesh, labels, count);
+    if (result != FCT_OK) return result;
+    judge j = {.mesh = mesh, .labels = labels, .count = count, .planes = planes};
+    result = group_faces(env, &j);
+    if (result == FCT_OK) fct_parallel_for(env, count, 64, judge_plane, &j);
     fct_release(env, j.faces);
     fct_release(env, j.pieces);
     return result;

@@ -104,7 +104,8 @@ static void look_around(const refiner *r, uint32_t face, fringe *out) {
     }
 }
 
-/* Gains that are lost in the rounding of their parts are none: on even ground nothing moves for nothing. */
+/* Gains that are lost in the rounding of their parts are none: on even ground nothing moves for nothing. (The
+ * lengths of borders are floats.) */
 static step best_step(const refiner *r, uint32_t face) {
     step best = {0, 0, FCT_NONE};
     const region *from = &r->regions[r->labels[face]];
@@ -121,7 +122,7 @@ static step best_step(const refiner *r, uint32_t face) {
         const region *to = &r->regions[around.labels[k]];
         double entered = square_growth(to->perimeter, perimeter - 2 * around.lengths[k]);
         double gain = 2 * (leave + growth(to->vector, a)) - r->weight * (left + entered);
-        double rounding = 1e-6 * (2 * (area + fabs(leave)) + r->weight * (fabs(left) + fabs(entered)));
+        double rounding = 1e-12 * (area + fabs(leave)) + 1e-6 * r->weight * (fabs(left) + fabs(entered));
         if (!(gain > rounding) || gain < best.gain) continue;
         if (gain == best.gain && around.labels[k] > best.to) continue;
         if (left + entered > 0 && !(r->squares + left + entered <= r->most_squares)) continue;
@@ -332,6 +333,10 @@ fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32
     fct_result result = check_def(env, &options);
     if (result == FCT_OK) result = fct_labels_check(env, mesh, labels, count);
     if (result != FCT_OK) return result;
+    if (mesh->face_count == 0) {
+        if (stats) *stats = done;
+        return FCT_OK;
+    }
     refiner *r = fct_allocate_zero(env, 1, sizeof *r);
     if (!r) return fct_fail_memory(env, "refining a partition");
     r->mesh = mesh;

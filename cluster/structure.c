@@ -23,31 +23,22 @@ typedef struct checker {
     uint32_t *seen; /* bits */
 } checker;
 
-/* By their exponents, for that is done for many at once. */
-static bool all_finite(const void *floats, size_t count) {
-    const uint32_t exponent = 0x7F800000;
-    const uint32_t *bits = floats;
-    uint32_t endless = 0;
-    for (size_t i = 0; i < count; ++i) endless |= (bits[i] & exponent) == exponent;
-    return endless == 0;
+static bool is_finite(const float p[3]) {
+    return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
 }
 
 static const char *node_fault(const fct_tree_view *view, uint32_t i) {
     const fct_cluster *c = &view->clusters[i];
-    uint32_t nodes = view->node_count, faces = view->face_count, place = c->first;
-    if (c->count < 2 || c->count > faces || c->first > faces - c->count) return "range outside the faces";
-    if (!all_finite(c, offsetof(fct_cluster, child) / sizeof(float))) return "a number that is not finite";
+    const char *own = fct_tree_node_fault(view, i, c);
+    if (own) return own;
     if (!(c->cost <= (i ? view->clusters[i - 1].cost : INFINITY))) return "cost above that of a later merge";
+    uint32_t first[2], count[2];
     for (int k = 0; k < 2; ++k) {
-        uint32_t child = c->child[k];
-        if (child <= i || child >= nodes + faces) return "child out of order";
-        uint32_t first = child < nodes ? view->clusters[child].first : child - nodes;
-        if (first != place) return "child's range is not part of its own";
-        uint32_t count = child < nodes ? view->clusters[child].count : 1;
-        if (count > faces - place) return "child's range is not part of its own";
-        place += count;
+        bool leaf = c->child[k] >= view->node_count;
+        first[k] = leaf ? c->child[k] - view->node_count : view->clusters[c->child[k]].first;
+        count[k] = leaf ? 1 : view->clusters[c->child[k]].count;
     }
-    return place == c->first + c->count ? NULL : "children do not fill its range";
+    return fct_tree_parts_fault(c, first, count);
 }
 
 static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -74,8 +65,10 @@ static void check_positions(void *user, size_t begin, size_t end, size_t chunk, 
     (void)thread;
     checker *check = user;
     for (size_t v = begin; v < end && !check->faults[chunk].what; ++v)
-        if (!all_finite(check->view->positions + 3 * v, 3))
+        if (!is_finite(check->view->positions + 3 * v))
             check->faults[chunk] = (fault){"a position that is not finite", (uint32_t)v};
+        else if (check->view->colors && !is_finite(check->view->colors + 3 * v))
+            check->faults[chunk] = (fault){"a color that is not finite", (uint32_t)v};
 }
 
 static fct_result run(const fct_env *env, const char *name, const char *kind, size_t count, checker *check,
@@ -119,10 +112,42 @@ static fct_result check_roots(const fct_env *env, const char *name, const fct_tr
     return fct_fail(env, FCT_ERROR_DATA, "%s: the roots hold %u of %u faces", name, place, view->face_count);
 }
 
-static fct_result check_all(const fct_env *env, const char *name, fct_tree *tree, checker *check) {
+/* The cut is the partition of its size, and its records are those of the nodes. */
+static fct_result check_cut(const fct_env *env, const char *name, const fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
+    uint32_t opened = tree->cut_count - view->root_count;
+    for (uint32_t i = 0; i < tree->cut_count; ++i) {
+        uint32_t id = tree->cut_ids[i];
+        const fct_cluster *c = &tree->cut[i];
+        bool right =
+            id >= opened && id < view->node_count + view->face_count && (i == 0 || id > tree->cut_ids[i - 1]);
+        if (right && id < view->node_count) right = !memcmp(c, &view->clusters[id], sizeof *c);
+        if (!right || fct_tree_node_fault(view, id, c))
+            return fct_fail(env, FCT_ERROR_DATA, "%s: entry %u of the cut is not that of its node", name, i);
+    }
+    return FCT_OK;
+}
+
+static fct_result check_depth(const fct_env *env, const char *name, const fct_tree_view *view) {
+    uint32_t depth;
+    double mean;
+    fct_result result = fct_tree_find_depth(env, view, &depth, &mean);
+    if (result != FCT_OK) return result;
+    if (view->face_count > 1 && depth > 3 * log2(view->face_count))
+        return fct_fail(env, FCT_ERROR_DATA, "%s: the tree is %u deep, more than 3 log2 of its %u faces",
+                        name, depth, view->face_count);
+    if (depth != view->depth || !(fabs(mean - view->mean_depth) <= 1e-9 * mean))
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "%s: the tree is %u deep, %g in the mean; its header says %u, %g", name, depth, mean,
+                        view->depth, view->mean_depth);
+    return FCT_OK;
+}
+
+static fct_result check_all(const fct_env *env, const char *name, const fct_tree *tree, checker *check) {
     const fct_tree_view *view = &tree->view;
     fct_result result = run(env, name, "node", view->node_count, check, check_nodes);
     if (result == FCT_OK) result = check_roots(env, name, view);
+    if (result == FCT_OK) result = check_cut(env, name, tree);
     if (result == FCT_OK) result = run(env, name, "face at place", view->face_count, check, check_triangles);
     if (result == FCT_OK) result = run(env, name, "vertex", view->vertex_count, check, check_positions);
     if (result == FCT_OK)
@@ -130,22 +155,28 @@ static fct_result check_all(const fct_env *env, const char *name, fct_tree *tree
     if (result == FCT_OK)
         result =
             check_permutation(env, name, "the vertex", view->vertex_ids, view->vertex_count, check->seen);
-    if (result == FCT_OK) result = fct_tree_measure_depth(tree);
-    if (result == FCT_OK && view->face_count > 1 && view->depth > 3 * log2(view->face_count))
-        result = fct_fail(env, FCT_ERROR_DATA, "%s: the tree is %u deep, more than 3 log2 of its %u faces",
-                          name, view->depth, view->face_count);
-    return result;
+    return result == FCT_OK ? check_depth(env, name, view) : result;
 }
 
-fct_result fct_tree_check_structure(const fct_env *env, const char *name, fct_tree *tree) {
+fct_result fct_tree_check_structure(const fct_env *env, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     size_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count;
     checker check = {.view = view};
     check.faults = fct_allocate(env, fct_chunk_count(most, GRAIN), sizeof *check.faults);
     check.seen = fct_allocate(env, most / 32 + 1, sizeof *check.seen);
-    fct_result result = check.faults && check.seen ? check_all(env, name, tree, &check)
-                                                   : fct_fail_memory(env, "checking a hierarchy");
+    fct_result result = check.faults && check.seen
+                            ? check_all(env, tree->path ? tree->path : "tree", tree, &check)
+                            : fct_fail_memory(env, "checking a hierarchy");
     fct_release(env, check.faults);
     fct_release(env, check.seen);
+    return result;
+}
+
+fct_result fct_tree_check(const fct_env *env, const fct_tree *tree) {
+    if (!atomic_load_explicit(&tree->unchecked, memory_order_acquire)) return FCT_OK;
+    fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_WHOLE);
+    fct_result result = fct_tree_check_structure(env, tree);
+    /* Trees are made by fct_tree_new alone, so that none is const from its birth. */
+    if (result == FCT_OK) atomic_store_explicit(&((fct_tree *)tree)->unchecked, false, memory_order_release);
     return result;
 }

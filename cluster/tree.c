@@ -1,4 +1,5 @@
-/* cluster/tree.c: reading a tree: views, single clusters, partitions, labels, the mesh in its own order. */
+/* cluster/tree.c: a tree from beginning to end: views, depth, bounds, labels, the mesh in its own order. What
+ * reads all faces asks for fct_tree_check first. */
 #include "cluster/tree.h"
 
 #include <string.h>
@@ -28,6 +29,7 @@ void fct_tree_destroy(fct_tree *tree) {
     for (uint32_t i = 0; own_names && i < tree->view.material_count; ++i) fct_release(env, tree->names[i]);
     fct_release(env, tree->names);
     fct_release(env, tree->source);
+    fct_release(env, tree->path);
     fct_file_close(env, &tree->file);
     fct_release(env, tree);
 }
@@ -36,43 +38,53 @@ fct_tree_view fct_tree_get(const fct_tree *tree) {
     return tree->view;
 }
 
-fct_result fct_tree_measure_depth(fct_tree *tree) {
-    fct_tree_view *view = &tree->view;
-    view->depth = 0, view->mean_depth = 0;
-    uint8_t *depths = fct_allocate_zero(tree->env, view->node_count, 1);
-    if (!depths) return fct_fail_memory(tree->env, "the tree");
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean) {
+    *depth = 0, *mean = 0;
+    uint8_t *depths = fct_allocate_zero(env, view->node_count, 1);
+    if (!depths) return fct_fail_memory(env, "the tree");
     uint64_t total = 0;
     for (uint32_t i = 0; i < view->node_count; ++i)
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = view->clusters[i].child[k], depth = depths[i] + 1u;
+            uint32_t child = view->clusters[i].child[k], below = depths[i] + 1u;
             if (child < view->node_count) {
-                depths[child] = (uint8_t)(depth < 255 ? depth : 255);
+                depths[child] = (uint8_t)(below < 255 ? below : 255);
             } else {
-                total += depth;
-                if (depth > view->depth) view->depth = depth;
+                total += below;
+                if (below > *depth) *depth = below;
             }
         }
-    fct_release(tree->env, depths);
-    view->mean_depth = (double)total / view->face_count;
+    fct_release(env, depths);
+    *mean = (double)total / view->face_count;
     return FCT_OK;
 }
 
-void fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out) {
-    const fct_tree_view *view = &tree->view;
-    if (node < view->node_count) {
-        *out = view->clusters[node];
-        return;
-    }
-    uint32_t place = node - view->node_count;
-    memset(out, 0, sizeof *out);
-    fct_cluster_describe_face(view, place, out);
-    out->child[0] = out->child[1] = FCT_NONE;
+fct_result fct_tree_measure_depth(fct_tree *tree) {
+    uint32_t depth;
+    double mean;
+    fct_result result = fct_tree_find_depth(tree->env, &tree->view, &depth, &mean);
+    tree->view.depth = depth, tree->view.mean_depth = mean;
+    return result;
+}
+
+void fct_tree_measure_bounds(fct_tree *tree) {
+    fct_tree_view *view = &tree->view;
+    fct_bounds b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t v = 0; v < view->vertex_count; ++v)
+        for (int k = 0; k < 3; ++k) {
+            float x = view->positions[3 * v + k];
+            if (x < b.lower[k]) b.lower[k] = x;
+            if (x > b.upper[k]) b.upper[k] = x;
+        }
+    view->bounds = b;
 }
 
 fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out) {
     const fct_tree_view *view = &tree->view;
     unsigned arrays = (view->colors ? FCT_MESH_COLORS : 0u) | (view->materials ? FCT_MESH_MATERIALS : 0u);
-    fct_result result = fct_mesh_create(env, view->vertex_count, view->face_count, arrays, out);
+    *out = (fct_mesh){0};
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
+    result = fct_mesh_create(env, view->vertex_count, view->face_count, arrays, out);
     if (result != FCT_OK) return result;
     for (size_t v = 0; v < view->vertex_count; ++v) {
         size_t to = 3 * (size_t)view->vertex_ids[v];
@@ -104,46 +116,16 @@ fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out
     return fct_fail_memory(env, "material names");
 }
 
-uint32_t fct_tree_partition(const fct_tree *tree, uint32_t count, uint32_t *nodes) {
+fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
+                           uint32_t *labels) {
     const fct_tree_view *view = &tree->view;
-    if (count < view->root_count) count = view->root_count;
-    if (count > view->face_count) count = view->face_count;
-    uint32_t opened = count - view->root_count; /* nodes below this id are opened */
-    /* What is written and what is still to be visited are disjoint clusters of the partition's size at most:
-     * the stack grows from the far end of the same array. */
-    uint32_t written = 0, top = count;
-    for (uint32_t r = view->root_count; r-- > 0;) nodes[--top] = view->roots[r];
-    while (top < count) {
-        uint32_t node = nodes[top++];
-        if (node >= opened) {
-            nodes[written++] = node;
-        } else {
-            nodes[--top] = view->clusters[node].child[1];
-            nodes[--top] = view->clusters[node].child[0];
-        }
-    }
-    return written;
-}
-
-uint32_t fct_tree_count_at_cost(const fct_tree *tree, double max_cost) {
-    const fct_tree_view *view = &tree->view;
-    uint32_t low = 0, high = view->node_count; /* nodes from `low` on are done */
-    while (low < high) {
-        uint32_t middle = low + (high - low) / 2;
-        if ((double)view->clusters[middle].cost <= max_cost)
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    return view->root_count + low;
-}
-
-void fct_tree_labels(const fct_tree *tree, const uint32_t *nodes, uint32_t count, uint32_t *labels) {
-    const fct_tree_view *view = &tree->view;
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
     for (uint32_t i = 0; i < count; ++i) {
         bool leaf = nodes[i] >= view->node_count;
         uint32_t first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
         uint32_t faces = leaf ? 1 : view->clusters[nodes[i]].count;
         for (uint32_t place = first; place < first + faces; ++place) labels[view->face_ids[place]] = i;
     }
+    return FCT_OK;
 }

@@ -2,6 +2,8 @@
 #ifndef FCT_CLUSTER_TREE_H
 #define FCT_CLUSTER_TREE_H
 
+#include <stdatomic.h>
+
 #include "base/env.h"
 #include "base/file.h"
 #include "cluster/work.h"
@@ -23,8 +25,21 @@ struct fct_tree {
     float *positions, *colors;
     char **names;
     char *source;
+    /* Of a tree from a file. */
     fct_file file;
+    char *path; /* for messages */
+    /* The cut into cut_count clusters, by ascending id, or NULL: they lie together near the file's beginning.
+     * Nodes below cut_count - root_count are above it. */
+    const uint32_t *cut_ids;
+    const fct_cluster *cut;
+    uint32_t cut_count;
+    atomic_bool unchecked; /* the structure of what is in the file has not been looked at */
 };
+
+/* What is wrong with the record of a node, leaves included, by itself, or NULL. */
+const char *fct_tree_node_fault(const fct_tree_view *view, uint32_t node, const fct_cluster *c);
+/* What is wrong with the places of its two children, or NULL. */
+const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], const uint32_t count[2]);
 
 /* An empty tree that can be destroyed. NULL when memory is out. */
 fct_tree *fct_tree_new(const fct_env *env);
@@ -44,5 +59,16 @@ void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cl
 
 /* Depths from the children links; view->depth and view->mean_depth. Errors: MEMORY. */
 fct_result fct_tree_measure_depth(fct_tree *tree);
+/* The same of any view, without writing to it. */
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean);
+/* view->bounds from the positions. */
+void fct_tree_measure_bounds(fct_tree *tree);
+
+/* Of the mesh's dual graph; components are the parts that edges connect. */
+typedef struct fct_edge_counts {
+    uint32_t boundary, nonmanifold, components;
+} fct_edge_counts;
+/* Counts them anew. Errors: MEMORY, CANCELLED. */
+fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, fct_edge_counts *out);
 
 #endif

@@ -24,7 +24,6 @@ typedef struct fct_work {
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
     bool steep;                /* the reserve of height may be used */
     bool balanced;             /* the greedy loop goes by size first, then by cost */
-    uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
     uint32_t stranded;         /* clusters that edges lead to but grafting found no place for */
     const uint32_t *materials; /* of the face of the slot, or NULL */
     /* Per slot, or NULL. Nonzero: the cluster has neighbours that are not here. It never merges, and a
@@ -40,6 +39,7 @@ typedef struct fct_work {
     fct_lists lists;
     fct_edge *edges;
     uint32_t edge_count;
+    uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
 } fct_work;
 
 /* The greatest height of a cluster of `count` faces: 3 log2 n - 1, so that a join of parts keeps the whole

@@ -59,10 +59,11 @@ int main(int argc, char **argv) {
     if (result == FCT_OK) result = fct_tree_open(&env, "surface.fct", &tree);
     if (result != FCT_OK) return 1;
 
-    uint32_t nodes[PARTS], count = fct_tree_partition(tree, PARTS, nodes);
-    print_clusters(tree, nodes, count);
+    uint32_t nodes[PARTS], count;
     fct_partition_quality quality;
-    result = fct_tree_quality(&env, tree, nodes, count, &quality);
+    result = fct_tree_partition(&env, tree, PARTS, nodes, &count);
+    if (result == FCT_OK) print_clusters(tree, nodes, count);
+    if (result == FCT_OK) result = fct_tree_quality(&env, tree, nodes, count, &quality);
     if (result == FCT_OK)
         printf("in one piece each: %s; mean squared deviation of normals %.4f\n",
                quality.connected ? "yes" : "no", quality.mean_normal_deviation);

@@ -147,7 +147,8 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     const fct_tree *tree = set->view.models[in->model].tree;
     const fct_material *material = &set->view.materials[in->material];
     fct_cluster c;
-    fct_tree_cluster(tree, node, &c);
+    fct_result r = fct_tree_cluster(tree, node, &c);
+    if (r != FCT_OK) return r;
     fct_element e = {
         .parent = parent, .instance = instance, .node = node, .back = back, .triangle = FCT_NONE};
     double sign = back ? -1 : 1;
@@ -155,7 +156,7 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
         v3 p[3];
         place_corners(set, in, c.first, p);
         set_triangle(&e, p, in->mirrored ? -sign : sign);
-        fct_result r = add_corners(set, p, &e.triangle);
+        r = add_corners(set, p, &e.triangle);
         if (r != FCT_OK) return r;
     } else {
         touch(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
@@ -229,8 +230,8 @@ fct_result fct_elements_split(fct_elements *set, uint32_t id) {
         r = quarter(set, id);
     } else {
         fct_cluster c;
-        fct_tree_cluster(set->view.models[set->view.instances[e.instance].model].tree, e.node, &c);
-        r = add_node(set, id, e.instance, c.child[0], e.back);
+        r = fct_tree_cluster(set->view.models[set->view.instances[e.instance].model].tree, e.node, &c);
+        if (r == FCT_OK) r = add_node(set, id, e.instance, c.child[0], e.back);
         if (r == FCT_OK) r = add_node(set, id, e.instance, c.child[1], e.back);
     }
     if (r != FCT_OK) return r;

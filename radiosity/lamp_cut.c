@@ -420,7 +420,9 @@ static fct_result make_table(const fct_env *env, fct_lamp *lamp) {
         result = fct_fail_memory(env, "a lamp's projected areas");
         goto done;
     }
-    table_work work = {lamp, facets, fct_tree_partition(lamp->tree, count, nodes)};
+    table_work work = {.lamp = lamp, .facets = facets};
+    result = fct_tree_partition(env, lamp->tree, count, nodes, &work.count);
+    if (result != FCT_OK) goto done;
     for (uint32_t i = 0; i < work.count; ++i) {
         fct_cluster c;
         fct_tree_cluster(lamp->tree, nodes[i], &c);

@@ -117,15 +117,16 @@ fct_result fct_transform_bounds(const fct_env *env, const fct_tree *tree, const 
     uint32_t count = view.root_count > CUT ? view.root_count : CUT;
     uint32_t *nodes = fct_allocate(env, count, sizeof *nodes);
     if (!nodes) return fct_fail_memory(env, "the bounds of a scene");
-    count = fct_tree_partition(tree, count, nodes);
-    for (uint32_t k = 0; k < count; ++k) {
+    fct_result result = fct_tree_partition(env, tree, count, nodes, &count);
+    for (uint32_t k = 0; k < count && result == FCT_OK; ++k) {
         fct_cluster cluster;
         fct_box box;
-        fct_tree_cluster(tree, nodes[k], &cluster);
+        result = fct_tree_cluster(tree, nodes[k], &cluster);
         fct_cluster_box(&cluster, &box);
         add_box(to_world, &box, tight_lower, tight_upper);
     }
     fct_release(env, nodes);
+    if (result != FCT_OK) return result;
     for (int i = 0; i < 3; ++i) { /* each is conservative, so their meeting is; rounded outwards to float */
         out->lower[i] = nextafterf((float)fmax(lower[i], tight_lower[i]), -INFINITY);
         out->upper[i] = nextafterf((float)fmin(upper[i], tight_upper[i]), INFINITY);

@@ -12,6 +12,7 @@ BEGIN {
         for (j = 1; j <= i; ++j) allowed[chain[i], chain[j]] = 1
     allowed["simplify", "base"] = allowed["simplify", "mesh"] = allowed["simplify", "simplify"] = 1
     allowed["tools", "tools"] = 1
+    allowed["openmesh", "cluster"] = 1
     folder["partition"] = "cluster" # a second public header of a folder
 }
 function fail(what) {

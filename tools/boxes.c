@@ -17,18 +17,17 @@ static json_t *numbers(const float *values, int count) {
     return array;
 }
 
-static json_t *describe(const fct_tree *tree, const uint32_t *nodes, uint32_t count) {
+static json_t *describe(const fct_cluster *clusters, uint32_t count) {
     json_t *list = json_array();
     for (uint32_t i = 0; i < count; ++i) {
-        fct_cluster cluster;
         fct_box box;
-        fct_tree_cluster(tree, nodes[i], &cluster);
-        fct_cluster_box(&cluster, &box);
+        const fct_cluster *cluster = &clusters[i];
+        fct_cluster_box(cluster, &box);
         json_t *item =
             json_pack("{s:o, s:[o, o, o], s:o, s:o, s:f, s:I}", "center", numbers(box.center, 3), "axes",
                       numbers(box.axes[0], 3), numbers(box.axes[1], 3), numbers(box.axes[2], 3),
-                      "half_extents", numbers(box.half, 3), "plane", numbers(cluster.plane, 4), "area",
-                      (double)cluster.area, "faces", (json_int_t)cluster.count);
+                      "half_extents", numbers(box.half, 3), "plane", numbers(cluster->plane, 4), "area",
+                      (double)cluster->area, "faces", (json_int_t)cluster->count);
         if (!item || json_array_append_new(list, item)) {
             json_decref(list);
             return NULL;
@@ -68,16 +67,14 @@ static void add_box(const fct_box *box, uint32_t index, fct_mesh *mesh) {
             mesh->triangles[3 * (12 * (size_t)index + f) + c] = 8 * index + sides[f][c];
 }
 
-static int write_mesh(tool *t, const fct_tree *tree, const uint32_t *nodes, uint32_t count) {
+static int write_mesh(tool *t, const fct_cluster *clusters, uint32_t count) {
     fct_mesh mesh;
     if (count > FCT_NONE / 48) return tool_fail(t, TOOL_USAGE, "-k %u: too many boxes for one mesh", count);
     int code = tool_result(t, fct_mesh_create(&t->env, 8 * count, 12 * count, FCT_MESH_COLORS, &mesh));
     if (code != TOOL_DONE) return code;
     for (uint32_t i = 0; i < count; ++i) {
-        fct_cluster cluster;
         fct_box box;
-        fct_tree_cluster(tree, nodes[i], &cluster);
-        fct_cluster_box(&cluster, &box);
+        fct_cluster_box(&clusters[i], &box);
         add_box(&box, i, &mesh);
     }
     code = tool_save_mesh(t, t->output, &mesh, 1);
@@ -85,15 +82,25 @@ static int write_mesh(tool *t, const fct_tree *tree, const uint32_t *nodes, uint
     return code;
 }
 
-static int write_boxes(tool *t, const fct_tree *tree, const uint32_t *nodes, uint32_t count) {
+static int write_boxes(tool *t, const fct_cluster *clusters, uint32_t count) {
     bool as_mesh = t->output && tool_is_mesh_name(t->output);
-    int code = as_mesh ? write_mesh(t, tree, nodes, count) : TOOL_DONE;
-    json_t *object = as_mesh && !t->json ? NULL : describe(tree, nodes, count);
+    int code = as_mesh ? write_mesh(t, clusters, count) : TOOL_DONE;
+    json_t *object = as_mesh && !t->json ? NULL : describe(clusters, count);
     if (code == TOOL_DONE && !object && !as_mesh)
         return tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output");
     if (code == TOOL_DONE && !as_mesh && (t->output || !t->json)) code = write_json(t, object);
     if (code == TOOL_DONE && t->json) return tool_json(t, object);
     json_decref(object);
+    return code;
+}
+
+/* The clusters of the partition; of a hierarchy file nothing but these and those above them is read. */
+static int read_clusters(tool *t, const fct_tree *tree, uint32_t wanted, fct_cluster *clusters,
+                         uint32_t *nodes) {
+    uint32_t count;
+    int code = tool_result(t, fct_tree_partition(&t->env, tree, wanted, nodes, &count));
+    for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)
+        code = tool_result(t, fct_tree_cluster(tree, nodes[i], &clusters[i]));
     return code;
 }
 
@@ -105,13 +112,17 @@ static int run(tool *t, void *options) {
     if (code != TOOL_DONE) return code;
     fct_tree_view view = fct_tree_get(tree);
     uint32_t *nodes = NULL;
+    fct_cluster *clusters = NULL;
     if (wanted < view.root_count || wanted > view.face_count)
         code = tool_fail(t, TOOL_USAGE, "-k %u: %s can be cut into %u to %u clusters", wanted, t->inputs[0],
                          view.root_count, view.face_count);
-    else if (!(nodes = tool_allocate(t, wanted, sizeof *nodes)))
+    else if (!(nodes = tool_allocate(t, wanted, sizeof *nodes)) ||
+             !(clusters = tool_allocate(t, wanted, sizeof *clusters)))
         code = TOOL_MEMORY;
-    if (code == TOOL_DONE) code = write_boxes(t, tree, nodes, fct_tree_partition(tree, wanted, nodes));
+    if (code == TOOL_DONE) code = read_clusters(t, tree, wanted, clusters, nodes);
+    if (code == TOOL_DONE) code = write_boxes(t, clusters, wanted);
     tool_release(t, nodes);
+    tool_release(t, clusters);
     fct_tree_destroy(tree);
     return code;
 }

@@ -3,13 +3,15 @@
 
 #include <inttypes.h>
 #include <limits.h>
+#include <math.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { KEY_VERIFY = TOOL_KEY };
 
 static const struct argp_option options_table[] = {
-    {"verify", KEY_VERIFY, NULL, 0, "Read a hierarchy file throughout: checksums, ranges, containment, areas",
-     0},
+    {"verify", KEY_VERIFY, NULL, 0,
+     "Read a hierarchy file throughout: checksums, structure, and every node's numbers against its faces", 0},
     {0}};
 
 static error_t parse(int key, char *text, struct argp_state *state) {
@@ -83,28 +85,64 @@ static json_t *build_options(const fct_tree_def *def) {
     return object;
 }
 
+/* The area of the roots, and of nothing else. */
+static int sum_area(tool *t, const fct_tree *tree, double *area) {
+    fct_tree_view view = fct_tree_get(tree);
+    int code = TOOL_DONE;
+    *area = 0;
+    for (uint32_t i = 0; i < view.root_count && code == TOOL_DONE; ++i) {
+        fct_cluster root = {0};
+        uint32_t id = view.roots[i];
+        if (id >= view.node_count + view.face_count)
+            return tool_fail(t, TOOL_DATA, "%s: root %u is out of range", t->inputs[0], i);
+        code = tool_result(t, fct_tree_cluster(tree, id, &root));
+        *area += (double)root.area;
+    }
+    return code;
+}
+
+/* What the header tells. */
+static int describe_header(tool *t, const fct_tree *tree, json_t *object) {
+    fct_tree_view view = fct_tree_get(tree);
+    double area, square = 0;
+    int code = sum_area(t, tree, &area);
+    if (code != TOOL_DONE) return code;
+    for (int k = 0; k < 3; ++k) {
+        double side = (double)view.bounds.upper[k] - (double)view.bounds.lower[k];
+        square += side * side;
+    }
+    char hash[24];
+    snprintf(hash, sizeof hash, "%016" PRIx64, view.source_hash);
+    set_count(object, "vertices", view.vertex_count);
+    set_count(object, "faces", view.face_count);
+    set_count(object, "boundary_edges", view.boundary_edges);
+    set_count(object, "nonmanifold_edges", view.nonmanifold_edges);
+    set_count(object, "components", view.component_count);
+    set_count(object, "materials", view.material_count);
+    json_object_set_new(object, "vertex_colors", json_boolean(view.colors != NULL));
+    set_bounds(object, &view.bounds);
+    json_object_set_new(object, "area", json_real(area));
+    json_object_set_new(object, "diagonal", json_real(sqrt(square)));
+    set_count(object, "roots", view.root_count);
+    set_count(object, "inner_nodes", view.node_count);
+    set_count(object, "depth", view.depth);
+    json_object_set_new(object, "mean_depth", json_real(view.mean_depth));
+    json_object_set_new(object, "source", json_string(view.source));
+    json_object_set_new(object, "source_hash", json_string(hash));
+    json_object_set_new(object, "build", build_options(&view.def));
+    return TOOL_DONE;
+}
+
 static int describe_tree(tool *t, const char *path, bool verify, json_t *object) {
     fct_tree *tree;
-    fct_mesh mesh = {0};
+    struct stat status;
     int code = tool_result(t, fct_tree_open(&t->env, path, &tree));
     if (code != TOOL_DONE) return code;
     if (verify) code = tool_result(t, fct_tree_verify(&t->env, tree));
-    if (code == TOOL_DONE) code = tool_result(t, fct_tree_mesh(&t->env, tree, &mesh));
-    if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
-    if (code == TOOL_DONE) {
-        fct_tree_view view = fct_tree_get(tree);
-        char hash[24];
-        snprintf(hash, sizeof hash, "%016" PRIx64, view.source_hash);
-        set_count(object, "roots", view.root_count);
-        set_count(object, "inner_nodes", view.node_count);
-        set_count(object, "depth", view.depth);
-        json_object_set_new(object, "mean_depth", json_real(view.mean_depth));
-        json_object_set_new(object, "source", json_string(view.source));
-        json_object_set_new(object, "source_hash", json_string(hash));
-        json_object_set_new(object, "build", build_options(&view.def));
-        if (verify) json_object_set_new(object, "verified", json_true());
-    }
-    fct_mesh_release(&t->env, &mesh);
+    if (code == TOOL_DONE) code = describe_header(t, tree, object);
+    if (code == TOOL_DONE && stat(path, &status) == 0 && S_ISREG(status.st_mode))
+        set_count(object, "file_bytes", (uint64_t)status.st_size);
+    if (code == TOOL_DONE && verify) json_object_set_new(object, "verified", json_true());
     fct_tree_destroy(tree);
     return code;
 }
@@ -165,11 +203,13 @@ int tool_info(int argc, char **argv) {
         .synopsis = "FILE",
         .summary = "count what a file holds; check a hierarchy file",
         .text = "FILE is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of a mesh: vertices, "
-                "faces, polygons "
-                "before they became triangles, boundary, non-manifold and misoriented edges, components, "
-                "degenerate "
-                "and duplicate faces. Of a hierarchy also depth, roots, and the options of its build.\n\n"
-                "JSON keys: as printed.",
+                "faces, polygons before they became triangles, boundary, non-manifold and misoriented edges, "
+                "components, degenerate and duplicate faces. Of a hierarchy what its header tells, at once "
+                "however large the file is: vertices, faces, boundary and non-manifold edges, components, "
+                "bounds, depth, roots, and the source and the options of its build.\n\n--verify reads all of "
+                "a hierarchy: checksums, links, ranges and depth, and of every node that its box and cone "
+                "hold its faces and that its area, moment, centroid and plane are theirs. What is wrong is "
+                "said, and the exit code is 65.\n\nJSON keys: as printed.",
         .options = options_table,
         .parse = parse,
         .run = run,

@@ -79,6 +79,7 @@ static int use_scene(tool *t, const char *path, loader *l, drawing *out) {
 
 static int use_tree(tool *t, const drawing_source *source, loader *l) {
     int code = tool_open_tree(t, source->path, &source->tree, &l->tree);
+    if (code == TOOL_DONE) code = tool_result(t, fct_tree_check(&t->env, l->tree));
     if (code != TOOL_DONE) return code;
     l->parts = tool_allocate(t, 1, sizeof *l->parts);
     if (!l->parts) return TOOL_MEMORY;
@@ -207,13 +208,15 @@ static int make_cuts(tool *t, loader *l, uint32_t count) {
         tool_release(t, nodes);
         return TOOL_MEMORY;
     }
-    for (uint32_t i = 0; i < l->part_count; ++i) {
+    int code = TOOL_DONE;
+    for (uint32_t i = 0; i < l->part_count && code == TOOL_DONE; ++i) {
         const fct_tree *tree = l->parts[i].tree;
-        uint32_t here =
-            fct_tree_partition(tree, l->part_count == 1 ? count : fct_tree_get(tree).root_count, nodes);
+        uint32_t here = l->part_count == 1 ? count : fct_tree_get(tree).root_count;
+        code = tool_result(t, fct_tree_partition(&t->env, tree, here, nodes, &here));
         for (uint32_t k = 0; k < here; ++k) l->cuts[n++] = make_cut(l, i, nodes[k]);
     }
     tool_release(t, nodes);
+    if (code != TOOL_DONE) return code;
     for (uint32_t i = n / 2; i-- > 0 && l->part_count > 1;) sift_down(l->cuts, n, i);
     while (n < most && l->cuts[0].count > 1) {
         cut top = l->cuts[0];

@@ -165,6 +165,12 @@ int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double expos
 bool tool_is_scene_name(const char *path);
 /* The colour of cluster `index`, linear: neighbours differ clearly, and no two of 7 million are the same. */
 void tool_palette(uint32_t index, float color[3]);
+/* --- labels (tool_labels.c) --- */
+/* Writes a label below `count` for each input face: one a line, or, where the path is named as a mesh, the
+ * mesh with a colour for each label, on the faces in .ply and .off, else on vertices, doubled along borders.
+ */
+int tool_save_labels(tool *t, const char *path, const fct_tree *tree, const uint32_t *labels, uint32_t count);
+
 error_t tool_parse_backend(struct argp_state *state, const char *name, const char *text,
                            fct_backend *backend);
 
@@ -179,6 +185,7 @@ int tool_cluster(int argc, char **argv);
 int tool_compare(int argc, char **argv);
 int tool_info(int argc, char **argv);
 int tool_make(int argc, char **argv);
+int tool_meshlets(int argc, char **argv);
 int tool_partition(int argc, char **argv);
 int tool_raycast(int argc, char **argv);
 int tool_render(int argc, char **argv);

@@ -102,19 +102,37 @@ typedef struct fct_tree_view {
 } fct_tree_view;
 FCT_API fct_tree_view fct_tree_get(const fct_tree *tree);
 
-/* The cluster of any node id, leaves included (computed from the triangle). */
-FCT_API void fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out);
+/* Trees from files. fct_tree_open reads the file's first page; what lies behind is looked at when it is used.
+ * Calls that touch few nodes (fct_tree_cluster, fct_tree_children, fct_tree_partition) check each node as
+ * they read it. Calls that read all of a tree check its whole structure first, once, which the tree
+ * remembers; do so yourself before you walk the arrays of a view of a tree from a file. After it has passed
+ * nothing can lead out of the arrays or around in circles, no call on this tree returns DATA, and the calls
+ * above cost no checks. A tree from fct_tree_build needs none. Several threads may call it. Errors: DATA,
+ * MEMORY. */
+FCT_API fct_result fct_tree_check(const fct_env *env, const fct_tree *tree);
 
-/* The mesh in the input's own order (positions, triangles, colours, materials). Errors: MEMORY. */
+/* The cluster of any node id below node_count + face_count, leaves included (computed from the triangle).
+ * Errors: DATA (a damaged file; *out is zero then, a leaf without faces, and the message goes to the
+ * environment of the tree). */
+FCT_API fct_result fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out);
+/* The two children of an inner node, whose faces are the first and the last part of its own. Who walks down
+ * the tree of a file by this comes to each node once. Errors as above. */
+FCT_API fct_result fct_tree_children(const fct_tree *tree, uint32_t node, fct_cluster out[2]);
+
+/* The mesh in the input's own order (positions, triangles, colours, materials). Errors: DATA, MEMORY. */
 FCT_API fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out);
 
 /* Node ids of the partition into `count` clusters, in order of their first place. `nodes` holds at least
- * `count`. Returns how many were written: count clamped to [root_count, face_count]. */
-FCT_API uint32_t fct_tree_partition(const fct_tree *tree, uint32_t count, uint32_t *nodes);
+ * `count`. *written: how many there are: count clamped to [root_count, face_count]; 0 on failure. Touches the
+ * nodes above the partition and its own. Errors: DATA. */
+FCT_API fct_result fct_tree_partition(const fct_env *env, const fct_tree *tree, uint32_t count,
+                                      uint32_t *nodes, uint32_t *written);
 /* How many clusters remain when all merges of cost <= max_cost are done. */
 FCT_API uint32_t fct_tree_count_at_cost(const fct_tree *tree, double max_cost);
-/* Cluster number (0..count-1, in the order of `nodes`) of each input face; labels holds face_count. */
-FCT_API void fct_tree_labels(const fct_tree *tree, const uint32_t *nodes, uint32_t count, uint32_t *labels);
+/* Cluster number (0..count-1, in the order of `nodes`) of each input face; labels holds face_count. Errors:
+ * DATA, MEMORY. */
+FCT_API fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
+                                   uint32_t count, uint32_t *labels);
 
 /* Area-weighted means over a partition (fit over the squared diagonal of the mesh's bounds). Errors: MEMORY.
  */
@@ -135,6 +153,11 @@ FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, co
  * counts for nothing. Errors: DATA (invalid mesh, a label out of range), MEMORY. */
 FCT_API fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                                       uint32_t count, fct_partition_quality *out);
+
+/* The least-squares plane n.x + d = 0 of each label's surface, n along its area vector: planes holds count x
+ * 4. All 0 for a label without faces. Errors: DATA, MEMORY. */
+FCT_API fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                                     uint32_t count, float *planes);
 
 typedef struct fct_refine_def {
     uint32_t size;
@@ -162,14 +185,17 @@ typedef struct fct_refine_stats {
 FCT_API fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32_t count,
                                         const fct_refine_def *def, uint32_t *labels, fct_refine_stats *stats);
 
-/* Writes the hierarchy file: temporary file, fsync, rename. Errors: OUTPUT, MEMORY. */
+/* Writes the hierarchy file, docs/hierarchy-file.md: temporary file, fsync, rename. Errors: OUTPUT, MEMORY,
+ * CANCELLED; DATA for a damaged tree. */
 FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);
-/* Maps a hierarchy file read-only, validates the header in O(1) and what queries rely on (links, ranges,
- * indices, finite numbers) in one pass, so that no file can crash a later query; docs/hierarchy-file.md.
- * Errors: INPUT, DATA, MEMORY. */
+/* Maps a hierarchy file read-only and validates its header, names included; nothing else is read before it is
+ * used (see fct_tree_check). The file must not be shortened while the tree lives. Errors: INPUT, DATA,
+ * MEMORY.
+ */
 FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out);
-/* Reads everything: checksums, ranges, children, containment of vertices in boxes, areas. Errors: DATA with
- * what is wrong. */
+/* Reads everything: checksums, fct_tree_check, and of every node its box, cone, area, area vector, moment,
+ * centroid and plane against its triangles; the counts and bounds of the view. O(F log F). Errors: DATA with
+ * what is wrong, MEMORY, CANCELLED. */
 FCT_API fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree);
 
 #ifdef __cplusplus

@@ -67,6 +67,8 @@ typedef struct fct_meshlet_def {
     uint32_t size;
     uint32_t max_vertices;  /* 3 to 256; default 64 */
     uint32_t max_triangles; /* 1 to 512; default 124 */
+    double flatness; /* weight of like normals against short distances, 0 to 1e6: more makes narrower cones
+                        and a few more meshlets; default 1 */
 } fct_meshlet_def;
 FCT_API fct_meshlet_def fct_meshlet_def_default(void);
 
@@ -101,10 +103,11 @@ typedef struct fct_meshlets {
     uint32_t *faces;            /* face_count, input face ids in the order of triangles */
 } fct_meshlets;
 
-/* Cuts the tree into meshlets: the largest subtrees that fit, then small ones join neighbours or are shared
- * out among them until nothing more fits. A meshlet's faces are of one material. Every input face is in one
- * meshlet, a face with a repeated vertex too. Arrays are the caller's until fct_meshlets_release. Errors:
- * DATA (limits out of range, damaged file), MEMORY, CANCELLED; *out is all zero then. */
+/* Cuts the mesh into meshlets: they grow over the surface in the order and at the scale of the tree, then
+ * small ones join neighbours or are shared out among them until nothing more fits. A meshlet's faces are of
+ * one material. Every input face is in one meshlet, a face with a repeated vertex too. Arrays are the
+ * caller's until fct_meshlets_release. Errors: DATA (limits out of range, damaged file), MEMORY, CANCELLED;
+ * *out is all zero then. */
 FCT_API fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct_meshlet_def *def,
                                      fct_meshlets *out);
 FCT_API void fct_meshlets_release(const fct_env *env, fct_meshlets *meshlets);

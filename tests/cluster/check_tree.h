@@ -41,6 +41,14 @@ static inline void check_node_geometry(const fct_tree_view *view, const fct_clus
         assert_true(isfinite(numbers[i]));
 }
 
+/* The partition, which must come out; returns how many clusters it has. */
+static inline uint32_t cut_tree(const fct_tree *tree, uint32_t count, uint32_t *nodes) {
+    fct_env env = fct_env_default();
+    uint32_t written = 0;
+    assert_int_equal(fct_tree_partition(&env, tree, count, nodes, &written), FCT_OK);
+    return written;
+}
+
 static inline void check_links(const fct_tree_view *view) {
     uint8_t *parents = calloc((size_t)view->node_count + view->face_count, 1);
     for (uint32_t i = 0; i < view->node_count; ++i) {

@@ -43,7 +43,7 @@ static void check(fct_mesh *mesh, int connected) {
         uint32_t *nodes = malloc(4 * (size_t)mesh->face_count);
         for (uint32_t k = 1; connected == ALWAYS && k <= mesh->face_count; k *= 3) {
             fct_partition_quality quality;
-            assert_int_equal(fct_tree_partition(tree, k, nodes), k);
+            assert_int_equal(cut_tree(tree, k, nodes), k);
             assert_int_equal(fct_tree_quality(&env, tree, nodes, k, &quality), FCT_OK);
             assert_true(quality.connected);
         }

@@ -46,18 +46,18 @@ static void partitions_are_exact_and_connected(void **state) {
                      *labels = malloc(4 * (size_t)view.face_count);
             double deviation = INFINITY;
             for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 8) {
-                assert_int_equal(fct_tree_partition(tree, k, nodes), k);
+                assert_int_equal(cut_tree(tree, k, nodes), k);
                 fct_partition_quality quality;
                 assert_int_equal(fct_tree_quality(&env, tree, nodes, k, &quality), FCT_OK);
                 assert_true(quality.connected);
                 assert_true(quality.mean_normal_deviation <= deviation + 1e-12);
                 deviation = quality.mean_normal_deviation;
                 memset(labels, 0xFF, 4 * (size_t)view.face_count);
-                fct_tree_labels(tree, nodes, k, labels);
+                assert_int_equal(fct_tree_labels(&env, tree, nodes, k, labels), FCT_OK);
                 for (uint32_t f = 0; f < view.face_count; ++f) assert_true(labels[f] < k);
             }
-            assert_int_equal(fct_tree_partition(tree, 0, nodes), 1);
-            assert_int_equal(fct_tree_partition(tree, UINT32_MAX, nodes), view.face_count);
+            assert_int_equal(cut_tree(tree, 0, nodes), 1);
+            assert_int_equal(cut_tree(tree, UINT32_MAX, nodes), view.face_count);
             free(nodes);
             free(labels);
             fct_tree_destroy(tree);
@@ -77,14 +77,14 @@ static void quality_of_a_folded_sheet(void **state) {
     fct_tree_def def = fct_tree_def_default();
     fct_tree *tree = build(&env, &mesh, &def);
     uint32_t nodes[2];
-    assert_int_equal(fct_tree_partition(tree, 2, nodes), 2);
+    assert_int_equal(cut_tree(tree, 2, nodes), 2);
     fct_partition_quality q;
     assert_int_equal(fct_tree_quality(&env, tree, nodes, 2, &q), FCT_OK);
     assert_true(q.connected && q.mean_fit < 1e-12 && q.mean_direction < 1e-12 &&
                 q.mean_normal_deviation < 1e-12);
     assert_true(fabs(q.mean_irregularity - 9 / (4 * 3.14159265358979 * 0.5)) < 1e-5);
     assert_true(fabs(q.box_area - 2 * 2 * 0.5 / 1.5) < 1e-5);
-    assert_int_equal(fct_tree_partition(tree, 1, nodes), 1);
+    assert_int_equal(cut_tree(tree, 1, nodes), 1);
     assert_int_equal(fct_tree_quality(&env, tree, nodes, 1, &q), FCT_OK);
     /* both halves at 45 degrees to the mean normal: |n_i - n|^2 = 2 - sqrt 2 */
     assert_true(fabs(q.mean_normal_deviation - (2 - sqrt(2))) < 1e-6);
@@ -105,7 +105,7 @@ static void roots_and_costs(void **state) {
         def.root_count = roots;
         fct_tree *tree = build(&env, &mesh, &def);
         assert_int_equal(fct_tree_get(tree).root_count, roots);
-        assert_int_equal(fct_tree_partition(tree, 1, nodes), roots);
+        assert_int_equal(cut_tree(tree, 1, nodes), roots);
         for (uint32_t i = 0; i < roots; ++i) {
             fct_cluster root;
             fct_tree_cluster(tree, nodes[i], &root);
@@ -144,7 +144,7 @@ static void materials_come_first(void **state) {
         fct_tree *tree = build(&env, &mesh, &def);
         fct_tree_view view = fct_tree_get(tree);
         uint32_t nodes[3];
-        assert_int_equal(fct_tree_partition(tree, 3, nodes), 3);
+        assert_int_equal(cut_tree(tree, 3, nodes), 3);
         for (int i = 0; i < 3; ++i) {
             const fct_cluster *c = &view.clusters[nodes[i]];
             for (uint32_t p = c->first; p < c->first + c->count; ++p)

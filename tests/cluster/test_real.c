@@ -42,7 +42,7 @@ static void check_model(const figures *expected) {
         const uint32_t counts[] = {1, 2, 3, 10, 100, 1000, view.face_count / 2};
         for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {
             fct_partition_quality quality;
-            assert_int_equal(fct_tree_partition(tree, counts[i], nodes), counts[i]);
+            assert_int_equal(cut_tree(tree, counts[i], nodes), counts[i]);
             assert_int_equal(fct_tree_quality(&env, tree, nodes, counts[i], &quality), FCT_OK);
             if (expected->connected) assert_true(quality.connected);
             if (counts[i] != 1000) continue;

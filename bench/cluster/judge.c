@@ -1,0 +1,94 @@
+/* bench/cluster/judge.c: how good a partition is, from the triangles and their labels.
+ *
+ * Written apart from the library's own measure and used for every builder, peers included. Sums are double;
+ * covariances are taken about a first corner of the cluster and then moved to its centroid. Borders come from
+ * the dual graph. O(F log F).
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/vec.h"
+#include "bench/cluster/bench.h"
+#include "facetree/dual.h"
+
+typedef struct sums {
+    double area, perimeter;
+    v3 vector, origin, first; /* S; where moments are taken about; integral of x - origin */
+    double second[6];         /* integral of (x - origin)(x - origin)^T */
+    uint32_t faces;
+} sums;
+
+static void add_face(sums *s, const fct_mesh *mesh, uint32_t face) {
+    v3 p[3];
+    for (size_t k = 0; k < 3; ++k)
+        p[k] = v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)face + k]);
+    if (s->faces++ == 0) s->origin = p[0];
+    v3 a = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), .5), sum = {0, 0, 0};
+    double area = v3_norm(a);
+    for (size_t k = 0; k < 3; ++k) {
+        p[k] = v3_sub(p[k], s->origin);
+        sum = v3_add(sum, p[k]);
+        sym3_add_outer(s->second, area / 12, p[k]);
+    }
+    sym3_add_outer(s->second, area / 12, sum);
+    s->first = v3_mad(s->first, area / 3, sum);
+    s->vector = v3_add(s->vector, a);
+    s->area += area;
+}
+
+static uint32_t *complete(const uint32_t *labels, uint32_t faces, uint32_t *label_count) {
+    uint32_t *out = bench_allocate(faces, sizeof *out);
+    for (uint32_t f = 0; f < faces; ++f) {
+        out[f] = labels[f];
+        if (labels[f] == FCT_NONE)
+            out[f] = (*label_count)++;
+        else if (labels[f] >= *label_count)
+            bench_fail("face %u has label %u of %u", f, labels[f], *label_count);
+    }
+    return out;
+}
+
+static void add_borders(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels, sums *all) {
+    fct_dual dual;
+    bench_check(fct_dual_build(env, mesh, &dual), "the dual graph");
+    for (uint32_t f = 0; f < mesh->face_count; ++f) all[labels[f]].perimeter += (double)dual.perimeters[f];
+    for (size_t e = 0; e < dual.edge_count; ++e) {
+        uint32_t a = labels[dual.edges[2 * e]], b = labels[dual.edges[2 * e + 1]];
+        if (a == b) all[a].perimeter -= 2 * (double)dual.lengths[e];
+    }
+    fct_dual_release(env, &dual);
+}
+
+static double least_moment(const sums *s) {
+    double m[6], values[3], vectors[3][3];
+    memcpy(m, s->second, sizeof m);
+    sym3_add_outer(m, -1 / s->area, s->first);
+    bench_eigen(m, values, vectors);
+    return fmax(values[0], 0);
+}
+
+bench_quality bench_judge(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                          uint32_t label_count) {
+    uint32_t *full = complete(labels, mesh->face_count, &label_count);
+    sums *all = bench_allocate(label_count, sizeof *all);
+    for (uint32_t f = 0; f < mesh->face_count; ++f) add_face(&all[full[f]], mesh, f);
+    add_borders(env, mesh, full, all);
+    double area = 0, diagonal = bench_diagonal(mesh);
+    bench_quality q = {0};
+    for (uint32_t i = 0; i < label_count; ++i) {
+        const sums *s = &all[i];
+        q.clusters += s->faces > 0;
+        if (!(s->area > 0)) continue;
+        double deviation = 2 * fmax(s->area - v3_norm(s->vector), 0);
+        q.deviation_worst = fmax(q.deviation_worst, deviation / s->area);
+        q.deviation += deviation;
+        q.fit += least_moment(s) / (diagonal * diagonal);
+        q.irregularity += fmax(s->perimeter, 0) * fmax(s->perimeter, 0) / (4 * M_PI);
+        area += s->area;
+    }
+    if (area > 0) q.deviation /= area, q.fit /= area, q.irregularity /= area;
+    free(all);
+    free(full);
+    return q;
+}
