@@ -150,11 +150,11 @@ static size_t sample(fct_points p, size_t begin, size_t end, double size, const 
         if (to < count) sample4(p.x + end - 4, p.y + end - 4, p.z + end - 4, origin, f, out, to), to += 4;
         return to;
     }
-    size_t taken = count < SAMPLES ? 4 : SAMPLES, step = count > taken ? count / taken : 1;
+    size_t taken = count < SAMPLES ? 4 : SAMPLES;
     for (; to < taken; to += 4) {
         float x[4], y[4], z[4];
         for (size_t i = 0; i < 4; ++i) {
-            size_t at = begin + (to + i) * step % count;
+            size_t at = begin + (count < SAMPLES ? (i < count ? i : 0) : (to + i) * count / SAMPLES);
             x[i] = p.x[at], y[i] = p.y[at], z[i] = p.z[at];
         }
         sample4(x, y, z, origin, f, out, to);
