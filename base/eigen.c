@@ -1,10 +1,11 @@
 /* base/eigen.c: symmetric 3x3 eigenproblem without iteration.
  *
  * The matrix is scaled to entries of at most 1 and its trace removed, so that near multiples of the identity
- * keep their digits. The eigenvalue that stands apart from the other two comes from the cubic's trigonometric
- * solution and its vector from the two most independent rows; the other two are the exact answer of the 2x2
- * problem in the plane across that vector, which is sound for equal values as well. Smith, "Eigenvalues of a
- * symmetric 3x3 matrix", CACM 4(4), 1961, for the cubic.
+ * keep their digits. The eigenvalue that stands apart from the other two is the cubic's largest root, which
+ * Newton's method finds in three steps, and its vector comes from the two most independent rows; the other
+ * two are the exact answer of the 2x2 problem in the plane across that vector, which is sound for equal
+ * values as well. Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961, for the cubic. No function
+ * of the C library but the square root, so that the result is the same everywhere.
  */
 #include "base/eigen.h"
 
@@ -34,6 +35,28 @@ static v3 null_vector(const double b[6], double value) {
     return v3_scale(best, 1 / sqrt(most));
 }
 
+/* cos(acos(r) / 3) for r in [0, 1]: the root of 4 c^3 - 3 c = r in [cos(pi / 6), 1]. */
+static double largest_root(double r) {
+    double c = 0.8660254037844386 + r * (0.1705 - 0.0365254037844386 * r); /* within .003 */
+    for (int i = 0; i < 3; ++i) c -= ((4 * c * c - 3) * c - r) / (12 * c * c - 3);
+    return c;
+}
+
+/* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]. */
+static void half_angle(double x, double y, double *c, double *s) {
+    double h = sqrt(x * x + y * y);
+    if (!(h > 0)) {
+        *c = 1, *s = 0;
+    } else if (x >= 0) {
+        *c = sqrt(0.5 + 0.5 * (x / h));
+        *s = 0.5 * (y / h) / *c;
+    } else {
+        double sine = sqrt(0.5 - 0.5 * (x / h));
+        *s = y < 0 ? -sine : sine;
+        *c = 0.5 * (fabs(y) / h) / sine;
+    }
+}
+
 void fct_eigen3(const double m[6], double values[3], v3 vectors[3]) {
     double scale = 0;
     for (int i = 0; i < 6; ++i) scale = fmax(scale, fabs(m[i]));
@@ -55,12 +78,13 @@ void fct_eigen3(const double m[6], double values[3], v3 vectors[3]) {
     for (int i = 0; i < 6; ++i) b[i] /= p;
     double r = 0.5 * (b[0] * (b[3] * b[5] - b[4] * b[4]) - b[1] * (b[1] * b[5] - b[4] * b[2]) +
                       b[2] * (b[1] * b[4] - b[3] * b[2]));
-    double apart = 2 * cos(acos(fmin(fabs(r), 1)) / 3);
+    double apart = 2 * largest_root(fmin(fabs(r), 1));
     v3 w = null_vector(b, r < 0 ? -apart : apart), u, v;
     v3_frame(w, &u, &v);
 
     double uu = sym3_form(a, u, u), uv = sym3_form(a, u, v), vv = sym3_form(a, v, v);
-    double angle = uv == 0 ? 0 : 0.5 * atan2(2 * uv, uu - vv), c = cos(angle), s = sin(angle);
+    double c, s;
+    half_angle(uu - vv, 2 * uv, &c, &s);
     vectors[0] = w, vectors[1] = v3_mad(v3_scale(u, c), s, v), vectors[2] = v3_mad(v3_scale(v, c), -s, u);
     for (int i = 0; i < 3; ++i) values[i] = scale * sym3_form(a, vectors[i], vectors[i]);
     sort_ascending(values, vectors);

@@ -1,5 +1,5 @@
-/* base/simd.h: eight floats at a time. The only file with intrinsics: AVX2 where the compiler offers it, else
- * (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the target has.
+/* base/simd.h: eight floats or four doubles at a time. The only file with intrinsics: AVX2 where the compiler
+ * offers it, else (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the target has.
  *
  * Both forms round every operation on its own (no fused multiply-add) and treat NaN alike: min(a, b) is a < b
  * ? a : b, comparisons with NaN are false. So a kernel gives the same bits in both.
@@ -12,9 +12,37 @@
 #if defined(__AVX2__) && !defined(FCT_SCALAR)
 #include <immintrin.h>
 
+typedef __m256d d4;
 typedef __m256 f8;
 typedef __m256i i8;
 
+static inline d4 d4_set(double a) {
+    return _mm256_set1_pd(a);
+}
+static inline d4 d4_load_floats(const float *p) {
+    return _mm256_cvtps_pd(_mm_loadu_ps(p));
+}
+static inline void d4_store(double *p, d4 a) {
+    _mm256_storeu_pd(p, a);
+}
+static inline void d4_store_floats(float *p, d4 a) {
+    _mm_storeu_ps(p, _mm256_cvtpd_ps(a));
+}
+static inline d4 d4_add(d4 a, d4 b) {
+    return _mm256_add_pd(a, b);
+}
+static inline d4 d4_sub(d4 a, d4 b) {
+    return _mm256_sub_pd(a, b);
+}
+static inline d4 d4_mul(d4 a, d4 b) {
+    return _mm256_mul_pd(a, b);
+}
+static inline d4 d4_min(d4 a, d4 b) {
+    return _mm256_min_pd(a, b);
+}
+static inline d4 d4_max(d4 a, d4 b) {
+    return _mm256_max_pd(a, b);
+}
 static inline f8 f8_set(float a) {
     return _mm256_set1_ps(a);
 }
@@ -50,6 +78,30 @@ static inline f8 f8_copysign(f8 a, f8 s) {
     f8 sign = _mm256_set1_ps(-0.0f);
     return _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, s));
 }
+static inline f8 f8_sqrt(f8 a) {
+    return _mm256_sqrt_ps(a);
+}
+/* a_i < b_i ? x_i : y_i */
+static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
+    return _mm256_blendv_ps(y, x, _mm256_cmp_ps(a, b, _CMP_LT_OQ));
+}
+/* Rows to columns of an 8 x 8 matrix. */
+static inline void f8_transpose(f8 m[8]) {
+    f8 a[8], b[8];
+    for (int i = 0; i < 8; i += 2) {
+        a[i] = _mm256_unpacklo_ps(m[i], m[i + 1]);
+        a[i + 1] = _mm256_unpackhi_ps(m[i], m[i + 1]);
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int k = 0; k < 2; ++k) {
+            b[i + 2 * k] = _mm256_shuffle_ps(a[i + k], a[i + 2 + k], 0x44);
+            b[i + 2 * k + 1] = _mm256_shuffle_ps(a[i + k], a[i + 2 + k], 0xEE);
+        }
+    for (int i = 0; i < 4; ++i) {
+        m[i] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x20);
+        m[i + 4] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x31);
+    }
+}
 /* Bit i: a_i <= b_i. */
 static inline uint32_t f8_le(f8 a, f8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
@@ -59,6 +111,33 @@ static inline uint32_t f8_lt(f8 a, f8 b) {
 }
 static inline uint32_t f8_eq(f8 a, f8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_EQ_OQ));
+}
+static inline i8 i8_set(uint32_t a) {
+    return _mm256_set1_epi32((int)a);
+}
+static inline i8 i8_load(const uint32_t *p) {
+    return _mm256_loadu_si256((const __m256i *)(const void *)p);
+}
+static inline i8 i8_shift_right(i8 a, int bits) {
+    return _mm256_srli_epi32(a, bits);
+}
+static inline i8 i8_or(i8 a, i8 b) {
+    return _mm256_or_si256(a, b);
+}
+/* Bit i: a_i == b_i. */
+static inline uint32_t i8_eq(i8 a, i8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b)));
+}
+/* Bit i: a_i < b_i, both below 2^31. */
+static inline uint32_t i8_lt(i8 a, i8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(b, a)));
+}
+/* The least of the eight as unsigned numbers. */
+static inline uint32_t i8_least(i8 a) {
+    __m128i b = _mm_min_epu32(_mm256_castsi256_si128(a), _mm256_extracti128_si256(a, 1));
+    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0x4E));
+    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0xB1));
+    return (uint32_t)_mm_cvtsi128_si32(b);
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
@@ -76,6 +155,9 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
 
 #else
 
+typedef struct d4 {
+    double v[4];
+} d4;
 typedef struct f8 {
     float v[8];
 } f8;
@@ -83,6 +165,10 @@ typedef struct i8 {
     int32_t v[8];
 } i8;
 
+#define FCT_D4(expression)                                                                                   \
+    d4 r;                                                                                                    \
+    for (int i = 0; i < 4; ++i) r.v[i] = (expression);                                                       \
+    return r
 #define FCT_F8(expression)                                                                                   \
     f8 r;                                                                                                    \
     for (int i = 0; i < 8; ++i) r.v[i] = (expression);                                                       \
@@ -92,6 +178,33 @@ typedef struct i8 {
     for (int i = 0; i < 8; ++i) mask |= (uint32_t)(expression) << i;                                         \
     return mask
 
+static inline d4 d4_set(double a) {
+    FCT_D4(a);
+}
+static inline d4 d4_load_floats(const float *p) {
+    FCT_D4((double)p[i]);
+}
+static inline void d4_store(double *p, d4 a) {
+    for (int i = 0; i < 4; ++i) p[i] = a.v[i];
+}
+static inline void d4_store_floats(float *p, d4 a) {
+    for (int i = 0; i < 4; ++i) p[i] = (float)a.v[i];
+}
+static inline d4 d4_add(d4 a, d4 b) {
+    FCT_D4(a.v[i] + b.v[i]);
+}
+static inline d4 d4_sub(d4 a, d4 b) {
+    FCT_D4(a.v[i] - b.v[i]);
+}
+static inline d4 d4_mul(d4 a, d4 b) {
+    FCT_D4(a.v[i] * b.v[i]);
+}
+static inline d4 d4_min(d4 a, d4 b) {
+    FCT_D4(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
+}
+static inline d4 d4_max(d4 a, d4 b) {
+    FCT_D4(a.v[i] > b.v[i] ? a.v[i] : b.v[i]);
+}
 static inline f8 f8_set(float a) {
     FCT_F8(a);
 }
@@ -125,6 +238,19 @@ static inline f8 f8_abs(f8 a) {
 static inline f8 f8_copysign(f8 a, f8 s) {
     FCT_F8(__builtin_copysignf(a.v[i], s.v[i]));
 }
+static inline f8 f8_sqrt(f8 a) {
+    FCT_F8(__builtin_sqrtf(a.v[i]));
+}
+static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
+    FCT_F8(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
+}
+static inline void f8_transpose(f8 m[8]) {
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < i; ++k) {
+            float t = m[i].v[k];
+            m[i].v[k] = m[k].v[i], m[k].v[i] = t;
+        }
+}
 static inline uint32_t f8_le(f8 a, f8 b) {
     FCT_M8(a.v[i] <= b.v[i]);
 }
@@ -133,6 +259,35 @@ static inline uint32_t f8_lt(f8 a, f8 b) {
 }
 static inline uint32_t f8_eq(f8 a, f8 b) {
     FCT_M8(a.v[i] == b.v[i]);
+}
+static inline i8 i8_set(uint32_t a) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)a;
+    return r;
+}
+static inline i8 i8_load(const uint32_t *p) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)p[i];
+    return r;
+}
+static inline i8 i8_shift_right(i8 a, int bits) {
+    for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] >> bits);
+    return a;
+}
+static inline i8 i8_or(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] |= b.v[i];
+    return a;
+}
+static inline uint32_t i8_eq(i8 a, i8 b) {
+    FCT_M8(a.v[i] == b.v[i]);
+}
+static inline uint32_t i8_lt(i8 a, i8 b) {
+    FCT_M8(a.v[i] < b.v[i]);
+}
+static inline uint32_t i8_least(i8 a) {
+    uint32_t least = UINT32_MAX;
+    for (int i = 0; i < 8; ++i) least = (uint32_t)a.v[i] < least ? (uint32_t)a.v[i] : least;
+    return least;
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     i8 r;
@@ -146,6 +301,7 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
     FCT_F8(index.v[i] & 8 ? high.v[index.v[i] & 7] : low.v[index.v[i] & 7]);
 }
 
+#undef FCT_D4
 #undef FCT_F8
 #undef FCT_M8
 #endif

@@ -43,17 +43,21 @@ static void move_pairs(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (size_t i = begin; i < end; ++i) {
         uint32_t place = places[p->keys[i] >> p->shift & (DIGITS - 1)]++;
         p->keys_out[place] = p->keys[i];
-        p->values_out[place] = p->values[i];
+        if (p->values) p->values_out[place] = p->values[i];
     }
 }
 
-static void sort_small(uint64_t *keys, uint32_t *values, size_t count) {
+static void sort_small(uint64_t *keys, uint32_t *values, unsigned low, size_t count) {
     for (size_t i = 1; i < count; ++i) {
         uint64_t key = keys[i];
-        uint32_t value = values[i];
+        uint32_t value = values ? values[i] : 0;
         size_t j = i;
-        for (; j > 0 && keys[j - 1] > key; --j) keys[j] = keys[j - 1], values[j] = values[j - 1];
-        keys[j] = key, values[j] = value;
+        for (; j > 0 && keys[j - 1] >> low > key >> low; --j) {
+            keys[j] = keys[j - 1];
+            if (values) values[j] = values[j - 1];
+        }
+        keys[j] = key;
+        if (values) values[j] = value;
     }
 }
 
@@ -67,26 +71,27 @@ static void counts_to_places(pass *p, size_t chunks) {
         }
 }
 
-fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count) {
+/* By the bits from `low` on; values may be NULL. */
+static fct_result sort(const fct_env *env, uint64_t *keys, uint32_t *values, unsigned low, size_t count) {
     if (count <= SMALL) {
-        sort_small(keys, values, count);
+        sort_small(keys, values, low, count);
         return FCT_OK;
     }
     size_t chunks = fct_chunk_count(count, GRAIN);
     uint64_t *other_keys = fct_allocate(env, count, sizeof *other_keys);
-    uint32_t *other_values = fct_allocate(env, count, sizeof *other_values);
+    uint32_t *other_values = values ? fct_allocate(env, count, sizeof *other_values) : NULL;
     pass p = {.keys = keys, .values = values, .keys_out = other_keys, .values_out = other_values};
     p.places = fct_allocate(env, chunks, sizeof *p.places);
     p.differing = fct_allocate(env, chunks, sizeof *p.differing);
     fct_result result = FCT_OK;
-    if (count > UINT32_MAX || !other_keys || !other_values || !p.places || !p.differing) {
+    if (count > UINT32_MAX || !other_keys || (values && !other_values) || !p.places || !p.differing) {
         result = fct_fail_memory(env, "sorting");
         goto done;
     }
     fct_parallel_for(env, count, GRAIN, find_differing, &p);
     uint64_t differing = 0;
     for (size_t chunk = 0; chunk < chunks; ++chunk) differing |= p.differing[chunk];
-    for (p.shift = 0; p.shift < 64; p.shift += 8) {
+    for (p.shift = low; p.shift < 64; p.shift += 8) {
         if (!(differing >> p.shift & (DIGITS - 1))) continue;
         fct_parallel_for(env, count, GRAIN, count_digits, &p);
         counts_to_places(&p, chunks);
@@ -98,7 +103,7 @@ fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, 
     }
     if (p.keys != keys) {
         memcpy(keys, p.keys, count * sizeof *keys);
-        memcpy(values, p.values, count * sizeof *values);
+        if (values) memcpy(values, p.values, count * sizeof *values);
     }
 done:
     fct_release(env, other_keys);
@@ -106,4 +111,12 @@ done:
     fct_release(env, p.places);
     fct_release(env, p.differing);
     return result;
+}
+
+fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count) {
+    return sort(env, keys, values, 0, count);
+}
+
+fct_result fct_sort_items(const fct_env *env, uint64_t *items, size_t count) {
+    return sort(env, items, NULL, 32, count);
 }

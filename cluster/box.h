@@ -1,35 +1,42 @@
-/* cluster/box.h: corners of consecutive faces as streams, and the box of such a run. */
+/* cluster/box.h: oriented boxes of streams of points. */
 #ifndef FCT_CLUSTER_BOX_H
 #define FCT_CLUSTER_BOX_H
 
 #include "base/vec.h"
 #include "facetree/cluster.h"
 
-/* Corners by place (3 a face) and unit normals by place; NaN for a face without area. */
-typedef struct fct_soup {
-    float *corner[3]; /* x, y, z */
-    float *normal[3];
-} fct_soup;
+typedef struct fct_points {
+    const float *x, *y, *z;
+} fct_points;
 
-/* Corner and normal streams of one face. */
-void fct_soup_face(const fct_soup *soup, size_t place, const float *positions, const uint32_t triangle[3]);
+/* Least and greatest product of points with each of three axes. */
+typedef struct fct_extents {
+    double low[3], high[3];
+} fct_extents;
 
+static inline fct_extents fct_extents_none(void) {
+    return (fct_extents){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+}
+
+/* The axes that fct_cluster_box gives for a rotation. */
+void fct_box_axes(const float rotation[4], float axes[3][3]);
 /* The rotation whose rows are the box's axes, as a float quaternion; frame is right-handed. */
 void fct_box_rotation(const v3 frame[3], float rotation[4]);
 
-/* Sets center and half extents from the rotation, exactly and rounded outwards, so that every corner of the
- * faces [first, first + count) is inside. Where such a box would leave the range of a float, the rotation
- * becomes none. */
-void fct_box_fit(const fct_soup *soup, size_t first, size_t count, fct_cluster *cluster);
+/* Widens the extents to points [begin, end). */
+void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size_t end,
+                     const float axes[3][3]);
 
-/* Turns the frame (t, b, normal) about its normal so that the box about a sample of at most 64 corners has
- * the least area. */
-void fct_box_turn(const fct_soup *soup, size_t first, size_t count, v3 frame[3]);
+/* Centre and half extents of a cluster's box of this rotation from the extents of its points along these very
+ * axes; `point` is any of them. False where they leave the range of a float: then they end there. */
+bool fct_box_set(const fct_extents *extents, const float rotation[4], const float axes[3][3], v3 point,
+                 fct_cluster *cluster);
 
-/* Half the surface area of a cluster's box, over 4. */
-double fct_box_area(const fct_cluster *cluster);
+/* Turns the frame (u, v, normal) about its normal so that the box of at most 64 of points [begin, end) has
+ * the least area. `size` is about the points' distance from each other, above 0. */
+void fct_box_turn(fct_points points, size_t begin, size_t end, double size, v3 frame[3]);
 
-/* The angle, rounded up, within which all normals are to the area vector. */
-float fct_cone_angle(const fct_soup *soup, size_t first, size_t count, const float vector[3]);
+/* A quarter of the surface area, for comparison. */
+double fct_box_area(const fct_extents *extents);
 
 #endif

@@ -88,7 +88,7 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     work.phase_ends[1] = work.merge_count;
     const fct_edge_counts counts = {work.boundary_edges, work.nonmanifold_edges,
                                     mesh->face_count - work.merge_count};
-    const bool complete = work.stranded == 0;
+    const bool complete = work.stranded == 0 && (work.edge_count == 0 || !mesh->materials);
     if (result == FCT_OK) result = fct_work_join(&work, mesh);
     work.phase_ends[2] = work.merge_count;
     if (result == FCT_OK) {

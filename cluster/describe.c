@@ -1,49 +1,42 @@
 /* cluster/describe.c: area, moments, cone, plane and box of every cluster.
  *
  * Sums over the surface are combined from the leaves up in double, about each cluster's own centroid.
- * Subtrees of at most BLOCK faces are one task each and stay in the cache; the nodes above are summed in
- * order and then described in parallel. Extents and cones run over the cluster's faces, which are
- * consecutive: O(F log F). Frame of a box: PCA of the surface, turned in its plane to the least area of eight
- * angles; above the blocks the children's frames and the world axes compete too (half a percent less area,
- * all of it near the root).
+ * Subtrees of at most FCT_BLOCK faces are one task each, whose corners and normals stay in the cache; extents
+ * and cones run over a cluster's faces, which are consecutive there: O(F log FCT_BLOCK). What is above is
+ * upper.c's. Frame of a box: PCA of the surface, turned in its plane to the least area of eight angles.
  *
  * Degenerate answers. A face without area weighs 1e-20 of its longest side squared in centroid and frame, so
  * that clusters of such faces still have both. Cancelled normals: cone pi, the plane's sign is the
  * eigenvector's. Areas beyond a float's range end at its largest value with S and M scaled alike, below it at
  * 0 (cone pi then); boxes, planes and centroids depend on neither.
  */
+#include "cluster/describe.h"
+
 #include <float.h>
 #include <string.h>
 
 #include "base/eigen.h"
 #include "base/parallel.h"
-#include "cluster/box.h"
-#include "cluster/tree.h"
+#include "cluster/cone.h"
 
-enum { BLOCK = 512 };
-
-/* Sums of a cluster; center and covariance by `weight`. */
-typedef struct sums {
-    double area, weight, moment[6], covariance[6];
-    v3 vector, center;
-} sums;
+/* Room for one block; corners and normals by place. */
+typedef struct block_scratch {
+    uint32_t order[FCT_BLOCK];
+    float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
+    fct_sums leaves[FCT_BLOCK], nodes[FCT_BLOCK];
+} block_scratch;
 
 typedef struct describer {
     fct_tree *tree;
-    fct_soup soup;
-    uint32_t *upper, upper_count;  /* ids of nodes of more than BLOCK faces, ascending */
-    uint32_t *blocks, block_count; /* ids of the subtrees' roots, ascending */
-    sums *upper_sums, *block_sums;
-    float (*rotations)[4]; /* of the nodes above the blocks */
-    sums *scratch;         /* BLOCK for each thread */
-    uint32_t *order;       /* BLOCK for each thread */
+    fct_outline outline;
+    block_scratch *scratch; /* one a thread */
 } describer;
 
-static void face_sums(const float *positions, const uint32_t triangle[3], sums *s) {
+void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *s) {
     v3 p[3];
     for (int k = 0; k < 3; ++k) p[k] = v3_load(positions + 3 * (size_t)triangle[k]);
     v3 u = v3_sub(p[1], p[0]), v = v3_sub(p[2], p[0]);
-    *s = (sums){.vector = v3_scale(v3_cross(u, v), 0.5)};
+    *s = (fct_sums){.vector = v3_scale(v3_cross(u, v), 0.5)};
     s->area = s->weight = v3_norm(s->vector);
     s->center = v3_mad(p[0], 1.0 / 3, v3_add(u, v));
     if (s->area > 0)
@@ -53,7 +46,7 @@ static void face_sums(const float *positions, const uint32_t triangle[3], sums *
     for (int k = 0; k < 3; ++k) sym3_add_outer(s->covariance, s->weight / 12, v3_sub(p[k], s->center));
 }
 
-static void join_sums(const sums *a, const sums *b, sums *out) {
+void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out) {
     double weight = a->weight + b->weight, share = weight > 0 ? b->weight / weight : 0.5;
     v3 d = v3_sub(b->center, a->center);
     out->area = a->area + b->area;
@@ -67,240 +60,216 @@ static void join_sums(const sums *a, const sums *b, sums *out) {
     sym3_add_outer(out->covariance, a->weight * share, d);
 }
 
-static void store_areas(const sums *s, fct_cluster *out) {
-    double factor = s->area > (double)FLT_MAX ? (double)FLT_MAX / s->area : 1;
+double fct_sums_describe(const fct_sums *s, v3 frame[3], fct_cluster *out) {
+    double factor = s->area > (double)FLT_MAX ? (double)FLT_MAX / s->area : 1, values[3];
     out->area = (float)(s->area * factor);
     v3_store(out->area_vector, v3_scale(s->vector, factor));
     for (int i = 0; i < 6; ++i) out->moment[i] = (float)(s->moment[i] * factor);
-}
-
-/* Takes the frame if its box is smaller than the cluster's. Nothing but the box is written: other threads
- * read the rest. */
-static void try_rotation(const fct_soup *soup, const float rotation[4], fct_cluster *out) {
-    fct_cluster other = *out;
-    memcpy(other.box_rotation, rotation, sizeof other.box_rotation);
-    fct_box_fit(soup, out->first, out->count, &other);
-    if (!(fct_box_area(&other) < fct_box_area(out))) return;
-    memcpy(out->box_center, other.box_center, sizeof out->box_center);
-    memcpy(out->box_rotation, other.box_rotation, sizeof out->box_rotation);
-    memcpy(out->box_half, other.box_half, sizeof out->box_half);
-}
-
-/* All but cost and links; first and count are set. */
-static void describe(const fct_soup *soup, const sums *s, fct_cluster *out) {
-    store_areas(s, out);
     v3_store(out->centroid, s->center);
-    out->cone_angle = fct_cone_angle(soup, out->first, out->count, out->area_vector);
-    double values[3];
     v3 axes[3];
     fct_eigen3(s->covariance, values, axes);
     v3 normal = v3_dot(axes[0], s->vector) < 0 ? v3_scale(axes[0], -1) : axes[0];
     v3_store(out->plane, normal);
     double offset = -v3_dot(normal, s->center);
-    out->plane[3] = (float)fmax(fmin(offset, (double)FLT_MAX), -(double)FLT_MAX);
-    v3 frame[3] = {axes[2], v3_cross(normal, axes[2]), normal};
-    fct_box_turn(soup, out->first, out->count, frame);
-    fct_box_rotation(frame, out->box_rotation);
-    fct_box_fit(soup, out->first, out->count, out);
+    out->plane[3] = (float)(fabs(offset) < (double)FLT_MAX ? offset : copysign((double)FLT_MAX, offset));
+    frame[0] = axes[2], frame[1] = v3_cross(normal, axes[2]), frame[2] = normal;
+    double radius = sqrt((s->covariance[0] + s->covariance[3] + s->covariance[5]) / s->weight);
+    return radius > 0 && radius < (double)FLT_MAX ? radius : 1;
+}
+
+/* The world's axes, for a model that is wider than half the range of floats: a turned box may not have one.
+ */
+static void fit_world(fct_points corners, size_t begin, size_t end, v3 point, fct_cluster *out) {
+    static const float world[4] = {0, 0, 0, 1};
+    float axes[3][3];
+    fct_extents extents = fct_extents_none();
+    fct_box_axes(world, axes);
+    fct_extents_add(&extents, corners, begin, end, (const float(*)[3])axes);
+    fct_box_set(&extents, world, (const float(*)[3])axes, point, out);
+}
+
+/* All but cost and links, from the corners and normals of faces [first, end) of a stream. */
+static void describe(fct_points corners, fct_points normals, const fct_sums *s, size_t first, size_t end,
+                     fct_cluster *out) {
+    v3 frame[3], cone = v3_unit(s->vector);
+    double size = fct_sums_describe(s, frame, out);
+    float rotation[4], axes[3][3], axis[3];
+    v3_store(axis, cone);
+    bool cancelled = v3_norm2(v3_load(out->area_vector)) == 0;
+    out->cone_angle = fct_cone_angle(cancelled ? 4 : fct_cone_widen(0, normals, first, end, axis));
+    fct_box_turn(corners, 3 * first, 3 * end, size, frame);
+    fct_box_rotation(frame, rotation);
+    fct_box_axes(rotation, axes);
+    fct_extents extents = fct_extents_none();
+    fct_extents_add(&extents, corners, 3 * first, 3 * end, (const float(*)[3])axes);
+    v3 point = {(double)corners.x[3 * first], (double)corners.y[3 * first], (double)corners.z[3 * first]};
+    if (!fct_box_set(&extents, rotation, (const float(*)[3])axes, point, out))
+        fit_world(corners, 3 * first, 3 * end, point, out);
 }
 
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
-    float streams[12];
-    fct_soup soup = {{streams, streams + 3, streams + 6}, {streams + 9, streams + 10, streams + 11}};
     const uint32_t *triangle = view->triangles + 3 * (size_t)place;
-    sums s;
-    fct_soup_face(&soup, 0, view->positions, triangle);
-    face_sums(view->positions, triangle, &s);
-    out->first = 0, out->count = 1;
-    describe(&soup, &s, out);
-    out->first = place;
-}
-
-static void fill_soup(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    describer *d = user;
-    const fct_tree_view *view = &d->tree->view;
-    for (size_t i = begin; i < end; ++i) fct_soup_face(&d->soup, i, view->positions, view->triangles + 3 * i);
+    float x[3], y[3], z[3], normal[3];
+    for (int k = 0; k < 3; ++k) {
+        const float *p = view->positions + 3 * (size_t)triangle[k];
+        x[k] = p[0], y[k] = p[1], z[k] = p[2];
+    }
+    fct_unit_normal(view->positions, triangle, normal);
+    fct_sums s;
+    fct_sums_face(view->positions, triangle, &s);
+    describe((fct_points){x, y, z}, (fct_points){normal, normal + 1, normal + 2}, &s, 0, 1, out);
+    out->first = place, out->count = 1;
 }
 
 /* Inner nodes of the subtree in preorder, in which a node's left child follows it and the right one comes
  * after the left's count - 1 inner nodes. */
-static uint32_t list_subtree(const describer *d, uint32_t root, uint32_t *order) {
-    const fct_cluster *clusters = d->tree->clusters;
-    uint32_t nodes = d->tree->view.node_count, count = 0, top = 0, stack[BLOCK];
-    stack[top++] = root;
+static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t *order) {
+    uint32_t nodes = tree->view.node_count, count = 0, top = 0, stack[FCT_BLOCK];
+    if (root < nodes) stack[top++] = root;
     while (top > 0) {
         uint32_t node = stack[--top];
+        const uint32_t *child = tree->links.children[node];
         order[count++] = node;
-        for (int k = 1; k >= 0; --k)
-            if (clusters[node].child[k] < nodes) stack[top++] = clusters[node].child[k];
+        if (child[1] < nodes) stack[top++] = child[1];
+        if (child[0] < nodes) stack[top++] = child[0];
     }
     return count;
 }
 
-static void describe_block(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+/* Corners, normals and sums of the block's faces. */
+static void load_faces(const fct_tree_view *view, size_t first, size_t count, block_scratch *s) {
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t *triangle = view->triangles + 3 * (first + i);
+        for (size_t k = 0; k < 3; ++k) {
+            const float *p = view->positions + 3 * (size_t)triangle[k];
+            for (int j = 0; j < 3; ++j) s->corners[j][3 * i + k] = p[j];
+        }
+        fct_sums *sums = &s->leaves[i];
+        fct_sums_face(view->positions, triangle, sums);
+        double invert = sums->area > 0 ? 1 / sums->area : (double)NAN;
+        s->normals[0][i] = (float)(sums->vector.x * invert);
+        s->normals[1][i] = (float)(sums->vector.y * invert);
+        s->normals[2][i] = (float)(sums->vector.z * invert);
+    }
+}
+
+void fct_node_links_store(const fct_node_links *links, uint32_t id, fct_cluster *out) {
+    out->cost = links->costs[id];
+    out->child[0] = links->children[id][0], out->child[1] = links->children[id][1];
+    out->first = links->firsts[id], out->count = links->counts[id];
+}
+
+static void describe_block(const describer *d, size_t block, block_scratch *s) {
+    const fct_tree *tree = d->tree;
+    uint32_t nodes = tree->view.node_count, root = d->outline.blocks[block];
+    uint32_t first = root < nodes ? tree->links.firsts[root] : root - nodes;
+    uint32_t faces = root < nodes ? tree->links.counts[root] : 1;
+    uint32_t count = list_subtree(tree, root, s->order);
+    load_faces(&tree->view, first, faces, s);
+    fct_points corners = {s->corners[0], s->corners[1], s->corners[2]};
+    fct_points normals = {s->normals[0], s->normals[1], s->normals[2]};
+    for (uint32_t i = count; i-- > 0;) {
+        uint32_t id = s->order[i], at = i + 1;
+        const fct_sums *parts[2];
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = tree->links.children[id][k];
+            if (child < nodes) {
+                parts[k] = &s->nodes[at];
+                at += tree->links.counts[child] - 1;
+            } else {
+                parts[k] = &s->leaves[child - nodes - first];
+            }
+        }
+        fct_sums_join(parts[0], parts[1], &s->nodes[i]);
+        fct_cluster c;
+        fct_node_links_store(&tree->links, id, &c);
+        describe(corners, normals, &s->nodes[i], c.first - first, c.first - first + c.count, &c);
+        tree->clusters[id] = c;
+    }
+    d->outline.sums[block] = count ? s->nodes[0] : s->leaves[0];
+}
+
+static void describe_blocks(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk;
     describer *d = user;
-    const fct_tree_view *view = &d->tree->view;
-    fct_cluster *clusters = d->tree->clusters;
-    uint32_t *order = d->order + (size_t)thread * BLOCK;
-    sums *scratch = d->scratch + (size_t)thread * BLOCK;
-    for (size_t block = begin; block < end; ++block) {
-        uint32_t count = list_subtree(d, d->blocks[block], order);
-        for (uint32_t i = count; i-- > 0;) {
-            fct_cluster *c = &clusters[order[i]];
-            uint32_t at = i + 1;
-            sums leaves[2];
-            const sums *parts[2];
-            for (int k = 0; k < 2; ++k) {
-                uint32_t child = c->child[k];
-                parts[k] = &scratch[at];
-                if (child < view->node_count) {
-                    at += clusters[child].count - 1;
-                } else {
-                    size_t place = child - view->node_count;
-                    face_sums(view->positions, view->triangles + 3 * place, &leaves[k]);
-                    parts[k] = &leaves[k];
-                }
+    for (size_t block = begin; block < end; ++block) describe_block(d, block, &d->scratch[thread]);
+}
+
+/* Notes where a part of its parent went. */
+typedef struct visit {
+    uint32_t node, parent, side;
+} visit;
+
+static void close_upper(fct_outline *o, uint32_t parent, uint32_t side, uint32_t part) {
+    if (parent == FCT_NONE) return;
+    if (o->upper) o->upper[parent].parts[side] = part;
+}
+
+/* Walks the tree from the root to its blocks; counts them where the lists are NULL. Heights are bounded, and
+ * so is the stack. */
+static void walk(const fct_tree *tree, fct_outline *o) {
+    const fct_tree_view *view = &tree->view;
+    visit stack[256];
+    o->upper_count = o->block_count = 0;
+    for (uint32_t r = 0; r < view->root_count; ++r) {
+        uint32_t top = 0;
+        stack[top++] = (visit){tree->roots[r], FCT_NONE, 0};
+        while (top > 0) {
+            visit v = stack[--top];
+            if (v.node >= view->node_count || tree->links.counts[v.node] <= FCT_BLOCK) {
+                close_upper(o, v.parent, v.side, FCT_IS_BLOCK | o->block_count);
+                if (o->blocks) o->blocks[o->block_count] = v.node;
+                ++o->block_count;
+                continue;
             }
-            join_sums(parts[0], parts[1], &scratch[i]);
-            describe(&d->soup, &scratch[i], c);
-        }
-        d->block_sums[block] = scratch[0];
-    }
-}
-
-static uint32_t index_of(const uint32_t *ids, uint32_t count, uint32_t id) {
-    uint32_t low = 0;
-    while (low < count) {
-        uint32_t middle = low + (count - low) / 2;
-        if (ids[middle] == id) return middle;
-        if (ids[middle] < id)
-            low = middle + 1;
-        else
-            count = middle;
-    }
-    return FCT_NONE;
-}
-
-static void sum_upper(describer *d) {
-    const fct_tree_view *view = &d->tree->view;
-    for (uint32_t i = d->upper_count; i-- > 0;) {
-        const fct_cluster *c = &d->tree->clusters[d->upper[i]];
-        sums leaves[2];
-        const sums *parts[2] = {&leaves[0], &leaves[1]};
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = c->child[k];
-            if (child >= view->node_count)
-                face_sums(view->positions, view->triangles + 3 * (size_t)(child - view->node_count),
-                          &leaves[k]);
-            else if (d->tree->clusters[child].count > BLOCK)
-                parts[k] = &d->upper_sums[index_of(d->upper, d->upper_count, child)];
-            else
-                parts[k] = &d->block_sums[index_of(d->blocks, d->block_count, child)];
-        }
-        join_sums(parts[0], parts[1], &d->upper_sums[i]);
-    }
-}
-
-static void describe_upper(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    describer *d = user;
-    static const float world[4] = {0, 0, 0, 1};
-    for (size_t i = begin; i < end; ++i) {
-        fct_cluster *c = &d->tree->clusters[d->upper[i]];
-        describe(&d->soup, &d->upper_sums[i], c);
-        try_rotation(&d->soup, world, c);
-        memcpy(d->rotations[i], c->box_rotation, sizeof d->rotations[i]);
-    }
-}
-
-/* The frames that the children had before any was handed up, so that the order of nodes does not matter. */
-static void try_children(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    describer *d = user;
-    const fct_cluster *clusters = d->tree->clusters;
-    for (size_t i = begin; i < end; ++i) {
-        fct_cluster *c = &d->tree->clusters[d->upper[i]];
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = c->child[k];
-            if (child >= d->tree->view.node_count) continue;
-            bool upper = clusters[child].count > BLOCK;
-            try_rotation(&d->soup,
-                         upper ? d->rotations[index_of(d->upper, d->upper_count, child)]
-                               : clusters[child].box_rotation,
-                         c);
+            close_upper(o, v.parent, v.side, o->upper_count);
+            if (o->upper) {
+                o->upper[o->upper_count].id = v.node;
+                o->upper[o->upper_count].first_block = o->block_count;
+            }
+            stack[top++] = (visit){tree->links.children[v.node][1], o->upper_count, 1};
+            stack[top++] = (visit){tree->links.children[v.node][0], o->upper_count, 0};
+            ++o->upper_count;
         }
     }
 }
 
-/* Finds blocks and the nodes above them; the lists have room, or are NULL to count. */
-static void list_nodes(describer *d, uint8_t *inside) {
-    const fct_tree_view *view = &d->tree->view;
-    memset(inside, 0, view->node_count);
-    d->upper_count = d->block_count = 0;
-    for (uint32_t i = 0; i < view->node_count; ++i) {
-        const fct_cluster *c = &view->clusters[i];
-        if (c->count > BLOCK) {
-            if (d->upper) d->upper[d->upper_count] = i;
-            ++d->upper_count;
-            continue;
-        }
-        if (!inside[i]) {
-            if (d->blocks) d->blocks[d->block_count] = i;
-            ++d->block_count;
-        }
+static void count_blocks(fct_outline *o) {
+    for (uint32_t i = o->upper_count; i-- > 0;) {
+        fct_upper *u = &o->upper[i];
+        u->block_count = 0;
         for (int k = 0; k < 2; ++k)
-            if (c->child[k] < view->node_count) inside[c->child[k]] = 1;
+            u->block_count += u->parts[k] & FCT_IS_BLOCK ? 1 : o->upper[u->parts[k]].block_count;
     }
 }
 
 static fct_result prepare(const fct_env *env, describer *d) {
-    const fct_tree_view *view = &d->tree->view;
-    uint8_t *inside = fct_allocate(env, view->node_count, 1);
-    for (int k = 0; k < 3; ++k) {
-        d->soup.corner[k] = fct_allocate(env, view->face_count, 3 * sizeof(float));
-        d->soup.normal[k] = fct_allocate(env, view->face_count, sizeof(float));
-    }
-    if (inside) list_nodes(d, inside);
-    d->upper = fct_allocate(env, d->upper_count, sizeof *d->upper);
-    d->blocks = fct_allocate(env, d->block_count, sizeof *d->blocks);
-    d->upper_sums = fct_allocate(env, d->upper_count, sizeof *d->upper_sums);
-    d->block_sums = fct_allocate(env, d->block_count, sizeof *d->block_sums);
-    d->rotations = fct_allocate(env, d->upper_count, sizeof *d->rotations);
-    d->scratch = fct_allocate(env, (size_t)fct_env_threads(env) * BLOCK, sizeof *d->scratch);
-    d->order = fct_allocate(env, (size_t)fct_env_threads(env) * BLOCK, sizeof *d->order);
-    bool complete = inside && d->upper && d->blocks && d->upper_sums && d->block_sums && d->rotations &&
-                    d->scratch && d->order;
-    for (int k = 0; k < 3; ++k) complete = complete && d->soup.corner[k] && d->soup.normal[k];
-    if (complete) list_nodes(d, inside);
-    fct_release(env, inside);
-    return complete ? FCT_OK : fct_fail_memory(env, "boxes");
+    fct_outline *o = &d->outline;
+    walk(d->tree, o);
+    o->upper = fct_allocate(env, o->upper_count, sizeof *o->upper);
+    o->blocks = fct_allocate(env, o->block_count, sizeof *o->blocks);
+    o->sums = fct_allocate(env, o->block_count, sizeof *o->sums);
+    d->scratch = fct_allocate(env, fct_env_threads(env), sizeof *d->scratch);
+    d->tree->clusters = fct_allocate(env, d->tree->view.node_count, sizeof *d->tree->clusters);
+    d->tree->view.clusters = d->tree->clusters;
+    if (!o->upper || !o->blocks || !o->sums || !d->scratch || !d->tree->clusters)
+        return fct_fail_memory(env, "boxes");
+    walk(d->tree, o);
+    count_blocks(o);
+    return FCT_OK;
 }
 
 fct_result fct_tree_describe(fct_tree *tree) {
     const fct_env *env = tree->env;
     describer d = {.tree = tree};
     fct_result result = prepare(env, &d);
-    if (result == FCT_OK) {
-        fct_parallel_for(env, tree->view.face_count, 1 << 14, fill_soup, &d);
-        result = fct_parallel_for_progress(env, "boxes", d.block_count, 4, describe_block, &d);
-    }
-    if (result == FCT_OK) {
-        sum_upper(&d);
-        fct_parallel_for(env, d.upper_count, 1, describe_upper, &d);
-        fct_parallel_for(env, d.upper_count, 1, try_children, &d);
-    }
-    for (int k = 0; k < 3; ++k) {
-        fct_release(env, d.soup.corner[k]);
-        fct_release(env, d.soup.normal[k]);
-    }
-    fct_release(env, d.upper);
-    fct_release(env, d.blocks);
-    fct_release(env, d.upper_sums);
-    fct_release(env, d.block_sums);
-    fct_release(env, d.rotations);
+    if (result == FCT_OK)
+        result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 4, describe_blocks, &d);
+    if (result == FCT_OK) result = fct_tree_describe_upper(tree, &d.outline);
+    fct_node_links_release(env, &tree->links);
+    fct_release(env, d.outline.upper);
+    fct_release(env, d.outline.blocks);
+    fct_release(env, d.outline.sums);
     fct_release(env, d.scratch);
-    fct_release(env, d.order);
     return result;
 }

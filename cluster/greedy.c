@@ -22,6 +22,7 @@ typedef struct greedy {
     uint32_t *seen;      /* per slot: the edge of the list being walked that leads there, if it does */
     fct_heap heap;
     bool across;
+    uint32_t waiting, batch[FCT_LANES]; /* edges to be priced together */
 } greedy;
 
 static uint64_t edge_key(const greedy *g, uint32_t e) {
@@ -38,22 +39,33 @@ static bool waits(const greedy *g, const fct_edge *edge) {
     return !fct_work_allowed(g->work, edge->a, edge->b);
 }
 
+static void price_batch(greedy *g) {
+    fct_pair pairs[FCT_LANES];
+    float costs[FCT_LANES];
+    for (uint32_t i = 0; i < g->waiting; ++i) pairs[i] = g->edges[g->batch[i]];
+    if (g->waiting) fct_work_costs(g->work, pairs, g->waiting, costs);
+    for (uint32_t i = 0; i < g->waiting; ++i) {
+        g->costs[g->batch[i]] = costs[i];
+        fct_heap_set(&g->heap, g->batch[i], edge_key(g, g->batch[i]));
+    }
+    g->waiting = 0;
+}
+
 static void price(greedy *g, uint32_t e) {
-    const fct_edge *edge = &g->edges[e];
-    if (waits(g, edge)) {
+    if (waits(g, &g->edges[e])) {
         fct_heap_remove(&g->heap, e);
         return;
     }
-    g->costs[e] = fct_work_cost(g->work, edge->a, edge->b, edge->shared);
-    fct_heap_set(&g->heap, e, edge_key(g, e));
+    g->batch[g->waiting++] = e;
+    if (g->waiting == FCT_LANES) price_batch(g);
 }
 
 static void price_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     greedy *g = user;
-    for (size_t e = begin; e < end; ++e) {
-        const fct_edge *edge = &g->edges[e];
-        g->costs[e] = waits(g, edge) ? INFINITY : fct_work_cost(g->work, edge->a, edge->b, edge->shared);
+    for (size_t e = begin; e < end; e += FCT_LANES) {
+        uint32_t count = end - e < FCT_LANES ? (uint32_t)(end - e) : FCT_LANES;
+        fct_work_costs(g->work, g->edges + e, count, g->costs + e);
     }
 }
 
@@ -110,6 +122,7 @@ static void contract(greedy *g, uint32_t e) {
         g->seen[link & 1 ? edge->a : edge->b] = FCT_NONE;
         price(g, link / 2);
     }
+    price_batch(g);
 }
 
 static fct_result run(greedy *g) {
@@ -141,14 +154,15 @@ static fct_result run(greedy *g) {
 
 fct_result fct_work_greedy(fct_work *work, bool across) {
     const fct_env *env = work->env;
-    if (work->edge_count == 0) return FCT_OK;
+    fct_result result = fct_work_list_edges(work);
+    if (result != FCT_OK || work->edge_count == 0) return result;
     if (work->edge_count >= UINT32_MAX / 2) return fct_fail_memory(env, "so many dual edges");
     greedy g = {.work = work, .edges = work->edges, .across = across};
     g.costs = fct_allocate(env, work->edge_count, sizeof *g.costs);
     g.next = fct_allocate(env, work->edge_count, sizeof *g.next);
     g.heads = fct_allocate(env, work->face_count, sizeof *g.heads);
     g.seen = fct_allocate(env, work->face_count, sizeof *g.seen);
-    fct_result result = fct_heap_create(env, work->edge_count, &g.heap);
+    result = fct_heap_create(env, work->edge_count, &g.heap);
     if (result == FCT_OK) {
         if (!g.costs || !g.next || !g.heads || !g.seen) {
             result = fct_fail_memory(env, "clustering");

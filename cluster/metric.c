@@ -1,4 +1,5 @@
-/* cluster/metric.c: fit, direction and shape error of a union, from the records of its parts.
+/* cluster/metric.c: fit, direction and shape error of a union, from the records of its parts, eight unions
+ * at a time.
  *
  * INCREMENT, C = a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 w E_shape: the growth of the total
  * error. MEAN, E = a1 E_fit + a2 E_dir + a3 E_shape (8.18). E_shape is (8.17), with its factor 2.
@@ -10,25 +11,13 @@
  */
 #include "cluster/metric.h"
 
-#include <float.h>
+#include <string.h>
 
 #include "base/eigen.h"
+#include "base/simd.h"
 
 #define PI_F 3.14159265f
 #define TINY 1e-30f
-
-/* fmaxf and fminf are calls here, for they must look out for NaN. */
-static inline float greater(float a, float b) {
-    return a > b ? a : b;
-}
-static inline float lesser(float a, float b) {
-    return a < b ? a : b;
-}
-
-/* Sums of a union about its own centroid. */
-typedef struct joint {
-    float covariance[6], centroid[3], weight, vector[3], area, perimeter;
-} joint;
 
 fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
     bool mean = def->cost == FCT_COST_MEAN;
@@ -65,131 +54,201 @@ void fct_metric_face(const fct_metric *metric, const float *positions, const uin
     if (area > 0) sym3_add_outer(direction->moment, 1 / area, vector);
 }
 
-static inline float irregularity(float perimeter, float area) {
-    float g = perimeter * perimeter / (4 * PI_F * greater(area, TINY));
-    return lesser(g, 1e30f);
+/* Records turned on their side: one field of eight clusters in each vector. */
+typedef struct lanes {
+    f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+} lanes;
+
+_Static_assert(sizeof(fct_record) == 16 * sizeof(float) && sizeof(lanes) == 16 * sizeof(f8),
+               "field for field");
+
+static inline f8 f8_mad(f8 a, f8 b, f8 c) {
+    return f8_add(a, f8_mul(b, c));
+}
+static inline f8 f8_twice(f8 a) {
+    return f8_add(a, a);
+}
+static inline f8 at_least(f8 a, float least) {
+    return f8_max(a, f8_set(least));
+}
+static inline f8 dot3(const f8 a[3], const f8 b[3]) {
+    return f8_mad(f8_mad(f8_mul(a[0], b[0]), a[1], b[1]), a[2], b[2]);
+}
+
+static inline void load_lanes(const fct_record *records, const fct_pair *pairs, uint32_t count, bool second,
+                              lanes *out) {
+    f8 rows[16];
+    for (uint32_t i = 0; i < FCT_LANES; ++i) {
+        const fct_pair *pair = &pairs[i < count ? i : 0];
+        const float *record = records[second ? pair->b : pair->a].covariance;
+        rows[i] = f8_load(record);
+        rows[i + 8] = f8_load(record + 8);
+    }
+    f8_transpose(rows);
+    f8_transpose(rows + 8);
+    memcpy(out, rows, sizeof *out);
+}
+
+static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
+    float shared[FCT_LANES];
+    for (uint32_t i = 0; i < FCT_LANES; ++i) shared[i] = pairs[i < count ? i : 0].shared;
+    return f8_load(shared);
+}
+
+static inline f8 irregularity(f8 perimeter, f8 area) {
+    f8 g = f8_div(f8_mul(perimeter, perimeter), f8_mul(f8_set(4 * PI_F), at_least(area, TINY)));
+    return f8_min(g, f8_set(1e30f));
 }
 
 /* (8.17) */
-static inline float shape_error(float worst, float joined) {
-    float error = 1 - worst / (2 * greater(joined, TINY));
-    return worst > 0 ? greater(error, -1000) : 0.5f;
+static inline f8 shape_error(const lanes *a, const lanes *b, const lanes *u) {
+    f8 worst = f8_max(irregularity(a->perimeter, a->area), irregularity(b->perimeter, b->area));
+    f8 joined = irregularity(u->perimeter, u->area);
+    f8 error = f8_sub(f8_set(1), f8_div(worst, f8_twice(at_least(joined, TINY))));
+    return f8_if_lt(f8_set(0), worst, at_least(error, -1000), f8_set(0.5f));
 }
 
-static inline void join(const fct_record *a, const fct_record *b, float shared, joint *u) {
-    float weight = a->weight + b->weight, share = weight > 0 ? b->weight / weight : 0.5f;
-    float k = a->weight * share, d[3];
+/* Sums of the union about its own centroid; all but its fit. */
+static inline void join(const lanes *a, const lanes *b, f8 shared, lanes *u) {
+    f8 d[3], weight = f8_add(a->weight, b->weight), none = f8_set(0);
+    f8 share = f8_if_lt(none, weight, f8_div(b->weight, weight), f8_set(0.5f));
+    f8 k = f8_mul(a->weight, share);
     for (int i = 0; i < 3; ++i) {
-        d[i] = b->centroid[i] - a->centroid[i];
-        u->centroid[i] = a->centroid[i] + share * d[i];
-        u->vector[i] = a->vector[i] + b->vector[i];
+        d[i] = f8_sub(b->centroid[i], a->centroid[i]);
+        u->centroid[i] = f8_mad(a->centroid[i], share, d[i]);
+        u->vector[i] = f8_add(a->vector[i], b->vector[i]);
     }
-    u->covariance[0] = a->covariance[0] + b->covariance[0] + k * d[0] * d[0];
-    u->covariance[1] = a->covariance[1] + b->covariance[1] + k * d[0] * d[1];
-    u->covariance[2] = a->covariance[2] + b->covariance[2] + k * d[0] * d[2];
-    u->covariance[3] = a->covariance[3] + b->covariance[3] + k * d[1] * d[1];
-    u->covariance[4] = a->covariance[4] + b->covariance[4] + k * d[1] * d[2];
-    u->covariance[5] = a->covariance[5] + b->covariance[5] + k * d[2] * d[2];
+    static const int rows[6] = {0, 0, 0, 1, 1, 2}, columns[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i)
+        u->covariance[i] =
+            f8_mad(f8_add(a->covariance[i], b->covariance[i]), f8_mul(k, d[rows[i]]), d[columns[i]]);
     u->weight = weight;
-    u->area = a->area + b->area;
-    u->perimeter = greater(a->perimeter + b->perimeter - 2 * shared, 0);
+    u->area = f8_add(a->area, b->area);
+    u->perimeter = f8_max(f8_sub(f8_add(a->perimeter, b->perimeter), f8_twice(shared)), none);
 }
 
-static inline float form(const float c[6], const float n[3]) {
-    return n[0] * (c[0] * n[0] + 2 * (c[1] * n[1] + c[2] * n[2])) + n[1] * (c[3] * n[1] + 2 * c[4] * n[2]) +
-           c[5] * n[2] * n[2];
+/* n^T C n */
+static inline f8 form(const f8 c[6], const f8 n[3]) {
+    f8 x = f8_mad(f8_mul(c[0], n[0]), f8_set(2), f8_mad(f8_mul(c[1], n[1]), c[2], n[2]));
+    f8 y = f8_mad(f8_mul(c[3], n[1]), f8_twice(c[4]), n[2]);
+    return f8_mad(f8_mad(f8_mul(n[0], x), n[1], y), f8_mul(c[5], n[2]), n[2]);
 }
 
 /* Least spread of the covariance, as a total over the measure: one step of inverse iteration from the mean
  * normal, which is as good as an eigen solve here and a tenth of its time. */
-static inline float least_spread(const joint *u) {
-    float trace = u->covariance[0] + u->covariance[3] + u->covariance[5];
-    float invert = 1 / greater(trace, TINY), c[6];
-    for (int i = 0; i < 6; ++i) c[i] = u->covariance[i] * invert;
-    float adjugate[6] = {c[3] * c[5] - c[4] * c[4], c[2] * c[4] - c[1] * c[5], c[1] * c[4] - c[2] * c[3],
-                         c[0] * c[5] - c[2] * c[2], c[1] * c[2] - c[0] * c[4], c[0] * c[3] - c[1] * c[1]};
-    float largest = greater(greater(fabsf(u->vector[0]), fabsf(u->vector[1])), fabsf(u->vector[2]));
-    bool cancelled = largest <= 1e-4f * u->area;
-    bool x = adjugate[0] >= adjugate[3] && adjugate[0] >= adjugate[5], y = !x && adjugate[3] >= adjugate[5];
-    float normalize = 1 / greater(largest, TINY);
-    float s[3] = {cancelled ? (x ? 1.f : 0.f) : u->vector[0] * normalize,
-                  cancelled ? (y ? 1.f : 0.f) : u->vector[1] * normalize,
-                  cancelled ? (x || y ? 0.f : 1.f) : u->vector[2] * normalize};
-    float n[3] = {adjugate[0] * s[0] + adjugate[1] * s[1] + adjugate[2] * s[2],
-                  adjugate[1] * s[0] + adjugate[3] * s[1] + adjugate[4] * s[2],
-                  adjugate[2] * s[0] + adjugate[4] * s[1] + adjugate[5] * s[2]};
-    float nn = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], ss = s[0] * s[0] + s[1] * s[1] + s[2] * s[2];
-    float start = form(c, s) / greater(ss, TINY), stepped = nn > TINY ? form(c, n) / nn : start;
-    return trace * greater(lesser(start, stepped), 0);
+static inline f8 least_spread(const lanes *u) {
+    f8 trace = f8_add(f8_add(u->covariance[0], u->covariance[3]), u->covariance[5]);
+    f8 invert = f8_div(f8_set(1), at_least(trace, TINY)), c[6];
+    for (int i = 0; i < 6; ++i) c[i] = f8_mul(u->covariance[i], invert);
+    f8 adjugate[6] = {
+        f8_sub(f8_mul(c[3], c[5]), f8_mul(c[4], c[4])), f8_sub(f8_mul(c[2], c[4]), f8_mul(c[1], c[5])),
+        f8_sub(f8_mul(c[1], c[4]), f8_mul(c[2], c[3])), f8_sub(f8_mul(c[0], c[5]), f8_mul(c[2], c[2])),
+        f8_sub(f8_mul(c[1], c[2]), f8_mul(c[0], c[4])), f8_sub(f8_mul(c[0], c[3]), f8_mul(c[1], c[1]))};
+    f8 one = f8_set(1), none = f8_set(0);
+    f8 largest = f8_max(f8_max(f8_abs(u->vector[0]), f8_abs(u->vector[1])), f8_abs(u->vector[2]));
+    f8 normalize = f8_div(one, at_least(largest, TINY));
+    /* where S cancels: the column of the adjugate with the largest diagonal entry */
+    f8 yz = f8_max(adjugate[3], adjugate[5]), x = f8_if_lt(adjugate[0], yz, none, one);
+    f8 y = f8_mul(f8_sub(one, x), f8_if_lt(adjugate[3], adjugate[5], none, one));
+    f8 start[3] = {x, y, f8_sub(f8_sub(one, x), y)}, s[3], n[3], limit = f8_mul(f8_set(1e-4f), u->area);
+    for (int i = 0; i < 3; ++i) s[i] = f8_if_lt(limit, largest, f8_mul(u->vector[i], normalize), start[i]);
+    static const int matrix[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    for (int i = 0; i < 3; ++i)
+        n[i] = f8_mad(f8_mad(f8_mul(adjugate[matrix[i][0]], s[0]), adjugate[matrix[i][1]], s[1]),
+                      adjugate[matrix[i][2]], s[2]);
+    f8 nn = dot3(n, n), ss = dot3(s, s), before = f8_div(form(c, s), at_least(ss, TINY));
+    f8 after = f8_if_lt(f8_set(TINY), nn, f8_div(form(c, n), at_least(nn, TINY)), before);
+    return f8_mul(trace, at_least(f8_min(before, after), 0));
 }
 
-static inline float total_fit(const fct_metric *metric, const joint *u) {
-    float spread = least_spread(u);
-    return metric->measure == FCT_FIT_AREA ? spread : spread * u->area / u->weight;
-}
-
-static inline float length3(const float v[3]) {
-    return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+static inline f8 total_fit(const fct_metric *metric, const lanes *u) {
+    f8 spread = least_spread(u);
+    return metric->measure == FCT_FIT_AREA ? spread : f8_div(f8_mul(spread, u->area), u->weight);
 }
 
 /* 2 (|a| + |b| - |a + b|). Near-parallel vectors go by their cross product, for the difference has no digits
  * left on fine meshes. */
-static inline float direction_growth(const float a[3], const float b[3]) {
-    float scale = greater(length3(a), length3(b)), invert = 1 / greater(scale, TINY);
-    float p[3] = {a[0] * invert, a[1] * invert, a[2] * invert};
-    float q[3] = {b[0] * invert, b[1] * invert, b[2] * invert};
-    float s[3] = {p[0] + q[0], p[1] + q[1], p[2] + q[2]};
-    float cross[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-    float lp = length3(p), lq = length3(q), ls = length3(s), dot = p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-    float cc = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
-    float near = cc / greater(lp * lq + dot, TINY), far = lp * lq - dot;
-    return scale * 4 * (dot > 0 ? near : far) / greater(lp + lq + ls, TINY);
+static inline f8 direction_growth(const f8 a[3], const f8 b[3]) {
+    f8 scale = f8_max(f8_sqrt(dot3(a, a)), f8_sqrt(dot3(b, b))),
+       invert = f8_div(f8_set(1), at_least(scale, TINY));
+    f8 p[3], q[3], s[3];
+    for (int i = 0; i < 3; ++i) {
+        p[i] = f8_mul(a[i], invert), q[i] = f8_mul(b[i], invert);
+        s[i] = f8_add(p[i], q[i]);
+    }
+    f8 cross[3] = {f8_sub(f8_mul(p[1], q[2]), f8_mul(p[2], q[1])),
+                   f8_sub(f8_mul(p[2], q[0]), f8_mul(p[0], q[2])),
+                   f8_sub(f8_mul(p[0], q[1]), f8_mul(p[1], q[0]))};
+    f8 lp = f8_sqrt(dot3(p, p)), lq = f8_sqrt(dot3(q, q)), ls = f8_sqrt(dot3(s, s)), dot = dot3(p, q);
+    f8 product = f8_mul(lp, lq), near = f8_div(dot3(cross, cross), at_least(f8_add(product, dot), TINY));
+    f8 growth = f8_if_lt(f8_set(0), dot, near, f8_sub(product, dot));
+    return f8_div(f8_mul(f8_mul(scale, f8_set(4)), growth), at_least(f8_add(f8_add(lp, lq), ls), TINY));
 }
 
-static inline float union_shape(const fct_record *a, const fct_record *b, const joint *u) {
-    float worst = greater(irregularity(a->perimeter, a->area), irregularity(b->perimeter, b->area));
-    return shape_error(worst, irregularity(u->perimeter, u->area));
+/* (8.18) with an eigen solve, in double. */
+static void mean_costs(const fct_metric *metric, const lanes *u, f8 shape, const fct_direction *directions,
+                       const fct_pair *pairs, uint32_t count, float *costs) {
+    float fields[10][FCT_LANES];
+    for (int i = 0; i < 6; ++i) f8_store(fields[i], u->covariance[i]);
+    f8_store(fields[6], u->weight);
+    f8_store(fields[7], shape);
+    for (uint32_t lane = 0; lane < count; ++lane) {
+        const fct_direction *da = &directions[pairs[lane].a], *db = &directions[pairs[lane].b];
+        double covariance[6], moment[6], values[3], weight = (double)fields[6][lane];
+        v3 axes[3];
+        for (int i = 0; i < 6; ++i)
+            covariance[i] = (double)fields[i][lane], moment[i] = da->moment[i] + db->moment[i];
+        fct_eigen3(covariance, values, axes);
+        v3 s = {da->vector[0] + db->vector[0], da->vector[1] + db->vector[1], da->vector[2] + db->vector[2]};
+        v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
+        double area = da->area + db->area, fit = weight > 0 ? fmax(values[0], 0) / weight : 0;
+        double direction = area > 0 ? fmax((sym3_form(moment, n, n) - 2 * v3_dot(n, s)) / area + 1, 0) : 0;
+        costs[lane] =
+            (float)((double)metric->fit_weight * fit + (double)metric->direction_weight * direction +
+                    (double)(metric->shape_weight * fields[7][lane]));
+    }
 }
 
-static float mean_cost(const fct_metric *metric, const joint *u, float shape, const fct_direction *da,
-                       const fct_direction *db) {
-    double covariance[6], moment[6], values[3];
-    v3 axes[3];
-    for (int i = 0; i < 6; ++i)
-        covariance[i] = (double)u->covariance[i], moment[i] = da->moment[i] + db->moment[i];
-    fct_eigen3(covariance, values, axes);
-    v3 s = {da->vector[0] + db->vector[0], da->vector[1] + db->vector[1], da->vector[2] + db->vector[2]};
-    v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
-    double area = da->area + db->area;
-    double fit = u->weight > 0 ? fmax(values[0], 0) / (double)u->weight : 0;
-    double direction = area > 0 ? fmax((sym3_form(moment, n, n) - 2 * v3_dot(n, s)) / area + 1, 0) : 0;
-    return (float)((double)metric->fit_weight * fit + (double)metric->direction_weight * direction +
-                   (double)(metric->shape_weight * shape));
+void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
+                      const fct_pair *pairs, uint32_t count, float *costs) {
+    lanes a, b, u;
+    load_lanes(records, pairs, count, false, &a);
+    load_lanes(records, pairs, count, true, &b);
+    join(&a, &b, load_shared(pairs, count), &u);
+    f8 shape = shape_error(&a, &b, &u);
+    if (metric->cost == FCT_COST_MEAN) {
+        mean_costs(metric, &u, shape, directions, pairs, count, costs);
+        return;
+    }
+    f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u), a.fit), b.fit), 0);
+    f8 cost = f8_mul(f8_set(metric->fit_weight), fit);
+    cost = f8_mad(cost, f8_set(metric->direction_weight), direction_growth(a.vector, b.vector));
+    cost = f8_mad(cost, f8_mul(f8_set(metric->shape_weight), u.area), shape);
+    float all[FCT_LANES];
+    f8_store(all, cost);
+    memcpy(costs, all, count * sizeof *costs);
 }
 
-float fct_metric_cost(const fct_metric *metric, const fct_record *a, const fct_record *b, float shared,
-                      const fct_direction *da, const fct_direction *db) {
-    joint u;
-    join(a, b, shared, &u);
-    float shape = union_shape(a, b, &u);
-    if (metric->cost == FCT_COST_MEAN) return mean_cost(metric, &u, shape, da, db);
-    float fit = greater(total_fit(metric, &u) - a->fit - b->fit, 0);
-    return metric->fit_weight * fit + metric->direction_weight * direction_growth(a->vector, b->vector) +
-           metric->shape_weight * u.area * shape;
-}
-
-void fct_metric_merge(const fct_metric *metric, fct_record *a, const fct_record *b, float shared,
-                      fct_direction *da, const fct_direction *db) {
-    joint u;
-    join(a, b, shared, &u);
-    for (int i = 0; i < 6; ++i) a->covariance[i] = u.covariance[i];
-    for (int i = 0; i < 3; ++i) a->centroid[i] = u.centroid[i], a->vector[i] = u.vector[i];
-    a->weight = u.weight;
-    a->area = u.area;
-    a->perimeter = u.perimeter;
-    a->fit = total_fit(metric, &u);
-    if (!da) return;
-    for (int i = 0; i < 6; ++i) da->moment[i] += db->moment[i];
-    for (int i = 0; i < 3; ++i) da->vector[i] += db->vector[i];
-    da->area += db->area;
+void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direction *directions,
+                       const fct_pair *pairs, uint32_t count) {
+    lanes a, b, u;
+    load_lanes(records, pairs, count, false, &a);
+    load_lanes(records, pairs, count, true, &b);
+    join(&a, &b, load_shared(pairs, count), &u);
+    u.fit = total_fit(metric, &u);
+    f8 rows[16];
+    memcpy(rows, &u, sizeof rows);
+    f8_transpose(rows);
+    f8_transpose(rows + 8);
+    for (uint32_t i = 0; i < count; ++i) {
+        float *record = records[pairs[i].a].covariance;
+        f8_store(record, rows[i]);
+        f8_store(record + 8, rows[i + 8]);
+        if (!directions) continue;
+        fct_direction *da = &directions[pairs[i].a];
+        const fct_direction *db = &directions[pairs[i].b];
+        for (int k = 0; k < 6; ++k) da->moment[k] += db->moment[k];
+        for (int k = 0; k < 3; ++k) da->vector[k] += db->vector[k];
+        da->area += db->area;
+    }
 }

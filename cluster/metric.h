@@ -41,13 +41,21 @@ fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds);
 void fct_metric_face(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
                      float perimeter, fct_record *record, fct_direction *direction);
 
-/* Cost of merging a and b that share a border of length `shared` (unit model). da, db only for MEAN. A NaN is
- * never returned. */
-float fct_metric_cost(const fct_metric *metric, const fct_record *a, const fct_record *b, float shared,
-                      const fct_direction *da, const fct_direction *db);
+/* Two clusters, by their records' numbers, and the border they share (unit model). */
+typedef struct fct_pair {
+    uint32_t a, b;
+    float shared;
+} fct_pair;
 
-/* a becomes the union of a and b. */
-void fct_metric_merge(const fct_metric *metric, fct_record *a, const fct_record *b, float shared,
-                      fct_direction *da, const fct_direction *db);
+enum { FCT_LANES = 8 }; /* pairs worked on at once */
+
+/* Costs of merging count <= FCT_LANES pairs. The same for (a, b) as for (b, a) but for rounding. directions
+ * only for MEAN. A NaN is never returned. */
+void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
+                      const fct_pair *pairs, uint32_t count, float *costs);
+
+/* In each of count <= FCT_LANES pairs of different clusters, a becomes the union. */
+void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direction *directions,
+                       const fct_pair *pairs, uint32_t count);
 
 #endif

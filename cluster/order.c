@@ -3,12 +3,17 @@
  * Each merge's cost becomes the running maximum over its subtree, and no less than that of any merge of an
  * earlier phase; a stable radix sort by it then keeps children before parents. Inner node M - 1 - i is the
  * merge of rank i. Ranges are handed down from the roots, which places the faces; vertices are numbered in
- * order of first use by the faces, so that a cluster's new vertices are one run.
+ * order of first use by the faces, so that a cluster's new vertices are one run. Links and costs stay in
+ * arrays of their own: nodes are written once, when they are described.
  */
+#include <stdatomic.h>
 #include <string.h>
 
+#include "base/parallel.h"
 #include "base/sort.h"
 #include "cluster/tree.h"
+
+enum { GRAIN = 1 << 13 };
 
 /* Raises costs so that they never fall from child to parent or from phase to phase. */
 static void make_monotone(fct_work *work) {
@@ -26,113 +31,192 @@ static void make_monotone(fct_work *work) {
     }
 }
 
-/* ranks[m]: place of merge m by cost. */
-static fct_result rank_merges(const fct_work *work, uint32_t *ranks, uint32_t *sorted) {
-    uint64_t *keys = fct_allocate(work->env, work->merge_count, sizeof *keys);
-    if (!keys) return fct_fail_memory(work->env, "ordering the tree");
-    for (uint32_t m = 0, phase = 0; m < work->merge_count; ++m) {
-        for (; phase < 2 && m >= work->phase_ends[phase]; ++phase) continue;
-        keys[m] = (uint64_t)phase << 32 | fct_float_key(work->costs[m]);
-        sorted[m] = m;
-    }
-    fct_result result = fct_sort_pairs(work->env, keys, sorted, work->merge_count);
-    for (uint32_t i = 0; result == FCT_OK && i < work->merge_count; ++i) ranks[sorted[i]] = i;
-    fct_release(work->env, keys);
-    return result;
+typedef struct orderer {
+    fct_work *work;
+    const fct_mesh *mesh;
+    fct_tree *tree;
+    bool alone;       /* one thread: counters need no lock */
+    uint64_t *sorted; /* by rank: cost << 32 | merge */
+    uint32_t *ranks;  /* of merges */
+    uint32_t kept;
+    _Atomic uint32_t *first_uses; /* per vertex: its first corner in the tree's order */
+    uint32_t *renamed, *places;   /* per vertex; per chunk */
+} orderer;
+
+static void list_costs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    for (size_t m = begin; m < end; ++m) o->sorted[m] = (uint64_t)fct_float_key(o->work->costs[m]) << 32 | m;
+}
+
+static void list_ranks(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    for (size_t i = begin; i < end; ++i) o->ranks[(uint32_t)o->sorted[i]] = (uint32_t)i;
 }
 
 /* How many merges the tree keeps: down to root_count clusters, none above max_cost. */
-static uint32_t kept_merges(const fct_work *work, const fct_tree_def *def, const uint32_t *sorted) {
+static uint32_t kept_merges(const orderer *o, const fct_tree_def *def) {
+    const fct_work *work = o->work;
     uint32_t roots = def->root_count > 1 ? def->root_count : 1;
     uint32_t kept = roots < work->face_count ? work->face_count - roots : 0;
     if (kept > work->merge_count) kept = work->merge_count;
-    while (kept > 0 && (double)work->costs[sorted[kept - 1]] > def->max_cost) --kept;
+    while (kept > 0 && (double)work->costs[(uint32_t)o->sorted[kept - 1]] > def->max_cost) --kept;
     return kept;
 }
 
-/* Inner nodes with children as build ids for leaves, marked by first = FCT_NONE; counts. */
-static void number_nodes(const fct_work *work, const uint32_t *ranks, uint32_t kept, fct_cluster *clusters) {
-    for (uint32_t m = 0; m < work->merge_count; ++m) {
-        if (ranks[m] >= kept) continue;
-        fct_cluster *c = &clusters[kept - 1 - ranks[m]];
-        memset(c, 0, sizeof *c);
-        c->cost = work->costs[m];
-        c->first = FCT_NONE;
+/* Children by node id; a leaf by its face for now. */
+static void number_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    const fct_node_links *links = &o->tree->links;
+    uint32_t faces = o->work->face_count, kept = o->kept;
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t m = (uint32_t)o->sorted[kept - 1 - i];
+        links->costs[i] = o->work->costs[m];
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = work->children[m][k];
-            bool leaf = child < work->face_count;
-            uint32_t id = leaf ? child : kept - 1 - ranks[child - work->face_count];
-            c->child[k] = leaf ? kept + child : id;
-            c->count += leaf ? 1 : clusters[id].count;
+            uint32_t child = o->work->children[m][k];
+            links->children[i][k] = child < faces ? kept + child : kept - 1 - o->ranks[child - faces];
         }
     }
 }
 
-/* Hands ranges from parents to children; leaves get the ids of their places. */
-static void place_faces(fct_tree *tree, uint32_t kept) {
-    fct_cluster *clusters = tree->clusters;
-    uint32_t place = 0, roots = 0;
-    for (uint32_t i = 0; i < kept; ++i) {
-        fct_cluster *c = &clusters[i];
-        if (c->first == FCT_NONE) {
-            tree->roots[roots++] = i;
-            c->first = place;
-            place += c->count;
-        }
-        uint32_t first = c->first;
+static void count_faces(const orderer *o) {
+    const fct_node_links *links = &o->tree->links;
+    for (uint32_t i = o->kept; i-- > 0;) {
+        uint32_t count = 0;
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = c->child[k];
+            uint32_t child = links->children[i][k];
+            count += child < o->kept ? links->counts[child] : 1;
+        }
+        links->counts[i] = count;
+    }
+}
+
+/* Hands ranges from parents to children; leaves get the ids of their places. Faces that no node holds become
+ * roots. */
+static void place_faces(const orderer *o, uint8_t *depths, uint8_t *held) {
+    fct_tree *tree = o->tree;
+    const fct_node_links *links = &tree->links;
+    fct_tree_view *view = &tree->view;
+    uint32_t kept = o->kept, place = 0, roots = 0, deepest = 0;
+    uint64_t total = 0;
+    memset(links->firsts, 0xFF, (size_t)kept * sizeof *links->firsts);
+    memset(held, 0, view->face_count);
+    for (uint32_t i = 0; i < kept; ++i) {
+        if (links->firsts[i] == FCT_NONE) {
+            tree->roots[roots++] = i;
+            links->firsts[i] = place;
+            depths[i] = 0;
+            place += links->counts[i];
+        }
+        uint32_t first = links->firsts[i], depth = depths[i] + 1u;
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = links->children[i][k];
             if (child < kept) {
-                clusters[child].first = first;
-                first += clusters[child].count;
+                links->firsts[child] = first;
+                depths[child] = (uint8_t)depth;
+                first += links->counts[child];
             } else {
                 tree->face_ids[first] = child - kept;
-                c->child[k] = kept + first++;
+                held[child - kept] = 1;
+                links->children[i][k] = kept + first++;
+                total += depth;
+                if (depth > deepest) deepest = depth;
             }
         }
     }
-    tree->view.root_count = roots;
-}
-
-/* Faces that no inner node holds become roots. */
-static void place_loose_faces(fct_tree *tree, const fct_work *work, const uint32_t *ranks, uint32_t kept,
-                              uint8_t *held) {
-    memset(held, 0, work->face_count);
-    uint32_t place = 0;
-    for (uint32_t m = 0; m < work->merge_count; ++m) {
-        if (ranks[m] >= kept) continue;
-        for (int k = 0; k < 2; ++k)
-            if (work->children[m][k] < work->face_count) held[work->children[m][k]] = 1, ++place;
-    }
-    for (uint32_t f = 0; f < work->face_count; ++f) {
+    for (uint32_t f = 0; place < view->face_count && f < view->face_count; ++f) {
         if (held[f]) continue;
-        tree->roots[tree->view.root_count++] = kept + place;
+        tree->roots[roots++] = kept + place;
         tree->face_ids[place++] = f;
     }
+    view->root_count = roots;
+    view->depth = deepest;
+    view->mean_depth = (double)total / view->face_count;
 }
 
-/* Triangles by place and vertices in order of first use. */
-static fct_result copy_mesh(const fct_env *env, const fct_mesh *mesh, fct_tree *tree) {
-    uint32_t *renamed = fct_allocate(env, mesh->vertex_count, sizeof *renamed);
-    if (!renamed) return fct_fail_memory(env, "ordering the tree");
-    memset(renamed, 0xFF, (size_t)mesh->vertex_count * sizeof *renamed);
+/* --- Vertices in order of first use --- */
+
+static void copy_triangles(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    for (size_t f = begin; f < end; ++f) {
+        const uint32_t *from = o->mesh->triangles + 3 * (size_t)o->tree->face_ids[f];
+        for (size_t i = 3 * f; i < 3 * f + 3; ++i) {
+            uint32_t v = *from++, corner = (uint32_t)i;
+            o->tree->triangles[i] = v;
+            uint32_t first = atomic_load_explicit(&o->first_uses[v], memory_order_relaxed);
+            if (corner < first && o->alone)
+                atomic_store_explicit(&o->first_uses[v], corner, memory_order_relaxed);
+            else
+                while (corner < first &&
+                       !atomic_compare_exchange_weak_explicit(&o->first_uses[v], &first, corner,
+                                                              memory_order_relaxed, memory_order_relaxed))
+                    continue;
+        }
+        if (o->tree->materials) o->tree->materials[f] = o->mesh->materials[o->tree->face_ids[f]];
+    }
+}
+
+static bool is_first_use(const orderer *o, size_t corner) {
+    return atomic_load_explicit(&o->first_uses[o->tree->triangles[corner]], memory_order_relaxed) == corner;
+}
+
+static void count_first_uses(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    orderer *o = user;
+    uint32_t count = 0;
+    for (size_t i = 3 * begin; i < 3 * end; ++i) count += is_first_use(o, i);
+    o->places[chunk] = count;
+}
+
+static void rename_vertices(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    orderer *o = user;
+    uint32_t next = o->places[chunk];
+    for (size_t i = 3 * begin; i < 3 * end; ++i) {
+        if (!is_first_use(o, i)) continue;
+        o->tree->vertex_ids[next] = o->tree->triangles[i];
+        o->renamed[o->tree->triangles[i]] = next++;
+    }
+}
+
+static void rename_corners(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    for (size_t i = 3 * begin; i < 3 * end; ++i) o->tree->triangles[i] = o->renamed[o->tree->triangles[i]];
+}
+
+static void copy_vertices(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    orderer *o = user;
+    for (size_t v = begin; v < end; ++v) {
+        size_t from = 3 * (size_t)o->tree->vertex_ids[v];
+        for (size_t k = 0; k < 3; ++k) o->tree->positions[3 * v + k] = o->mesh->positions[from + k];
+        for (size_t k = 0; k < 3 && o->tree->colors; ++k)
+            o->tree->colors[3 * v + k] = o->mesh->colors[from + k];
+    }
+}
+
+/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
+static void copy_mesh(const fct_env *env, orderer *o) {
+    size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
+    memset((void *)o->first_uses, 0xFF, vertices * sizeof *o->first_uses);
+    fct_parallel_for(env, faces, GRAIN, copy_triangles, o);
+    fct_parallel_for(env, faces, GRAIN, count_first_uses, o);
     uint32_t used = 0;
-    for (size_t i = 0; i < 3 * (size_t)mesh->face_count; ++i) {
-        uint32_t v = mesh->triangles[3 * (size_t)tree->face_ids[i / 3] + i % 3];
-        if (renamed[v] == FCT_NONE) renamed[v] = used, tree->vertex_ids[used++] = v;
-        tree->triangles[i] = renamed[v];
+    for (size_t i = 0; i < fct_chunk_count(faces, GRAIN); ++i) {
+        uint32_t count = o->places[i];
+        o->places[i] = used;
+        used += count;
     }
-    for (uint32_t v = 0; v < mesh->vertex_count; ++v)
-        if (renamed[v] == FCT_NONE) tree->vertex_ids[used++] = v;
-    fct_release(env, renamed);
-    for (size_t v = 0; v < mesh->vertex_count; ++v) {
-        size_t from = 3 * (size_t)tree->vertex_ids[v];
-        memcpy(tree->positions + 3 * v, mesh->positions + from, 3 * sizeof(float));
-        if (tree->colors) memcpy(tree->colors + 3 * v, mesh->colors + from, 3 * sizeof(float));
-    }
-    for (size_t f = 0; tree->materials && f < mesh->face_count; ++f)
-        tree->materials[f] = mesh->materials[tree->face_ids[f]];
-    return FCT_OK;
+    fct_parallel_for(env, faces, GRAIN, rename_vertices, o);
+    fct_parallel_for(env, faces, GRAIN, rename_corners, o);
+    for (uint32_t v = 0; used < vertices; ++v)
+        if (atomic_load_explicit(&o->first_uses[v], memory_order_relaxed) == FCT_NONE)
+            o->tree->vertex_ids[used++] = v;
+    fct_parallel_for(env, vertices, GRAIN, copy_vertices, o);
 }
 
 static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_tree *tree) {
@@ -150,9 +234,25 @@ static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_tree 
     return FCT_OK;
 }
 
+static fct_result allocate_links(const fct_env *env, uint32_t kept, fct_node_links *links) {
+    links->children = fct_allocate(env, kept, sizeof *links->children);
+    links->costs = fct_allocate(env, kept, sizeof *links->costs);
+    links->counts = fct_allocate(env, kept, sizeof *links->counts);
+    links->firsts = fct_allocate(env, kept, sizeof *links->firsts);
+    bool complete = links->children && links->costs && links->counts && links->firsts;
+    return complete ? FCT_OK : fct_fail_memory(env, "the tree");
+}
+
+void fct_node_links_release(const fct_env *env, fct_node_links *links) {
+    fct_release(env, links->children);
+    fct_release(env, links->costs);
+    fct_release(env, links->counts);
+    fct_release(env, links->firsts);
+    *links = (fct_node_links){0};
+}
+
 static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint32_t kept, fct_tree *tree) {
     uint32_t faces = mesh->face_count, vertices = mesh->vertex_count;
-    tree->clusters = fct_allocate(env, kept, sizeof *tree->clusters);
     tree->roots = fct_allocate(env, faces - kept, sizeof *tree->roots);
     tree->face_ids = fct_allocate(env, faces, sizeof *tree->face_ids);
     tree->vertex_ids = fct_allocate(env, vertices, sizeof *tree->vertex_ids);
@@ -160,46 +260,71 @@ static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint
     tree->positions = fct_allocate(env, vertices, 3 * sizeof *tree->positions);
     if (mesh->colors) tree->colors = fct_allocate(env, vertices, 3 * sizeof *tree->colors);
     if (mesh->materials) tree->materials = fct_allocate(env, faces, sizeof *tree->materials);
-    if (!tree->clusters || !tree->roots || !tree->face_ids || !tree->vertex_ids || !tree->triangles ||
-        !tree->positions || (mesh->colors && !tree->colors) || (mesh->materials && !tree->materials))
+    if (!tree->roots || !tree->face_ids || !tree->vertex_ids || !tree->triangles || !tree->positions ||
+        (mesh->colors && !tree->colors) || (mesh->materials && !tree->materials))
         return fct_fail_memory(env, "the tree");
     fct_tree_view *view = &tree->view;
     view->face_count = faces, view->vertex_count = vertices, view->node_count = kept;
-    view->clusters = tree->clusters, view->roots = tree->roots, view->face_ids = tree->face_ids;
+    view->roots = tree->roots, view->face_ids = tree->face_ids;
     view->vertex_ids = tree->vertex_ids, view->triangles = tree->triangles;
     view->positions = tree->positions, view->colors = tree->colors, view->materials = tree->materials;
     return FCT_OK;
 }
 
+/* Merges by rank, and from them the links by node id. */
+static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def *def) {
+    fct_work *work = o->work;
+    size_t merges = work->merge_count;
+    make_monotone(work);
+    o->sorted = fct_allocate(env, merges, sizeof *o->sorted);
+    o->ranks = fct_allocate(env, merges, sizeof *o->ranks);
+    if (!o->sorted || !o->ranks) return fct_fail_memory(env, "ordering the tree");
+    fct_parallel_for(env, merges, GRAIN, list_costs, o);
+    fct_result result = fct_sort_items(env, o->sorted, merges);
+    if (result != FCT_OK) return result;
+    fct_parallel_for(env, merges, GRAIN, list_ranks, o);
+    o->kept = kept_merges(o, def);
+    result = allocate_links(env, o->kept, &o->tree->links);
+    if (result == FCT_OK) fct_parallel_for(env, o->kept, GRAIN, number_nodes, o);
+    fct_release(env, o->sorted);
+    fct_release(env, o->ranks);
+    o->sorted = NULL, o->ranks = NULL;
+    fct_work_release(work);
+    return result;
+}
+
+static fct_result place(const fct_env *env, orderer *o) {
+    size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
+    fct_result result = allocate_arrays(env, o->mesh, o->kept, o->tree);
+    if (result != FCT_OK) return result;
+    uint8_t *depths = fct_allocate(env, o->kept, 1), *held = fct_allocate(env, faces, 1);
+    if (depths && held) {
+        count_faces(o);
+        place_faces(o, depths, held);
+    } else {
+        result = fct_fail_memory(env, "ordering the tree");
+    }
+    fct_release(env, depths);
+    fct_release(env, held);
+    if (result != FCT_OK) return result;
+    o->first_uses = fct_allocate(env, vertices, sizeof *o->first_uses);
+    o->renamed = fct_allocate(env, vertices, sizeof *o->renamed);
+    o->places = fct_allocate(env, fct_chunk_count(faces, GRAIN), sizeof *o->places);
+    if (!o->first_uses || !o->renamed || !o->places) return fct_fail_memory(env, "ordering the tree");
+    copy_mesh(env, o);
+    return copy_names(env, o->mesh, o->tree);
+}
+
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree) {
     const fct_env *env = work->env;
-    uint32_t *ranks = fct_allocate(env, work->merge_count, sizeof *ranks);
-    uint32_t *sorted = fct_allocate(env, work->merge_count, sizeof *sorted);
-    uint8_t *held = fct_allocate(env, work->face_count, 1);
-    fct_result result = FCT_OK;
-    if (!ranks || !sorted || !held) {
-        result = fct_fail_memory(env, "ordering the tree");
-        goto done;
-    }
-    make_monotone(work);
-    result = rank_merges(work, ranks, sorted);
-    if (result != FCT_OK) goto done;
-    uint32_t kept = kept_merges(work, def, sorted);
-    fct_release(env, work->records); /* the largest arrays go before the tree's come */
-    fct_release(env, work->directions);
-    fct_release(env, work->edges);
-    work->records = NULL, work->directions = NULL, work->edges = NULL;
-    result = allocate_arrays(env, mesh, kept, tree);
-    if (result != FCT_OK) goto done;
-    number_nodes(work, ranks, kept, tree->clusters);
-    place_faces(tree, kept);
-    place_loose_faces(tree, work, ranks, kept, held);
-    result = copy_mesh(env, mesh, tree);
-    if (result == FCT_OK) result = copy_names(env, mesh, tree);
-    if (result == FCT_OK) result = fct_tree_measure_depth(tree);
-done:
-    fct_release(env, ranks);
-    fct_release(env, sorted);
-    fct_release(env, held);
-    return result;
+    orderer o = {.work = work, .mesh = mesh, .tree = tree, .alone = fct_env_threads(env) == 1};
+    fct_result result = link_nodes(env, &o, def);
+    if (result == FCT_OK) result = fct_progress(env, "order", 0.3);
+    if (result == FCT_OK) result = place(env, &o);
+    fct_release(env, o.sorted);
+    fct_release(env, o.ranks);
+    fct_release(env, (void *)o.first_uses);
+    fct_release(env, o.renamed);
+    fct_release(env, o.places);
+    return result == FCT_OK ? fct_progress(env, "order", 1) : result;
 }

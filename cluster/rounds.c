@@ -1,144 +1,132 @@
 /* cluster/rounds.c: contraction in rounds: every cluster that is its cheapest neighbour's cheapest neighbour
  * merges with it, all such pairs at once.
  *
- * In and out: the live edges of an fct_work. Live clusters are numbered anew each round, edges are flat
- * arrays grouped by their lower end; each round regroups them by a counting sort, sorts each group by the
- * other end and adds up doubles. A merged pair prices its edges anew, the rest keep their cost. Ties (costs
+ * In: the live lists or edges of an fct_work. Out: its live edges. Live clusters are numbered anew each
+ * round, with one list of neighbours each in a flat array, an edge being in the lists of both its ends. A
+ * union's list is those of its parts, renumbered, doubles added up; lists are written one after the other, so
+ * no sort of edges is needed. The lower end prices an edge and writes the cost into both lists. Ties (costs
  * equal to 18 bits) go to the smaller union, then to a hash of the edge and the round: by number a flat grid
  * would make one merge per chain and round. When a round finds few pairs, or few clusters are left, the
- * greedy loop ends the work: it is bounded on every input, rounds are not. The same bits for every thread
- * count: minima and counts commute, and groups are sorted by all that tells their entries apart.
+ * greedy loop ends the work: it is bounded on every input, rounds are not. No two threads write the same
+ * field and nothing depends on their order: the same bits for every thread count.
  */
-#include <stdatomic.h>
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/simd.h"
 #include "base/sort.h"
 #include "cluster/work.h"
 
-enum { GRAIN = 1 << 13, FEW = 4096, SMALL_GROUP = 24 };
+enum { GRAIN = 1 << 12, FEW = 4096, LONG = 16 };
 
-/* Ends are live numbers, a < b. */
-typedef struct link {
-    uint32_t a, b;
-    float shared, cost; /* cost: INFINITY where the merge is not allowed, NaN where it must be priced */
-} link;
+#define MERGED 0x80000000u
+
+/* Costs are compared and kept as keys that order like them (fct_float_key). */
+#define OPEN    UINT32_MAX  /* to be priced */
+#define BLOCKED 0xFF800000u /* infinity: the merge is not allowed */
+#define SAME    5           /* low bits of a cost in which equal ones may differ */
+
+/* The live clusters of a round and their lists. Lists longer than LONG are sorted by live number. Arrays of
+ * entries may be read, not written, up to SLACK beyond a list. */
+typedef struct generation {
+    uint32_t count;
+    uint32_t *slots, *starts, *lengths; /* of live numbers */
+    uint32_t *others;                   /* per entry: the live number at the other end */
+    float *shared;
+    uint32_t *keys;
+} generation;
+
+enum { SLACK = 8, QUEUE = 256 };
 
 typedef struct rounds {
     fct_work *work;
     bool across;
     uint32_t round;
-    uint32_t live_count, next_count; /* clusters in this round and in the next */
-    uint32_t *slots, *next_slots;    /* of live numbers */
-    uint32_t *mates;                 /* FCT_NONE: stays alone */
-    uint32_t *mate_links;            /* of the lower of a pair */
-    uint32_t *renumbered;            /* this round's number to the next's */
-    _Atomic uint64_t *best;
-    _Atomic uint32_t *starts; /* of groups */
-    uint32_t link_count, grouped_count;
-    link *links, *other;
-    uint32_t *kept, *merged; /* per chunk: counts, then places */
+    generation now, next;
+    uint32_t *best;                 /* per live cluster: its cheapest neighbour or FCT_NONE */
+    uint32_t *renumbered;           /* this round's number to the next's, with MERGED */
+    uint32_t *kept, *merged, *room; /* per chunk: counts, then places */
 } rounds;
 
-static uint32_t scatter_bits(uint32_t x, uint32_t round) {
-    x ^= round * 0x9E3779B9u;
-    x *= 0x85EBCA6Bu, x ^= x >> 15;
-    x *= 0xC2B2AE35u, x ^= x >> 13;
-    return x;
+/* --- Pairs --- */
+
+static uint32_t link_hash(uint32_t a, uint32_t b, uint32_t round) {
+    uint32_t low = a < b ? a : b, high = a < b ? b : a;
+    uint64_t x = ((uint64_t)low << 32 | high) + round * 0x9E3779B97F4A7C15u;
+    x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ x >> 27) * 0x94D049BB133111EBu;
+    return (uint32_t)(x >> 32);
 }
 
-/* Different for every link of a round, for scatter_bits is a permutation. */
-static uint64_t link_key(const rounds *r, uint32_t e) {
-    const link *l = &r->links[e];
-    uint32_t faces = r->work->counts[r->slots[l->a]] + r->work->counts[r->slots[l->b]];
-    uint64_t size = 31 - (uint32_t)__builtin_clz(faces);
-    return (uint64_t)(fct_float_key(l->cost) >> 5) << 37 | size << 32 | scatter_bits(e, r->round);
+/* What decides between edges of the same cost. */
+static uint64_t tie_key(const rounds *r, uint32_t a, uint32_t b) {
+    uint32_t faces = r->work->counts[r->now.slots[a]] + r->work->counts[r->now.slots[b]];
+    return (uint64_t)(31 - (uint32_t)__builtin_clz(faces)) << 32 | link_hash(a, b, r->round);
 }
 
-static void price(const rounds *r, link *l) {
-    fct_work *work = r->work;
-    uint32_t a = r->slots[l->a], b = r->slots[l->b];
-    bool foreign = !r->across && work->materials && work->materials[a] != work->materials[b];
-    l->cost = foreign || !fct_work_allowed(work, a, b) ? INFINITY : fct_work_cost(work, a, b, l->shared);
-}
-
-static void price_all(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    rounds *r = user;
-    for (size_t e = begin; e < end; ++e) price(r, &r->links[e]);
-}
-
-static void clear_round(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    rounds *r = user;
-    for (size_t i = begin; i < end; ++i) {
-        atomic_store_explicit(&r->best[i], UINT64_MAX, memory_order_relaxed);
-        r->mates[i] = FCT_NONE;
+/* The cheapest of entries whose costs share the key `least`, which one has for certain. */
+static uint32_t break_tie(const rounds *r, uint32_t i, uint32_t least) {
+    const uint32_t *keys = r->now.keys + r->now.starts[i], *others = r->now.others + r->now.starts[i];
+    uint32_t best = FCT_NONE;
+    uint64_t best_key = UINT64_MAX;
+    for (uint32_t k = 0; k < r->now.lengths[i]; ++k) {
+        if (keys[k] >> SAME != least) continue;
+        uint64_t key = tie_key(r, i, others[k]);
+        if (key < best_key) best = others[k], best_key = key;
     }
+    return best;
 }
 
-static void lower_to(_Atomic uint64_t *best, uint64_t key) {
-    uint64_t old = atomic_load_explicit(best, memory_order_relaxed);
-    while (key < old && !atomic_compare_exchange_weak_explicit(best, &old, key, memory_order_relaxed,
-                                                               memory_order_relaxed))
-        continue;
+/* Lanes from `from` on are all ones. */
+static inline i8 lanes_from(uint32_t from) {
+    static const uint32_t lanes[16] = {0,    0,    0,    0,    0,    0,    0,    0,
+                                       OPEN, OPEN, OPEN, OPEN, OPEN, OPEN, OPEN, OPEN};
+    return i8_load(lanes + 8 - (from < 8 ? from : 8));
+}
+
+static uint32_t best_of(const rounds *r, uint32_t i) {
+    const uint32_t *keys = r->now.keys + r->now.starts[i], length = r->now.lengths[i];
+    uint32_t least = OPEN, at = 0, equal = 0;
+    for (uint32_t k = 0; k < length; k += 8) {
+        i8 lanes = i8_or(i8_shift_right(i8_load(keys + k), SAME), lanes_from(length - k));
+        uint32_t low = i8_least(lanes);
+        if (low > least) continue;
+        uint32_t mask = i8_eq(lanes, i8_set(low)), ties = (uint32_t)__builtin_popcount(mask);
+        equal = low < least ? ties : equal + ties;
+        if (low < least) at = k + (uint32_t)__builtin_ctz(mask);
+        least = low;
+    }
+    if (least >= BLOCKED >> SAME) return FCT_NONE;
+    return equal == 1 ? r->now.others[r->now.starts[i] + at] : break_tie(r, i, least);
 }
 
 static void find_best(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     rounds *r = user;
-    for (size_t e = begin; e < end; ++e) {
-        if (r->links[e].cost == INFINITY) continue;
-        uint64_t key = link_key(r, (uint32_t)e);
-        lower_to(&r->best[r->links[e].a], key);
-        lower_to(&r->best[r->links[e].b], key);
-    }
+    const uint8_t *frozen = r->work->frozen;
+    for (uint32_t i = (uint32_t)begin; i < end; ++i)
+        r->best[i] = frozen && frozen[r->now.slots[i]] ? FCT_NONE : best_of(r, i);
 }
 
-static void find_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    rounds *r = user;
-    for (size_t e = begin; e < end; ++e) {
-        const link *l = &r->links[e];
-        const uint8_t *frozen = r->work->frozen;
-        if (l->cost == INFINITY || (frozen && (frozen[r->slots[l->a]] || frozen[r->slots[l->b]]))) continue;
-        uint64_t key = link_key(r, (uint32_t)e);
-        if (atomic_load_explicit(&r->best[l->a], memory_order_relaxed) != key ||
-            atomic_load_explicit(&r->best[l->b], memory_order_relaxed) != key)
-            continue;
-        r->mates[l->a] = l->b;
-        r->mates[l->b] = l->a;
-        r->mate_links[l->a] = (uint32_t)e;
-    }
+static inline uint32_t mate_of(const rounds *r, uint32_t i) {
+    uint32_t best = r->best[i];
+    return best != FCT_NONE && r->best[best] == i ? best : FCT_NONE;
 }
 
 static void count_clusters(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     rounds *r = user;
-    uint32_t kept = 0, merged = 0;
-    for (size_t i = begin; i < end; ++i) {
-        kept += r->mates[i] > i; /* alone, or the lower of a pair */
-        merged += r->mates[i] > i && r->mates[i] != FCT_NONE;
+    uint32_t kept = 0, merged = 0, room = 0;
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        uint32_t mate = mate_of(r, i);
+        if (mate < i) continue; /* the lower of a pair speaks for both */
+        ++kept;
+        room += r->now.lengths[i];
+        if (mate == FCT_NONE) continue;
+        ++merged;
+        room += r->now.lengths[mate] - 2;
     }
-    r->kept[chunk] = kept, r->merged[chunk] = merged;
-}
-
-static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)thread;
-    rounds *r = user;
-    uint32_t next = r->kept[chunk], merge = r->work->merge_count + r->merged[chunk];
-    for (size_t i = begin; i < end; ++i) {
-        uint32_t mate = r->mates[i];
-        if (mate <= i) continue;
-        r->next_slots[next] = r->slots[i];
-        r->renumbered[i] = next;
-        if (mate != FCT_NONE) {
-            const link *l = &r->links[r->mate_links[i]];
-            r->renumbered[mate] = next;
-            fct_work_merge_as(r->work, merge++, r->slots[i], r->slots[mate], l->shared, l->cost);
-        }
-        ++next;
-    }
+    r->kept[chunk] = kept, r->merged[chunk] = merged, r->room[chunk] = room;
 }
 
 static uint32_t counts_to_places(uint32_t *counts, size_t chunks) {
@@ -151,197 +139,393 @@ static uint32_t counts_to_places(uint32_t *counts, size_t chunks) {
     return total;
 }
 
-/* The link in the next round's numbers; false if it has become a loop. */
-static bool renumber(const rounds *r, const link *from, link *to) {
-    uint32_t a = r->renumbered[from->a], b = r->renumbered[from->b];
-    bool changed = r->mates[from->a] != FCT_NONE || r->mates[from->b] != FCT_NONE;
-    *to = (link){a < b ? a : b, a < b ? b : a, from->shared, changed ? NAN : from->cost};
-    return a != b;
-}
-
-static void count_groups(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    rounds *r = user;
-    link l;
-    for (size_t e = begin; e < end; ++e)
-        if (renumber(r, &r->links[e], &l))
-            atomic_fetch_add_explicit(&r->starts[l.a], 1, memory_order_relaxed);
-}
-
-static void fill_groups(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    rounds *r = user;
-    link l;
-    for (size_t e = begin; e < end; ++e)
-        if (renumber(r, &r->links[e], &l))
-            r->other[atomic_fetch_add_explicit(&r->starts[l.a], 1, memory_order_relaxed)] = l;
-}
-
-static inline bool before(const link *p, const link *q) {
-    return p->b != q->b ? p->b < q->b : p->shared < q->shared;
-}
-
-/* By (b, shared): what is left equal is equal throughout. */
-static void sort_group(link *group, link *scratch, size_t count) {
-    size_t run = count <= SMALL_GROUP ? count : SMALL_GROUP;
-    for (size_t from = 0; from < count; from += run) {
-        size_t end = from + run < count ? from + run : count;
-        for (size_t i = from + 1; i < end; ++i) {
-            link l = group[i];
-            size_t j = i;
-            for (; j > from && before(&l, &group[j - 1]); --j) group[j] = group[j - 1];
-            group[j] = l;
-        }
+/* The entry of live cluster i that leads to `other`, which is there. */
+static uint32_t entry_of(const generation *g, uint32_t i, uint32_t other) {
+    const uint32_t *others = g->others + g->starts[i];
+    uint32_t low = 0, high = g->lengths[i], mask;
+    while (high - low > LONG) {
+        uint32_t middle = low + (high - low) / 2;
+        if (others[middle] <= other)
+            low = middle;
+        else
+            high = middle;
     }
-    for (; run < count; run *= 2) {
-        for (size_t from = 0; from < count; from += 2 * run) {
-            size_t middle = from + run < count ? from + run : count;
-            size_t end = middle + run < count ? middle + run : count, i = from, j = middle;
-            for (size_t k = from; k < end; ++k)
-                scratch[k] =
-                    j >= end || (i < middle && !before(&group[j], &group[i])) ? group[i++] : group[j++];
-        }
-        memcpy(group, scratch, count * sizeof *group);
-    }
+    for (i8 wanted = i8_set(other); (mask = i8_eq(i8_load(others + low), wanted)) == 0;) low += 8;
+    return g->starts[i] + low + (uint32_t)__builtin_ctz(mask);
 }
 
-/* Sorts the groups of a chunk, joins doubles and packs the chunk's links together at its beginning. */
-static void join_doubles(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static float cost_of_key(uint32_t key) {
+    uint32_t bits = key & 0x80000000u ? key & 0x7FFFFFFFu : ~key;
+    float cost;
+    memcpy(&cost, &bits, sizeof cost);
+    return cost;
+}
+
+/* Numbers the clusters of the next round and merges. */
+static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     rounds *r = user;
-    uint32_t first = begin ? r->starts[begin - 1] : 0, from = first, to = first;
-    for (size_t i = begin; i < end; ++i) {
-        uint32_t last = r->starts[i]; /* filling has moved every start to its group's end */
-        if (last - from > 1) sort_group(r->other + from, r->links + from, last - from);
-        for (; from < last; ++from) {
-            link *l = &r->other[from];
-            if (to > first && r->other[to - 1].a == l->a && r->other[to - 1].b == l->b)
-                r->other[to - 1].shared += l->shared;
-            else
-                r->other[to++] = *l;
+    uint32_t next = r->kept[chunk], merge = r->work->merge_count + r->merged[chunk], room = r->room[chunk];
+    fct_pair pairs[FCT_LANES];
+    float costs[FCT_LANES];
+    uint32_t count = 0;
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        uint32_t mate = mate_of(r, i);
+        if (mate < i) continue;
+        r->next.slots[next] = r->now.slots[i];
+        r->next.starts[next] = room;
+        room += r->now.lengths[i];
+        r->renumbered[i] = next;
+        if (mate != FCT_NONE) {
+            uint32_t entry = entry_of(&r->now, i, mate);
+            room += r->now.lengths[mate] - 2;
+            r->renumbered[i] = r->renumbered[mate] = next | MERGED;
+            pairs[count] = (fct_pair){r->now.slots[i], r->now.slots[mate], r->now.shared[entry]};
+            costs[count++] = cost_of_key(r->now.keys[entry]);
+            if (count == FCT_LANES) {
+                fct_work_merges(r->work, merge, pairs, costs, count);
+                merge += count, count = 0;
+            }
+        }
+        ++next;
+    }
+    if (count) fct_work_merges(r->work, merge, pairs, costs, count);
+}
+
+/* --- Lists --- */
+
+/* A list being made, with room for SLACK more. */
+typedef struct list {
+    uint32_t *others, *keys;
+    float *shared;
+} list;
+
+static inline bool before(const list *l, size_t p, size_t q) {
+    return l->others[p] != l->others[q] ? l->others[p] < l->others[q] : l->shared[p] < l->shared[q];
+}
+
+static void swap(const list *l, size_t p, size_t q) {
+    uint32_t other = l->others[p], key = l->keys[p];
+    float shared = l->shared[p];
+    l->others[p] = l->others[q], l->keys[p] = l->keys[q], l->shared[p] = l->shared[q];
+    l->others[q] = other, l->keys[q] = key, l->shared[q] = shared;
+}
+
+static void sift_down(const list *l, size_t at, size_t count) {
+    for (size_t child; (child = 2 * at + 1) < count; at = child) {
+        if (child + 1 < count && before(l, child, child + 1)) ++child;
+        if (!before(l, at, child)) break;
+        swap(l, at, child);
+    }
+}
+
+static void sort_list(const list *l, size_t count) {
+    for (size_t i = count / 2; i-- > 0;) sift_down(l, i, count);
+    for (size_t i = count; i-- > 1;) {
+        swap(l, 0, i);
+        sift_down(l, 0, i);
+    }
+}
+
+/* Adds up neighbouring doubles; a double stands for a merge, so its cost is open. */
+static uint32_t join_sorted(const list *l, uint32_t count) {
+    uint32_t to = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (to > 0 && l->others[to - 1] == l->others[i])
+            l->shared[to - 1] += l->shared[i];
+        else
+            l->others[to] = l->others[i], l->keys[to] = l->keys[i], l->shared[to++] = l->shared[i];
+    }
+    return to;
+}
+
+/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`. */
+static uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, const list *l, uint32_t count) {
+    uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
+    for (; from < end; ++from) {
+        uint32_t number = r->renumbered[r->now.others[from]];
+        if ((number & ~MERGED) == self) continue;
+        l->others[count] = number & ~MERGED;
+        l->shared[count] = r->now.shared[from];
+        l->keys[count++] = (number | own) & MERGED ? OPEN : r->now.keys[from];
+    }
+    return count;
+}
+
+/* The same for a list of at most LONG, adding up doubles. Without branches but the loop's, for which way
+ * they go could not be foretold. */
+static inline uint32_t renumber_few(const rounds *r, uint32_t i, uint32_t self, const list *l,
+                                    uint32_t count) {
+    uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
+    for (; from < end; ++from) {
+        uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
+        i8 wanted = i8_set(other);
+        uint32_t low = i8_eq(i8_load(l->others), wanted), high = i8_eq(i8_load(l->others + 8), wanted);
+        uint32_t there = (low | high << 8) & ((1u << count) - 1),
+                 at = (uint32_t)__builtin_ctz(there | 1u << count);
+        float sum = l->shared[at];
+        l->others[at] = other;
+        l->shared[at] = (there ? sum : 0) + r->now.shared[from];
+        l->keys[at] = (number | own) & MERGED ? OPEN : r->now.keys[from];
+        count += !there && other != self;
+    }
+    return count;
+}
+
+static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+    uint32_t others[LONG + SLACK], keys[LONG + SLACK];
+    float shared[LONG + SLACK];
+    list l = {others, keys, shared};
+    memset(others, 0xFF, sizeof others);
+    memset(shared, 0, sizeof shared);
+    uint32_t count = renumber_few(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = renumber_few(r, mate, next, &l, count);
+    for (uint32_t k = 0; k < count; ++k) {
+        r->next.others[place + k] = others[k];
+        r->next.shared[place + k] = shared[k];
+        r->next.keys[place + k] = keys[k];
+    }
+    return count;
+}
+
+static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+    list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
+    uint32_t count = renumber_list(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = renumber_list(r, mate, next, &l, count);
+    sort_list(&l, count);
+    return join_sorted(&l, count);
+}
+
+static void join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    rounds *r = user;
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        uint32_t mate = mate_of(r, i), length = r->now.lengths[i];
+        if (mate < i) continue;
+        uint32_t next = r->renumbered[i] & ~MERGED, place = r->next.starts[next];
+        if (mate != FCT_NONE) length += r->now.lengths[mate];
+        r->next.lengths[next] =
+            length <= LONG ? join_few(r, i, mate, next, place) : join_many(r, i, mate, next, place);
+    }
+}
+
+/* --- Costs --- */
+
+/* Edges to be priced: first all are found, then their costs, so that neither loop waits for the other's
+ * branches. */
+typedef struct price_queue {
+    uint32_t count;
+    uint32_t clusters[QUEUE + 8], entries[QUEUE + 8];
+} price_queue;
+
+static bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
+    const uint32_t *materials = r->work->materials;
+    return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
+}
+
+static void price_queued(const rounds *r, price_queue *queue) {
+    const generation *now = &r->now;
+    fct_pair pairs[FCT_LANES];
+    float costs[FCT_LANES];
+    uint32_t entries[FCT_LANES], mirrors[FCT_LANES], count = 0;
+    for (uint32_t q = 0; q < queue->count; ++q) {
+        uint32_t i = queue->clusters[q], entry = queue->entries[q], other = now->others[entry];
+        uint32_t a = now->slots[i], b = now->slots[other], mirror = entry_of(now, other, i);
+        pairs[count] = (fct_pair){a, b, now->shared[entry]};
+        entries[count] = entry, mirrors[count] = mirror;
+        if (may_merge(r, a, b))
+            ++count;
+        else
+            now->keys[entry] = now->keys[mirror] = BLOCKED;
+        if (count < FCT_LANES && q + 1 < queue->count) continue;
+        if (count) fct_work_costs(r->work, pairs, count, costs);
+        for (uint32_t k = 0; k < count; ++k)
+            now->keys[entries[k]] = now->keys[mirrors[k]] = fct_float_key(costs[k]);
+        count = 0;
+    }
+    queue->count = 0;
+}
+
+/* Prices the edges of the clusters of a chunk to those of higher number, for both lists. */
+static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    rounds *r = user;
+    const generation *now = &r->now;
+    price_queue queue = {.count = 0};
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        i8 self = i8_set(i);
+        uint32_t start = now->starts[i], length = now->lengths[i];
+        for (uint32_t k = 0; k < length; k += 8) {
+            uint32_t within = length - k < 8 ? (1u << (length - k)) - 1 : 0xFF;
+            uint32_t mask = within & i8_lt(self, i8_load(now->others + start + k));
+            for (; mask; mask &= mask - 1) {
+                uint32_t entry = start + k + (uint32_t)__builtin_ctz(mask);
+                queue.clusters[queue.count] = i, queue.entries[queue.count] = entry;
+                queue.count += now->keys[entry] == OPEN; /* others write the keys of the lanes left out */
+            }
+            if (queue.count >= QUEUE) price_queued(r, &queue);
         }
     }
-    r->kept[chunk] = to - first;
-    r->merged[chunk] = first;
+    price_queued(r, &queue);
 }
 
-static void price_kept(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)begin, (void)end, (void)thread;
-    rounds *r = user;
-    uint32_t place = r->kept[chunk], last = r->kept[chunk + 1];
-    const link *from = r->other + r->merged[chunk];
-    for (; place < last; ++place) {
-        link *l = &r->links[place];
-        *l = *from++;
-        if (l->cost != l->cost) price(r, l);
-    }
+/* --- Rounds --- */
+
+static bool allocate_generation(const fct_env *env, uint32_t count, size_t room, generation *out) {
+    out->slots = fct_allocate(env, count, sizeof *out->slots);
+    out->starts = fct_allocate(env, count, sizeof *out->starts);
+    out->lengths = fct_allocate(env, count, sizeof *out->lengths);
+    out->others = fct_allocate(env, room + SLACK, sizeof *out->others);
+    out->shared = fct_allocate(env, room, sizeof *out->shared);
+    out->keys = fct_allocate(env, room + SLACK, sizeof *out->keys);
+    bool complete = out->slots && out->starts && out->lengths && out->others && out->shared && out->keys;
+    if (!complete) return false;
+    memset(out->others + room, 0, SLACK * sizeof *out->others);
+    memset(out->keys + room, 0, SLACK * sizeof *out->keys);
+    return true;
 }
 
-/* Takes the links into the next round. */
-static void regroup(rounds *r) {
+static void release_generation(const fct_env *env, generation *g) {
+    fct_release(env, g->slots);
+    fct_release(env, g->starts);
+    fct_release(env, g->lengths);
+    fct_release(env, g->others);
+    fct_release(env, g->shared);
+    fct_release(env, g->keys);
+    *g = (generation){0};
+}
+
+/* Pairs up, merges and takes the lists into the next round; *merges: how many. Errors: MEMORY. */
+static fct_result one_round(rounds *r, uint32_t *merges) {
     const fct_env *env = r->work->env;
-    uint32_t count = r->next_count;
-    memset((void *)r->starts, 0, ((size_t)count + 1) * sizeof *r->starts);
-    fct_parallel_for(env, r->link_count, GRAIN, count_groups, r);
-    uint32_t place = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        uint32_t size = atomic_load_explicit(&r->starts[i], memory_order_relaxed);
-        atomic_store_explicit(&r->starts[i], place, memory_order_relaxed);
-        place += size;
-    }
-    fct_parallel_for(env, r->link_count, GRAIN, fill_groups, r);
-    uint32_t *slots = r->slots;
-    r->slots = r->next_slots, r->next_slots = slots;
-    fct_parallel_for(env, count, GRAIN, join_doubles, r);
-    size_t chunks = fct_chunk_count(count, GRAIN);
-    r->kept[chunks] = 0;
-    r->link_count = counts_to_places(r->kept, chunks + 1);
-    fct_parallel_for(env, count, GRAIN, price_kept, r);
-}
-
-/* Merges of this round. */
-static uint32_t one_round(rounds *r) {
-    fct_work *work = r->work;
-    const fct_env *env = work->env;
-    size_t chunks = fct_chunk_count(r->live_count, GRAIN);
-    fct_parallel_for(env, r->live_count, GRAIN, clear_round, r);
-    fct_parallel_for(env, r->link_count, GRAIN, find_best, r);
-    fct_parallel_for(env, r->link_count, GRAIN, find_pairs, r);
-    fct_parallel_for(env, r->live_count, GRAIN, count_clusters, r);
-    r->next_count = counts_to_places(r->kept, chunks);
-    uint32_t merges = counts_to_places(r->merged, chunks);
-    fct_parallel_for(env, r->live_count, GRAIN, merge_pairs, r);
-    work->merge_count += merges;
-    regroup(r);
-    r->live_count = r->next_count;
+    size_t count = r->now.count, chunks = fct_chunk_count(count, GRAIN);
+    fct_parallel_for(env, count, GRAIN, find_best, r);
+    fct_parallel_for(env, count, GRAIN, count_clusters, r);
+    uint32_t live = counts_to_places(r->kept, chunks), room = counts_to_places(r->room, chunks);
+    *merges = counts_to_places(r->merged, chunks);
+    /* The first round's need is the largest that comes. */
+    if (!r->next.slots && !allocate_generation(env, live, room, &r->next))
+        return fct_fail_memory(env, "clustering");
+    fct_parallel_for(env, count, GRAIN, merge_pairs, r);
+    r->work->merge_count += *merges;
+    fct_parallel_for(env, count, GRAIN, join_lists, r);
+    generation old = r->now;
+    r->now = r->next, r->next = old;
+    r->now.count = live;
     ++r->round;
-    return merges;
+    fct_parallel_for(env, live, GRAIN, price_edges, r);
+    return FCT_OK;
 }
 
-/* Live numbers, and links out of the work's edges. */
-static void enter(rounds *r) {
+/* The work's lists become the first generation. */
+static fct_result enter_lists(rounds *r) {
     fct_work *work = r->work;
+    size_t count = work->lists.entry_count;
+    r->now = (generation){.count = work->face_count,
+                          .slots = fct_allocate(work->env, work->face_count, sizeof *r->now.slots),
+                          .starts = work->lists.starts,
+                          .lengths = work->lists.counts,
+                          .others = work->lists.neighbors,
+                          .shared = work->lists.lengths,
+                          .keys = fct_allocate(work->env, count + SLACK, sizeof *r->now.keys)};
+    work->lists = (fct_lists){0};
+    if (!r->now.slots || !r->now.keys) return fct_fail_memory(work->env, "clustering");
+    for (uint32_t s = 0; s < work->face_count; ++s) r->now.slots[s] = s;
+    memset(r->now.keys, 0xFF, (count + SLACK) * sizeof *r->now.keys);
+    return FCT_OK;
+}
+
+/* Lists out of the work's edges. */
+static fct_result enter_edges(rounds *r) {
+    fct_work *work = r->work;
+    generation *now = &r->now;
+    uint32_t live = 0, count = work->face_count - work->merge_count, place = 0;
+    size_t room = 2 * (size_t)work->edge_count;
+    if (room > UINT32_MAX || !allocate_generation(work->env, count, room, now))
+        return fct_fail_memory(work->env, "clustering");
     for (uint32_t s = 0; s < work->face_count; ++s)
         if (work->nodes[s] != FCT_NONE) {
-            r->renumbered[s] = r->live_count;
-            r->slots[r->live_count++] = s;
+            r->renumbered[s] = live;
+            now->slots[live++] = s;
         }
+    now->count = live;
+    memset(now->lengths, 0, (size_t)live * sizeof *now->lengths);
     for (uint32_t e = 0; e < work->edge_count; ++e) {
-        uint32_t a = r->renumbered[work->edges[e].a], b = r->renumbered[work->edges[e].b];
-        r->links[e] = (link){a < b ? a : b, a < b ? b : a, work->edges[e].shared, NAN};
+        ++now->lengths[r->renumbered[work->edges[e].a]];
+        ++now->lengths[r->renumbered[work->edges[e].b]];
     }
-    r->link_count = work->edge_count;
+    for (uint32_t i = 0; i < live; ++i) {
+        now->starts[i] = place;
+        place += now->lengths[i];
+        now->lengths[i] = 0;
+    }
+    for (uint32_t e = 0; e < work->edge_count; ++e)
+        for (int k = 0; k < 2; ++k) {
+            const fct_edge *edge = &work->edges[e];
+            uint32_t a = r->renumbered[k ? edge->b : edge->a], b = r->renumbered[k ? edge->a : edge->b];
+            uint32_t entry = now->starts[a] + now->lengths[a]++;
+            now->others[entry] = b, now->shared[entry] = edge->shared, now->keys[entry] = OPEN;
+        }
+    for (uint32_t i = 0; i < live; ++i) {
+        list l = {now->others + now->starts[i], now->keys + now->starts[i], now->shared + now->starts[i]};
+        if (now->lengths[i] > LONG) sort_list(&l, now->lengths[i]);
+    }
+    fct_release(work->env, work->edges);
+    work->edges = NULL, work->edge_count = 0;
+    return FCT_OK;
+}
+
+static fct_result leave(rounds *r) {
+    fct_work *work = r->work;
+    const generation *now = &r->now;
+    uint32_t count = 0, place = 0;
+    for (uint32_t i = 0; i < now->count; ++i)
+        for (uint32_t k = 0; k < now->lengths[i]; ++k) count += now->others[now->starts[i] + k] > i;
+    work->edges = fct_allocate(work->env, count, sizeof *work->edges);
+    if (!work->edges) return fct_fail_memory(work->env, "clustering");
+    for (uint32_t i = 0; i < now->count; ++i)
+        for (uint32_t entry = now->starts[i]; entry < now->starts[i] + now->lengths[i]; ++entry) {
+            uint32_t other = now->others[entry];
+            if (other > i)
+                work->edges[place++] = (fct_edge){now->slots[i], now->slots[other], now->shared[entry]};
+        }
+    work->edge_count = count;
+    return FCT_OK;
 }
 
 static fct_result run(rounds *r) {
     fct_work *work = r->work;
-    enter(r);
-    fct_parallel_for(work->env, r->link_count, GRAIN, price_all, r);
-    for (uint32_t merges = UINT32_MAX; r->live_count > FEW && merges > r->live_count / 64;) {
-        fct_result result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
+    fct_result result = work->lists.neighbors ? enter_lists(r) : enter_edges(r);
+    if (result != FCT_OK) return result;
+    fct_parallel_for(work->env, r->now.count, GRAIN, price_edges, r);
+    for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
+        result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
+        if (result == FCT_OK) result = one_round(r, &merges);
         if (result != FCT_OK) return result;
-        merges = one_round(r);
     }
-    for (uint32_t e = 0; e < r->link_count; ++e)
-        work->edges[e] = (fct_edge){r->slots[r->links[e].a], r->slots[r->links[e].b], r->links[e].shared};
-    work->edge_count = r->link_count;
-    return FCT_OK;
-}
-
-static bool allocate_rounds(const fct_env *env, rounds *r) {
-    size_t faces = r->work->face_count, edges = r->work->edge_count, chunks = fct_chunk_count(faces, GRAIN);
-    r->slots = fct_allocate(env, faces, sizeof *r->slots);
-    r->next_slots = fct_allocate(env, faces, sizeof *r->next_slots);
-    r->mates = fct_allocate(env, faces, sizeof *r->mates);
-    r->mate_links = fct_allocate(env, faces, sizeof *r->mate_links);
-    r->renumbered = fct_allocate(env, faces, sizeof *r->renumbered);
-    r->best = fct_allocate(env, faces, sizeof *r->best);
-    r->starts = fct_allocate(env, faces + 1, sizeof *r->starts);
-    r->links = fct_allocate(env, edges, sizeof *r->links);
-    r->other = fct_allocate(env, edges, sizeof *r->other);
-    r->kept = fct_allocate(env, chunks + 1, sizeof *r->kept);
-    r->merged = fct_allocate(env, chunks + 1, sizeof *r->merged);
-    return r->slots && r->next_slots && r->mates && r->mate_links && r->renumbered && r->best && r->starts &&
-           r->links && r->other && r->kept && r->merged;
+    return leave(r);
 }
 
 fct_result fct_work_rounds(fct_work *work, bool across) {
     const fct_env *env = work->env;
     fct_result result = FCT_OK;
-    if (work->face_count - work->merge_count > FEW && work->edge_count > 0) {
+    size_t live = work->face_count - work->merge_count, chunks = fct_chunk_count(live, GRAIN);
+    if (live > FEW && (work->lists.neighbors || work->edge_count > 0)) {
         rounds r = {.work = work, .across = across};
-        result = allocate_rounds(env, &r) ? run(&r) : fct_fail_memory(env, "clustering");
-        fct_release(env, r.slots);
-        fct_release(env, r.next_slots);
-        fct_release(env, r.mates);
-        fct_release(env, r.mate_links);
+        r.best = fct_allocate(env, live, sizeof *r.best);
+        r.renumbered = fct_allocate(env, work->face_count, sizeof *r.renumbered);
+        r.kept = fct_allocate(env, chunks, sizeof *r.kept);
+        r.merged = fct_allocate(env, chunks, sizeof *r.merged);
+        r.room = fct_allocate(env, chunks, sizeof *r.room);
+        bool complete = r.best && r.renumbered && r.kept && r.merged && r.room;
+        result = complete ? run(&r) : fct_fail_memory(env, "clustering");
+        release_generation(env, &r.now);
+        release_generation(env, &r.next);
+        fct_release(env, r.best);
         fct_release(env, r.renumbered);
-        fct_release(env, (void *)r.best);
-        fct_release(env, (void *)r.starts);
-        fct_release(env, r.links);
-        fct_release(env, r.other);
         fct_release(env, r.kept);
         fct_release(env, r.merged);
+        fct_release(env, r.room);
     }
     return result == FCT_OK ? fct_work_greedy(work, across) : result;
 }

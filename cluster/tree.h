@@ -8,11 +8,19 @@
 #include "base/file.h"
 #include "cluster/work.h"
 
+/* Inner nodes by id, between ordering and description: what a node's record will hold of other nodes. */
+typedef struct fct_node_links {
+    uint32_t (*children)[2];
+    float *costs;
+    uint32_t *counts, *firsts;
+} fct_node_links;
+
 struct fct_tree {
     const fct_env *env;
     fct_tree_view view;
     /* What view points to and the tree owns; NULL where it points into the mapped file. */
     fct_cluster *clusters;
+    fct_node_links links;
     uint32_t *roots, *face_ids, *vertex_ids, *triangles, *materials;
     float *positions, *colors;
     char **names;
@@ -36,12 +44,15 @@ const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], 
 /* An empty tree that can be destroyed. NULL when memory is out. */
 fct_tree *fct_tree_new(const fct_env *env);
 
-/* Numbers the nodes of a finished clustering, sets children, ranges, costs, roots, depth and face order, and
- * copies the mesh into the tree's order. The work's merges are used up. Errors: MEMORY. */
+/* Numbers the nodes of a finished clustering, sets links, roots, depth and face order, and copies the mesh
+ * into the tree's order. The work is released. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree);
 
-/* Fills area, moments, cone, plane and box of all inner nodes. Errors: MEMORY, CANCELLED. */
+/* Writes the records of all inner nodes; the links are released. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe(fct_tree *tree);
+void fct_node_links_release(const fct_env *env, fct_node_links *links);
+/* A node's links and cost into its record. */
+void fct_node_links_store(const fct_node_links *links, uint32_t id, fct_cluster *out);
 
 /* The attributes of the leaf at a place, but for cost and links. */
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out);

@@ -4,13 +4,13 @@
 #include <string.h>
 
 #include "base/parallel.h"
-#include "base/sort.h"
-#include "facetree/dual.h"
+
+enum { GRAIN = 1 << 13 };
 
 typedef struct face_job {
     fct_work *work;
     const fct_mesh *mesh;
-    const float *perimeters;
+    fct_bounds *bounds; /* per chunk */
 } face_job;
 
 uint32_t fct_height_limit(uint32_t count, bool mild) {
@@ -19,76 +19,91 @@ uint32_t fct_height_limit(uint32_t count, bool mild) {
     return (uint32_t)(mild && gentle < steep ? gentle : steep);
 }
 
+static void bound_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    face_job *job = user;
+    fct_bounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t i = 3 * begin; i < 3 * end; ++i) {
+        const float *p = job->mesh->positions + 3 * (size_t)job->mesh->triangles[i];
+        for (int k = 0; k < 3; ++k) {
+            bounds.lower[k] = p[k] < bounds.lower[k] ? p[k] : bounds.lower[k];
+            bounds.upper[k] = p[k] > bounds.upper[k] ? p[k] : bounds.upper[k];
+        }
+    }
+    job->bounds[chunk] = bounds;
+}
+
+/* Of the vertices that faces use. */
+static fct_result bound_mesh(const fct_env *env, const fct_mesh *mesh, fct_bounds *out) {
+    size_t chunks = fct_chunk_count(mesh->face_count, GRAIN);
+    face_job job = {.mesh = mesh, .bounds = fct_allocate(env, chunks, sizeof *job.bounds)};
+    if (!job.bounds) return fct_fail_memory(env, "clustering");
+    fct_parallel_for(env, mesh->face_count, GRAIN, bound_faces, &job);
+    *out = job.bounds[0];
+    for (size_t i = 1; i < chunks; ++i)
+        for (int k = 0; k < 3; ++k) {
+            if (job.bounds[i].lower[k] < out->lower[k]) out->lower[k] = job.bounds[i].lower[k];
+            if (job.bounds[i].upper[k] > out->upper[k]) out->upper[k] = job.bounds[i].upper[k];
+        }
+    fct_release(env, job.bounds);
+    return FCT_OK;
+}
+
+/* Records, and borders in the unit model. */
 static void make_records(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     face_job *job = user;
     fct_work *work = job->work;
+    const fct_lists *lists = &work->lists;
     for (size_t f = begin; f < end; ++f) {
-        fct_metric_face(&work->metric, job->mesh->positions, job->mesh->triangles + 3 * f, job->perimeters[f],
-                        &work->records[f], work->directions ? &work->directions[f] : NULL);
+        fct_metric_face(&work->metric, job->mesh->positions, job->mesh->triangles + 3 * f,
+                        lists->perimeters[f], &work->records[f],
+                        work->directions ? &work->directions[f] : NULL);
         work->counts[f] = 1;
         work->heights[f] = 0;
         work->nodes[f] = (uint32_t)f;
+        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
+            lists->lengths[i] = (float)((double)lists->lengths[i] * work->metric.scale);
     }
 }
 
-static fct_bounds mesh_bounds(const fct_mesh *mesh) {
-    fct_bounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (size_t i = 0; i < 3 * (size_t)mesh->face_count; ++i) {
-        const float *p = mesh->positions + 3 * (size_t)mesh->triangles[i];
-        for (int k = 0; k < 3; ++k) {
-            if (p[k] < bounds.lower[k]) bounds.lower[k] = p[k];
-            if (p[k] > bounds.upper[k]) bounds.upper[k] = p[k];
-        }
-    }
-    return bounds;
-}
-
-static fct_result take_dual(const fct_env *env, const fct_mesh *mesh, fct_work *work) {
-    fct_dual dual;
-    fct_result result = fct_dual_build(env, mesh, &dual);
-    if (result != FCT_OK) return result;
-    face_job job = {work, mesh, dual.perimeters};
-    fct_parallel_for(env, mesh->face_count, 1 << 14, make_records, &job);
-    work->edge_count = dual.edge_count;
-    work->boundary_edges = dual.boundary_edges, work->nonmanifold_edges = dual.nonmanifold_edges;
-    work->edges = fct_allocate(env, dual.edge_count, sizeof *work->edges);
-    if (work->edges)
-        for (uint32_t e = 0; e < dual.edge_count; ++e)
-            work->edges[e] = (fct_edge){dual.edges[2 * (size_t)e], dual.edges[2 * (size_t)e + 1],
-                                        (float)((double)dual.lengths[e] * work->metric.scale)};
-    else
-        result = fct_fail_memory(env, "clustering");
-    fct_dual_release(env, &dual);
-    return result;
+static fct_result allocate_clusters(fct_work *work, bool directions) {
+    const fct_env *env = work->env;
+    size_t faces = work->face_count;
+    work->records = fct_allocate(env, faces, sizeof *work->records);
+    if (directions) work->directions = fct_allocate(env, faces, sizeof *work->directions);
+    work->counts = fct_allocate(env, faces, sizeof *work->counts);
+    work->heights = fct_allocate(env, faces, sizeof *work->heights);
+    work->nodes = fct_allocate(env, faces, sizeof *work->nodes);
+    work->children = fct_allocate(env, faces, sizeof *work->children);
+    work->costs = fct_allocate(env, faces, sizeof *work->costs);
+    bool complete = work->records && (!directions || work->directions) && work->counts && work->heights &&
+                    work->nodes && work->children && work->costs;
+    return complete ? FCT_OK : fct_fail_memory(env, "clustering");
 }
 
 fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
                                   const fct_tree_def *def, fct_work *out) {
-    uint32_t faces = mesh->face_count;
-    *out = (fct_work){.env = env, .face_count = faces, .materials = mesh->materials};
+    *out = (fct_work){.env = env, .face_count = mesh->face_count, .materials = mesh->materials};
     out->metric = fct_metric_make(def, bounds);
-    out->records = fct_allocate(env, faces, sizeof *out->records);
-    bool directions = def->cost == FCT_COST_MEAN;
-    if (directions) out->directions = fct_allocate(env, faces, sizeof *out->directions);
-    out->counts = fct_allocate(env, faces, sizeof *out->counts);
-    out->heights = fct_allocate(env, faces, sizeof *out->heights);
-    out->nodes = fct_allocate(env, faces, sizeof *out->nodes);
-    out->children = fct_allocate(env, faces, sizeof *out->children);
-    out->costs = fct_allocate(env, faces, sizeof *out->costs);
-    fct_result result;
-    if (!out->records || (directions && !out->directions) || !out->counts || !out->heights || !out->nodes ||
-        !out->children || !out->costs)
-        result = fct_fail_memory(env, "clustering");
-    else
-        result = take_dual(env, mesh, out);
-    if (result != FCT_OK) fct_work_release(out);
-    return result;
+    fct_result result = fct_lists_build(env, mesh, &out->lists);
+    if (result == FCT_OK) result = allocate_clusters(out, def->cost == FCT_COST_MEAN);
+    if (result != FCT_OK) {
+        fct_work_release(out);
+        return result;
+    }
+    out->boundary_edges = out->lists.boundary_edges, out->nonmanifold_edges = out->lists.nonmanifold_edges;
+    face_job job = {.work = out, .mesh = mesh};
+    fct_parallel_for(env, mesh->face_count, GRAIN, make_records, &job);
+    fct_release(env, out->lists.perimeters);
+    out->lists.perimeters = NULL;
+    return FCT_OK;
 }
 
 fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out) {
-    fct_bounds bounds = mesh_bounds(mesh);
-    return fct_work_create_within(env, mesh, &bounds, def, out);
+    fct_bounds bounds;
+    fct_result result = bound_mesh(env, mesh, &bounds);
+    return result == FCT_OK ? fct_work_create_within(env, mesh, &bounds, def, out) : result;
 }
 
 void fct_work_release(fct_work *work) {
@@ -100,14 +115,9 @@ void fct_work_release(fct_work *work) {
     fct_release(work->env, work->children);
     fct_release(work->env, work->costs);
     fct_release(work->env, work->edges);
+    fct_lists_release(work->env, &work->lists);
     const fct_env *env = work->env;
     *work = (fct_work){.env = env};
-}
-
-float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared) {
-    return fct_metric_cost(&work->metric, &work->records[a], &work->records[b], shared,
-                           work->directions ? &work->directions[a] : NULL,
-                           work->directions ? &work->directions[b] : NULL);
 }
 
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
@@ -115,20 +125,38 @@ bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
     return taller < 8 || taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b], !work->steep);
 }
 
-void fct_work_merge_as(fct_work *work, uint32_t merge, uint32_t a, uint32_t b, float shared, float cost) {
-    work->children[merge][0] = work->nodes[a];
-    work->children[merge][1] = work->nodes[b];
-    work->costs[merge] = cost;
-    fct_metric_merge(&work->metric, &work->records[a], &work->records[b], shared,
-                     work->directions ? &work->directions[a] : NULL,
-                     work->directions ? &work->directions[b] : NULL);
-    work->counts[a] += work->counts[b];
-    uint8_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
-    work->heights[a] = (uint8_t)(taller + 1);
-    work->nodes[a] = work->face_count + merge;
-    work->nodes[b] = FCT_NONE;
+void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
+                     uint32_t count) {
+    for (uint32_t i = 0; i < count; ++i, ++merge) {
+        uint32_t a = pairs[i].a, b = pairs[i].b;
+        work->children[merge][0] = work->nodes[a];
+        work->children[merge][1] = work->nodes[b];
+        work->costs[merge] = costs[i];
+        work->counts[a] += work->counts[b];
+        uint8_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
+        work->heights[a] = (uint8_t)(taller + 1);
+        work->nodes[a] = work->face_count + merge;
+        work->nodes[b] = FCT_NONE;
+    }
+    fct_metric_merges(&work->metric, work->records, work->directions, pairs, count);
 }
 
 void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost) {
-    fct_work_merge_as(work, work->merge_count++, a, b, shared, cost);
+    fct_work_merges(work, work->merge_count++, &(fct_pair){a, b, shared}, &cost, 1);
+}
+
+fct_result fct_work_list_edges(fct_work *work) {
+    const fct_lists *lists = &work->lists;
+    if (!lists->neighbors) return FCT_OK;
+    uint32_t count = 0;
+    for (uint32_t f = 0; f < work->face_count; ++f)
+        for (uint32_t i = 0; i < lists->counts[f]; ++i) count += lists->neighbors[lists->starts[f] + i] > f;
+    work->edges = fct_allocate(work->env, count, sizeof *work->edges);
+    if (!work->edges) return fct_fail_memory(work->env, "clustering");
+    for (uint32_t f = 0; f < work->face_count; ++f)
+        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
+            if (lists->neighbors[i] > f)
+                work->edges[work->edge_count++] = (fct_edge){f, lists->neighbors[i], lists->lengths[i]};
+    fct_lists_release(work->env, &work->lists);
+    return FCT_OK;
 }

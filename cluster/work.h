@@ -8,11 +8,9 @@
 
 #include "base/env.h"
 #include "cluster/metric.h"
+#include "dual/lists.h"
 
-typedef struct fct_edge {
-    uint32_t a, b; /* slots */
-    float shared;  /* border, unit model */
-} fct_edge;
+typedef fct_pair fct_edge; /* a, b: slots */
 
 typedef struct fct_work {
     const fct_env *env;
@@ -37,7 +35,8 @@ typedef struct fct_work {
     float *costs;
     uint32_t merge_count;
     uint32_t phase_ends[3]; /* merges within materials, across materials, without a shared edge */
-    /* live edges */
+    /* live edges, in the unit model: before the first contraction as lists by face, afterwards once each */
+    fct_lists lists;
     fct_edge *edges;
     uint32_t edge_count;
     uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
@@ -55,14 +54,26 @@ fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, cons
                                   const fct_tree_def *def, fct_work *out);
 void fct_work_release(fct_work *work);
 
-/* Cost of merging the clusters of two slots. */
-float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared);
+/* Costs of merging count <= FCT_LANES pairs of slots. */
+static inline void fct_work_costs(const fct_work *work, const fct_pair *pairs, uint32_t count, float *costs) {
+    fct_metric_costs(&work->metric, work->records, work->directions, pairs, count, costs);
+}
+static inline float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared) {
+    float cost;
+    fct_work_costs(work, &(fct_pair){a, b, shared}, 1, &cost);
+    return cost;
+}
 /* Whether the union keeps the height limit. */
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
 /* Notes the merge; slot a holds the union, slot b dies. */
 void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost);
-/* The same as merge number `merge`, for merges of disjoint pairs on several threads; the caller counts. */
-void fct_work_merge_as(fct_work *work, uint32_t merge, uint32_t a, uint32_t b, float shared, float cost);
+/* The same for count <= FCT_LANES pairs with no slot in common, which become merges `merge` and on, on
+ * several threads; the caller counts. */
+void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
+                     uint32_t count);
+
+/* Turns the lists into edges, if there are lists. Errors: MEMORY. */
+fct_result fct_work_list_edges(fct_work *work);
 
 /* Contracts along live edges, cheapest first, until no allowed one is left; with `across` false only between
  * clusters of one material. Leaves the edges that remain. Errors: MEMORY, CANCELLED. */

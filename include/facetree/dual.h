@@ -27,7 +27,8 @@ typedef struct fct_dual {
     uint32_t nonmanifold_edges; /* mesh edges with three or more faces */
 } fct_dual;
 
-/* O(F log F) by sorting sides; parallel; same bits for every thread count. Errors: MEMORY, CANCELLED. */
+/* O(F), and O(v log v) at a vertex of valence v; parallel; same bits for every thread count. Errors: MEMORY,
+ * CANCELLED. */
 FCT_API fct_result fct_dual_build(const fct_env *env, const fct_mesh *mesh, fct_dual *out);
 FCT_API void fct_dual_release(const fct_env *env, fct_dual *dual);
 
