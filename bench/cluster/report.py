@@ -187,7 +187,28 @@ def table_growth(runs):
     table("Growth of the time per face against the smallest of its kind", "", ["mesh", "faces", "rounds T1", "T2", "meshlets"], rows)
 
 
-def read_boxes(path):
+def table_large(found):
+    builds = [[r["mesh"], r["faces"], r["how"], r["code"], show(float(r["seconds"]), "{:.1f}"), show(float(r["resident_bytes"]) / 1e6, "{:.0f}"),
+               show(float(r["resident_bytes"]) / float(r["faces"] or "nan"), "{:.0f}"), r["depth"]] for r in found if not r["clusters"]]
+    table("Out of core: whole commands, files read and written", "", ["mesh", "faces", "how", "exit code", "seconds", "peak MB", "bytes/face", "depth"], builds)
+    rows = []
+    for r in found:
+        other = [o for o in found if o["clusters"] and r["how"] == "parts" and o["how"] == "memory" and (o["mesh"], o["clusters"]) == (r["mesh"], r["clusters"])]
+        for o in other:
+            rows.append([r["mesh"], r["clusters"]] + [show(seam(r, o, k), "{:.3f}") for k in SEAM_FIGURES])
+    if rows:
+        table("Quality of a tree made in parts over that of the tree made in memory; the goal is at most 1.05", "",
+              ["mesh", "clusters", "fit", "direction", "irregularity", "L2,1", "boxes"], rows)
+
+
+SEAM_FIGURES = ["mean_fit", "mean_direction", "mean_irregularity", "mean_normal_deviation", "box_area"]
+
+
+def seam(parts, memory, key):
+    return over(float(parts[key]), float(memory[key])) if parts.get(key) and memory.get(key) else None
+
+
+def read_rows(path):
     if not os.path.exists(path):
         return []
     with open(path, newline="") as file:
@@ -278,7 +299,7 @@ def worst(pairs):
     return max(pairs) if pairs else (None, "-")
 
 
-def goals(runs, hard, boxes):
+def goals(runs, hard, large):
     g = Goals()
     peer = runs.get("bunny-x16", "meshlets") if "bunny-x16" in runs.faces else None
     for threads, mixkit, rate in ((1, 30, 2), (2, 55, 3.5)):
@@ -307,6 +328,14 @@ def goals(runs, hard, boxes):
         if not m.startswith("sphere-"):
             ratio = max((growth(hard, m, smooth_of(m), t) or 0 for t in (1, 2)), default=None)
             g.most(f"time per face over a smooth mesh's, {m}", ratio or None, 2)
+    for r in large:
+        if r["mesh"] == "terrain-100m" and r["how"] == "4G":
+            g.most("gigabytes for 100 million under --max-memory 4G", float(r["resident_bytes"]) / 1e9 if r["code"] == "0" else None, 4.295)
+    seams = [(seam(r, o, k), f"{r['mesh']}, {k}, {r['clusters']} clusters") for r in large for o in large for k in SEAM_FIGURES
+             if r["how"] == "parts" and o["how"] == "memory" and r["clusters"] and (r["mesh"], r["clusters"]) == (o["mesh"], o["clusters"])]
+    if seams:
+        value, where = worst(seams)
+        g.most(f"quality in parts over that in memory, worst ({where})", value, 1.05)
     g.print()
 
 
@@ -346,7 +375,7 @@ def chart(runs, out):
 def main():
     out = sys.argv[1]
     runs, hard = Runs(os.path.join(out, "time.csv")), Runs(os.path.join(out, "adversarial.csv"))
-    boxes = read_boxes(os.path.join(out, "boxes.csv"))
+    boxes = read_rows(os.path.join(out, "boxes.csv"))
     if os.path.exists(os.path.join(out, "machine.json")):
         with open(os.path.join(out, "machine.json")) as file:
             machine = json.load(file)
@@ -362,8 +391,11 @@ def main():
     if boxes:
         table_boxes(boxes)
         table_yardsticks(boxes)
-    goals(runs, hard, boxes)
-    print(f"\nIn {out}: time.csv, adversarial.csv, boxes.csv, time-per-face.svg, report.txt")
+    large = read_rows(os.path.join(out, "large.csv"))
+    if large:
+        table_large(large)
+    goals(runs, hard, large)
+    print(f"\nIn {out}: CSV files, time-per-face.svg, report.txt")
 
 
 if __name__ == "__main__":
