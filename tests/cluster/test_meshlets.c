@@ -81,7 +81,8 @@ static void check_boxes(const fct_mesh *mesh, const fct_meshlets *m) {
         }
         assert_true((double)b->radius <= widest * (1 + 1e-6));
         /* no larger than the box of the world's axes, but for the rounding of its center */
-        assert_true(own <= least * (1 + 1e-5) + 4e-6 * widest * (widest + v3_norm(v3_load(b->box.center))));
+        assert_true(own <=
+                    least * (1 + 1e-5) + 4e-6 * widest * (widest + v3_norm(v3_load(b->box.center))) + 1e-20);
     }
 }
 
