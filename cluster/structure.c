@@ -176,6 +176,7 @@ fct_result fct_tree_check(const fct_env *env, const fct_tree *tree) {
     if (!atomic_load_explicit(&tree->unchecked, memory_order_acquire)) return FCT_OK;
     fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_WHOLE);
     fct_result result = fct_tree_check_structure(env, tree);
+    fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_USUAL);
     /* Trees are made by fct_tree_new alone, so that none is const from its birth. */
     if (result == FCT_OK) atomic_store_explicit(&((fct_tree *)tree)->unchecked, false, memory_order_release);
     return result;

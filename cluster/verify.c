@@ -196,6 +196,7 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
 fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree) {
     fct_result result = fct_tree_check_sums(env, tree);
     if (result == FCT_OK) result = fct_tree_check_structure(env, tree);
+    fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_USUAL);
     if (result == FCT_OK) result = check_counts(env, tree);
     return result == FCT_OK ? check_geometry(env, tree) : result;
 }
