@@ -136,7 +136,7 @@ static void every_face_once_within_limits_and_bounds(void **state) {
             fct_meshlets m = meshlets_of(&env, &mesh, &def);
             check_layout(&mesh, &def, &m);
             check_boxes(&mesh, &m);
-            check_cones(&mesh, &m, 40);
+            check_cones(&mesh, &m, SANITIZED ? 4 : 40);
             fct_meshlets_release(&env, &m);
             fct_mesh_release(&env, &mesh);
         }
@@ -226,7 +226,7 @@ static void the_smallest_ball(void **state) {
     uint32_t random = 5;
     v3 points[64], center;
     double radius;
-    for (int run = 0; run < 300; ++run) {
+    for (int run = 0; run < (SANITIZED ? 30 : 300); ++run) {
         uint32_t count = 1 + (uint32_t)(9 * shape_random(&random));
         for (uint32_t i = 0; i < count; ++i) {
             points[i] = (v3){shape_random(&random), shape_random(&random), shape_random(&random)};
