@@ -135,6 +135,7 @@ static bool keeps_angle(const merger *m, uint32_t small, uint32_t large, double 
     double limit = m->charter->def.max_angle;
     v3 axis = v3_add(a->vector, b->vector);
     *cone = fmax(a->cone + fct_angle(a->vector, axis), b->cone + fct_angle(b->vector, axis));
+    if (limit >= FCT_HALF_TURN) return true;
     if (v3_norm2(axis) > 0 ? *cone <= limit : a->area + b->area == 0) return true;
     if (!(v3_norm2(axis) > 0) || b->faces > STREAM + 16 * a->faces) return false;
     *cone = widest_angle(m, small, axis, limit);
