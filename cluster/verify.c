@@ -140,11 +140,12 @@ static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
         add_face(view, place, &f, cone, &t);
     const char *fault = box_fault(c, &box, &t, diagonal);
     if (fault) return fault;
+    fault = sums_fault(c, &t);
+    if (fault) return fault;
     if (!(c->cone_angle >= 0 && c->cone_angle < 3.1416F)) return "a cone of no angle";
     if (v3_norm2(cone) > 0 && acos(fmax(t.narrowest, -1)) > (double)c->cone_angle + 1e-7)
         return "a face outside its cone of normals";
-    fault = sums_fault(c, &t);
-    return fault ? fault : plane_fault(c, &box, &t, diagonal);
+    return plane_fault(c, &box, &t, diagonal);
 }
 
 static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
