@@ -97,7 +97,7 @@ static void what_is_no_distance_is_refused(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-static void same_for_every_thread_count(void **state) {
+static void a_wide_cut_is_the_same_for_every_thread_count(void **state) {
     (void)state;
     fct_env env = fct_env_default();
     fct_mesh mesh = make_sphere(&env, SANITIZED ? 60 : 120);
@@ -142,9 +142,10 @@ static void survives_no_memory(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_coarsest_cut_within_a_distance), cmocka_unit_test(the_limit_itself_is_within),
-        cmocka_unit_test(what_is_no_distance_is_refused), cmocka_unit_test(same_for_every_thread_count),
-        cmocka_unit_test(survives_no_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_coarsest_cut_within_a_distance),
+                                       cmocka_unit_test(the_limit_itself_is_within),
+                                       cmocka_unit_test(what_is_no_distance_is_refused),
+                                       cmocka_unit_test(a_wide_cut_is_the_same_for_every_thread_count),
+                                       cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
