@@ -67,8 +67,8 @@ static const struct argp_option options_table[] = {
     {"keep-cuts", KEY_KEEP_CUTS, NULL, 0, "With --charts: clusters of the tree, without merging neighbours",
      0},
     {"adjacency", KEY_ADJACENCY, "FILE", 0, "Write neighbours to FILE: A B LENGTH EDGES a line, A < B", 0},
-    {"refine", KEY_REFINE, "N", 0, "Let faces on borders change sides, in at most N sweeps (4 are plenty)",
-     0},
+    {"refine", KEY_REFINE, "N", 0,
+     "Let what is on borders change sides, in at most N sweeps a cut (4 are plenty)", 0},
     {"perimeter", KEY_PERIMETER, "W", 0, "With --refine: weight of short borders (default 0.1)", 0},
     {"irregularity", KEY_IRREGULARITY, "R", 0,
      "With --refine: irregularity may grow to R times its start, or inf (default 1)", 0},
@@ -193,16 +193,16 @@ static void say_quality(tool *t, const char *what, const fct_partition_quality *
 }
 
 /* Refines the labels, and measures them before and after with the same ruler. */
-static int refine(tool *t, const fct_tree *tree, const fct_refine_def *def, uint32_t *labels, uint32_t count,
-                  refinement *out) {
+static int refine(tool *t, const fct_refine_def *def, partition *p, refinement *out) {
     fct_mesh mesh;
-    int code = tool_result(t, fct_tree_mesh(&t->env, tree, &mesh));
+    int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
     if (code != TOOL_DONE) return code;
-    code = tool_result(t, fct_labels_quality(&t->env, &mesh, labels, count, &out->before));
+    code = tool_result(t, fct_labels_quality(&t->env, &mesh, p->labels, p->count, &out->before));
     if (code == TOOL_DONE)
-        code = tool_result(t, fct_partition_refine(&t->env, &mesh, count, def, labels, &out->stats));
+        code = tool_result(
+            t, fct_tree_refine(&t->env, p->tree, p->nodes, p->count, def, p->labels, &out->stats));
     if (code == TOOL_DONE)
-        code = tool_result(t, fct_labels_quality(&t->env, &mesh, labels, count, &out->after));
+        code = tool_result(t, fct_labels_quality(&t->env, &mesh, p->labels, p->count, &out->after));
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -316,8 +316,7 @@ static int run(tool *t, void *options) {
     int code = check_options(t, o);
     if (code == TOOL_DONE) code = tool_open_tree(t, t->inputs[0], NULL, &p.tree);
     if (code == TOOL_DONE) code = make_partition(t, o, &p);
-    if (code == TOOL_DONE && o->refine.sweep_count > 0)
-        code = refine(t, p.tree, &o->refine, p.labels, p.count, &p.refined);
+    if (code == TOOL_DONE && o->refine.sweep_count > 0) code = refine(t, &o->refine, &p, &p.refined);
     if (code == TOOL_DONE) code = tool_save_labels(t, t->output, p.tree, p.labels, p.count);
     if (code == TOOL_DONE && o->adjacency) code = write_adjacency(t, o->adjacency, &p);
     if (code == TOOL_DONE) code = report(t, o, &p);
@@ -350,10 +349,15 @@ int tool_partition(int argc, char **argv) {
             "--adjacency writes the pairs of clusters that share edges of the mesh, with the length of their "
             "common border and the number of its edges; where three faces or more meet at an edge, each face "
             "is a neighbour of the next one only, over half its length.\n\n"
-            "--refine starts from that cut and lets faces on the borders between clusters change sides, the "
-            "most gainful first, so that the squared deviation of normals falls and borders stay short. "
-            "Clusters stay in one piece and keep at least a face; a face follows only neighbours of its own "
-            "material. The result is no longer a cut of the tree.\n\n"
+            "--refine starts from that cut and lets what lies on the borders between clusters change sides, "
+            "the "
+            "most gainful first, so that the squared deviation of normals falls and borders stay short: "
+            "first "
+            "the clusters of finer cuts, then faces, in at most N sweeps each. Clusters stay in one piece "
+            "and "
+            "keep at least a face; a face follows only neighbours of its own material. The result is no "
+            "longer "
+            "a cut of the tree.\n\n"
             "JSON keys: clusters, mean_fit, mean_direction, mean_irregularity, mean_normal_deviation, "
             "box_area, connected; with --refine those of the refined clusters, and sweeps, moves, "
             "seconds{dual,refine} and before{...}, the same keys for the cut; with --max-distance "

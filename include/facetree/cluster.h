@@ -162,16 +162,16 @@ FCT_API fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, c
 typedef struct fct_refine_def {
     uint32_t size;
     uint32_t sweep_count;      /* at most this many; it ends when no face moves; default 4 */
-    double perimeter_weight;   /* of (sum of squared perimeters) beside the deviation of normals, both over
-                                  their   start; 0 to 1e6, default .1 */
+    double perimeter_weight;   /* of the sum of squared perimeters beside the deviation of normals, each over
+                                  what it is at the start; 0 to 1e6, default .1 */
     double irregularity_limit; /* mean irregularity may reach this multiple of its start; at least 1, INFINITY
                                   for no limit; default 1 */
 } fct_refine_def;
 FCT_API fct_refine_def fct_refine_def_default(void);
 
 typedef struct fct_refine_stats {
-    uint32_t sweeps; /* done */
-    uint64_t moves;  /* faces that changed sides */
+    uint32_t sweeps; /* done, over all cuts */
+    uint64_t moves;  /* faces, or clusters of finer cuts, that changed sides */
     double seconds_dual, seconds_sweeps;
 } fct_refine_stats;
 
@@ -184,6 +184,14 @@ typedef struct fct_refine_stats {
  * CANCELLED. */
 FCT_API fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32_t count,
                                         const fct_refine_def *def, uint32_t *labels, fct_refine_stats *stats);
+
+/* The same from the cut of the tree that `nodes` are, and better: clusters of finer cuts change sides before
+ * faces do, with so many sweeps each. labels receives the refined cluster of each input face (0..count-1, in
+ * the order of `nodes`), face_count entries, untouched on failure. Errors: DATA (a damaged file, an option
+ * out of range), MEMORY, CANCELLED. */
+FCT_API fct_result fct_tree_refine(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
+                                   uint32_t count, const fct_refine_def *def, uint32_t *labels,
+                                   fct_refine_stats *stats);
 
 /* Writes the hierarchy file, docs/hierarchy-file.md: temporary file, fsync, rename. Errors: OUTPUT, MEMORY,
  * CANCELLED; DATA for a damaged tree. */

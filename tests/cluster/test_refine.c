@@ -63,24 +63,29 @@ static account account_of(const fct_mesh *mesh, const uint32_t *labels, uint32_t
     return out;
 }
 
-/* Refines, and checks what is promised for every mesh. Returns the deviation's fall as a share of it. */
+/* What is promised for every mesh. Returns the deviation's fall as a share of it. */
+static double check_refined(const fct_mesh *mesh, const account *before, const uint32_t *labels,
+                            uint32_t count, const fct_refine_def *def) {
+    fct_refine_def used = def ? *def : fct_refine_def_default();
+    account after = account_of(mesh, labels, count);
+    assert_int_equal(after.filled, before->filled);
+    assert_true(after.pieces <= before->pieces);
+    if (used.irregularity_limit < INFINITY)
+        assert_true(after.squares <= before->squares * used.irregularity_limit * (1 + 1e-9) + 1e-30);
+    double weight = used.perimeter_weight * before->deviation / before->squares;
+    if (before->deviation > 1e-5 * before->area)
+        assert_true(after.deviation + weight * after.squares <=
+                    (before->deviation + weight * before->squares) * (1 + 1e-9));
+    return 1 - after.deviation / before->deviation;
+}
+
 static double refine(const fct_mesh *mesh, uint32_t *labels, uint32_t count, const fct_refine_def *def) {
     fct_env env = fct_env_default();
     fct_refine_stats stats;
     account before = account_of(mesh, labels, count);
     assert_int_equal(fct_partition_refine(&env, mesh, count, def, labels, &stats), FCT_OK);
-    account after = account_of(mesh, labels, count);
-    assert_int_equal(after.filled, before.filled);
-    assert_true(after.pieces <= before.pieces);
-    if (!def || def->irregularity_limit < INFINITY)
-        assert_true(after.squares <=
-                    before.squares * (def ? def->irregularity_limit : 1) * (1 + 1e-9) + 1e-30);
-    double weight = (def ? def->perimeter_weight : 0.1) * before.deviation / before.squares;
-    if (before.deviation > 1e-5 * before.area)
-        assert_true(after.deviation + weight * after.squares <=
-                    (before.deviation + weight * before.squares) * (1 + 1e-9));
     assert_true(stats.sweeps <= (def ? def->sweep_count : 4));
-    return 1 - after.deviation / before.deviation;
+    return check_refined(mesh, &before, labels, count, def);
 }
 
 static void fill_labels(const fct_mesh *mesh, uint32_t count, uint32_t *labels) {
@@ -92,6 +97,23 @@ static void fill_labels(const fct_mesh *mesh, uint32_t count, uint32_t *labels) 
     assert_int_equal(fct_tree_labels(&env, tree, nodes, count, labels), FCT_OK);
     free(nodes);
     fct_tree_destroy(tree);
+}
+
+/* From the cut of the mesh's tree; labels receives the result. */
+static double refine_tree(const fct_mesh *mesh, uint32_t count, const fct_refine_def *def, uint32_t *labels) {
+    fct_env env = fct_env_default();
+    fct_tree *tree;
+    fct_refine_stats stats;
+    assert_int_equal(fct_tree_build(&env, mesh, NULL, NULL, &tree), FCT_OK);
+    uint32_t *nodes = malloc(4 * (size_t)count);
+    assert_int_equal(cut_tree(tree, count, nodes), count);
+    assert_int_equal(fct_tree_labels(&env, tree, nodes, count, labels), FCT_OK);
+    account before = account_of(mesh, labels, count);
+    assert_int_equal(fct_tree_refine(&env, tree, nodes, count, def, labels, &stats), FCT_OK);
+    assert_true(stats.sweeps >= 1);
+    free(nodes);
+    fct_tree_destroy(tree);
+    return check_refined(mesh, &before, labels, count, def);
 }
 
 /* Two flat halves that meet in a right angle at x = 1/2, with the border of the labels one column beside the
@@ -266,6 +288,69 @@ static void odd_meshes(void **state) {
     }
 }
 
+/* On a fine sphere with few clusters single faces hardly get anywhere, clusters of finer cuts do. */
+static void finer_cuts_move_first(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_sphere(&env, 90);
+    uint32_t *labels = malloc(4 * (size_t)mesh.face_count);
+    fill_labels(&mesh, 30, labels);
+    double fine = refine(&mesh, labels, 30, NULL), both = refine_tree(&mesh, 30, NULL, labels);
+    assert_true(both > 2 * fine && both > 0.05);
+    for (uint32_t k = 1; k <= mesh.face_count; k = 5 * k + 1) refine_tree(&mesh, k, NULL, labels);
+    refine_tree(&mesh, mesh.face_count, NULL, labels);
+    free(labels);
+    fct_mesh_release(&env, &mesh);
+}
+
+static bool is_mixed(const uint32_t *labels, const uint32_t *materials, uint32_t faces, uint32_t label) {
+    bool seen[2] = {false, false};
+    for (uint32_t f = 0; f < faces; ++f)
+        if (labels[f] == label) seen[materials[f]] = true;
+    return seen[0] && seen[1];
+}
+
+/* Crumpled and torn paper: parts, edges of three and more faces where sheets are sewn together, two materials
+ * by halves. Cuts of few clusters hold several parts at once. */
+static void torn_and_sewn_sheets(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    uint32_t seed = 11;
+    for (uint32_t round = 0; round < 24; ++round) {
+        fct_mesh grid = make_grid(&env, 14), mesh;
+        uint32_t *kept = malloc(4 * (size_t)grid.face_count), count = 0;
+        uint32_t *labels = malloc(4 * (size_t)grid.face_count);
+        for (uint32_t f = 0; f < grid.face_count; ++f)
+            if (next(&seed) % 16 >= round % 8) kept[count++] = f;
+        assert_int_equal(fct_mesh_extract(&env, &grid, kept, count, &mesh, NULL), FCT_OK);
+        for (uint32_t v = 0; v < mesh.vertex_count; ++v)
+            mesh.positions[3 * v + 2] = (float)(next(&seed) % 100) * 0.002f;
+        for (uint32_t i = 0; i < 3 * round; ++i) /* sew */
+            mesh.triangles[next(&seed) % (3 * count)] = next(&seed) % mesh.vertex_count;
+        fct_refine_def def = fct_refine_def_default();
+        if (round % 3 == 0) def.perimeter_weight = 0, def.irregularity_limit = INFINITY;
+        uint32_t *materials = malloc(4 * (size_t)count);
+        for (uint32_t f = 0; f < count; ++f) materials[f] = kept[f] < grid.face_count / 2;
+        for (uint32_t k = 1; k < count; k = 3 * k + 2) {
+            refine_tree(&mesh, k, &def, labels);
+            if (k < 12) continue;
+            mesh.materials = materials, mesh.material_count = 2;
+            uint32_t mixed_before = 0, mixed = 0;
+            fill_labels(&mesh, k, labels);
+            for (uint32_t i = 0; i < k; ++i) mixed_before += is_mixed(labels, materials, count, i);
+            refine_tree(&mesh, k, &def, labels);
+            for (uint32_t i = 0; i < k; ++i) mixed += is_mixed(labels, materials, count, i);
+            assert_true(mixed <= mixed_before);
+            mesh.materials = NULL, mesh.material_count = 0;
+        }
+        free(materials);
+        free(labels);
+        free(kept);
+        fct_mesh_release(&env, &mesh);
+        fct_mesh_release(&env, &grid);
+    }
+}
+
 static void same_for_every_thread_count(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -289,6 +374,17 @@ static void same_for_every_thread_count(void **state) {
         assert_memory_equal(&a, &b, offsetof(fct_partition_quality, connected));
         assert_int_equal(a.connected, b.connected);
     }
+    fct_tree *tree;
+    assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+    uint32_t nodes[60];
+    assert_int_equal(cut_tree(tree, 60, nodes), 60);
+    for (uint32_t threads = 1; threads < 5; ++threads) {
+        env.thread_count = threads;
+        uint32_t *out = threads == 1 ? one : more;
+        assert_int_equal(fct_tree_refine(&env, tree, nodes, 60, NULL, out, NULL), FCT_OK);
+        assert_memory_equal(one, out, bytes);
+    }
+    fct_tree_destroy(tree);
     free(start);
     free(one);
     free(more);
@@ -315,6 +411,13 @@ static void bad_options_and_labels(void **state) {
         def = good, def.irregularity_limit = limits[i];
         assert_int_equal(fct_partition_refine(&env, &mesh, 3, &def, labels, NULL), FCT_ERROR_DATA);
     }
+    fct_tree *tree;
+    uint32_t node = 0;
+    assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+    def = good, def.perimeter_weight = -1;
+    assert_int_equal(fct_tree_refine(&env, tree, &node, 1, &def, labels, NULL), FCT_ERROR_DATA);
+    assert_int_equal(labels[7], 2);
+    fct_tree_destroy(tree);
     def = good, def.size = 4;
     assert_int_equal(fct_partition_refine(&env, &mesh, 3, &def, labels, NULL), FCT_ERROR_DATA);
     mesh.positions[5] = NAN;
@@ -358,6 +461,33 @@ static void failures_leave_the_labels(void **state) {
         assert_true(nth > 2 ? measured == FCT_OK : measured == FCT_ERROR_MEMORY);
         assert_int_equal(r.alive, 0);
     }
+    fct_tree *tree;
+    assert_int_equal(fct_tree_build(&plain, &mesh, NULL, NULL, &tree), FCT_OK);
+    uint32_t nodes[12];
+    assert_int_equal(cut_tree(tree, 12, nodes), 12);
+    result = FCT_ERROR_MEMORY;
+    for (long nth = 1; result != FCT_OK; ++nth) {
+        recorder r = {.fail_at = nth};
+        fct_env env = recorder_env(&r);
+        memcpy(labels, start, 4 * (size_t)mesh.face_count);
+        result = fct_tree_refine(&env, tree, nodes, 12, NULL, labels, NULL);
+        assert_true(result == FCT_OK || result == FCT_ERROR_MEMORY);
+        assert_true(result == FCT_OK ? nth > 30 : r.text[0] != 0);
+        if (result != FCT_OK) assert_memory_equal(labels, start, 4 * (size_t)mesh.face_count);
+        assert_int_equal(r.alive, 0);
+    }
+    result = FCT_ERROR_CANCELLED;
+    for (long calls = 1; result != FCT_OK; ++calls) {
+        long left = calls;
+        fct_env env = fct_env_default();
+        env.progress = cancel;
+        env.progress_user = &left;
+        memcpy(labels, start, 4 * (size_t)mesh.face_count);
+        result = fct_tree_refine(&env, tree, nodes, 12, NULL, labels, NULL);
+        assert_true(result == FCT_OK ? calls > 5 : result == FCT_ERROR_CANCELLED);
+        if (result != FCT_OK) assert_memory_equal(labels, start, 4 * (size_t)mesh.face_count);
+    }
+    fct_tree_destroy(tree);
     result = FCT_ERROR_CANCELLED;
     for (long calls = 1; result != FCT_OK; ++calls) {
         long left = calls;
@@ -415,8 +545,9 @@ static void real_meshes(void **state) {
     const struct {
         const char *name;
         uint32_t count;
-        double fall;
-    } models[] = {{"stanford-bunny", 1000, 0.10}, {"cow", 50, 0.12}, {"fandisk", 1000, 0.25}};
+        double fall, tree_fall;
+    } models[] = {
+        {"stanford-bunny", 1000, 0.10, 0.12}, {"cow", 50, 0.12, 0.18}, {"fandisk", 1000, 0.25, 0.25}};
     for (size_t i = 0; i < sizeof models / sizeof *models; ++i) {
         char path[512];
         snprintf(path, sizeof path, "%s/%s.obj", FACETREE_DATA, models[i].name);
@@ -427,6 +558,7 @@ static void real_meshes(void **state) {
         uint32_t *labels = malloc(4 * (size_t)mesh.face_count);
         fill_labels(&mesh, models[i].count, labels);
         assert_true(refine(&mesh, labels, models[i].count, NULL) >= models[i].fall);
+        assert_true(refine_tree(&mesh, models[i].count, NULL, labels) >= models[i].tree_fall);
         free(labels);
         fct_mesh_release(&env, &mesh);
     }
@@ -439,6 +571,8 @@ int main(void) {
                                        cmocka_unit_test(clusters_stay_in_one_piece),
                                        cmocka_unit_test(rings_may_be_opened),
                                        cmocka_unit_test(odd_meshes),
+                                       cmocka_unit_test(finer_cuts_move_first),
+                                       cmocka_unit_test(torn_and_sewn_sheets),
                                        cmocka_unit_test(same_for_every_thread_count),
                                        cmocka_unit_test(bad_options_and_labels),
                                        cmocka_unit_test(failures_leave_the_labels),
