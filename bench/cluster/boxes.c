@@ -14,9 +14,9 @@
 #include "bench/cluster/bench.h"
 #include "bench/cluster/boxtree.h"
 
-enum { TREES = 4, QUERIES = 4, GRID = 160, RAYS = 20000, POSES = 150, MOST_REPEATS = 25 };
+enum { TREES = 5, CUT = 4096, QUERIES = 4, GRID = 160, RAYS = 20000, POSES = 150, MOST_REPEATS = 25 };
 
-static const char *const tree_names[TREES] = {"rounds", "greedy", "obbtree", "aligned"};
+static const char *const tree_names[TREES] = {"rounds", "greedy", "regrouped", "obbtree", "aligned"};
 static const char *const query_names[QUERIES] = {"primary", "incoherent", "touching", "apart"};
 
 typedef struct ray {
@@ -36,16 +36,32 @@ typedef struct figure {
     size_t found;
 } figure;
 
-static void take_ours(const fct_env *env, const fct_mesh *mesh, fct_cluster_method method, box_tree *out) {
+static fct_tree *build_ours(const fct_env *env, const fct_mesh *mesh, fct_cluster_method method,
+                            double *seconds) {
     fct_tree_def def = fct_tree_def_default();
     fct_tree *tree;
     def.method = method;
     double start = bench_seconds();
     bench_check(fct_tree_build(env, mesh, &def, NULL, &tree), "the tree");
-    double seconds = bench_seconds() - start;
-    box_tree_take(mesh, tree, out);
-    out->seconds = seconds;
+    *seconds = bench_seconds() - start;
+    return tree;
+}
+
+static void make_trees(const fct_env *env, const fct_mesh *mesh, box_tree trees[TREES]) {
+    double seconds;
+    fct_tree *tree = build_ours(env, mesh, FCT_CLUSTER_ROUNDS, &seconds);
+    box_tree_take(mesh, tree, &trees[0]);
+    trees[0].seconds = seconds;
+    double start = bench_seconds();
+    box_tree_regroup(mesh, tree, CUT, &trees[2]);
+    trees[2].seconds = seconds + bench_seconds() - start;
     fct_tree_destroy(tree);
+    tree = build_ours(env, mesh, FCT_CLUSTER_GREEDY, &seconds);
+    box_tree_take(mesh, tree, &trees[1]);
+    trees[1].seconds = seconds;
+    fct_tree_destroy(tree);
+    box_tree_oriented(mesh, &trees[3]);
+    box_tree_aligned(mesh, &trees[4]);
 }
 
 /* --- Queries --- */
@@ -172,17 +188,14 @@ int main(int argc, char **argv) {
     static figure figures[TREES][QUERIES];
     bench_load(&env, argv[1], &mesh);
     double diagonal = bench_diagonal(&mesh);
-    take_ours(&env, &mesh, FCT_CLUSTER_ROUNDS, &trees[0]);
-    take_ours(&env, &mesh, FCT_CLUSTER_GREEDY, &trees[1]);
-    box_tree_oriented(&mesh, &trees[2]);
-    box_tree_aligned(&mesh, &trees[3]);
+    make_trees(&env, &mesh, trees);
     tests t = {.counts = {(size_t)GRID * GRID, RAYS, POSES, POSES}};
     for (int i = 0; i < 2; ++i) {
         t.rays[i] = bench_allocate(t.counts[i], sizeof *t.rays[i]);
         t.poses[i] = bench_allocate(POSES, sizeof *t.poses[i]);
     }
     make_rays(&mesh, diagonal, &t);
-    make_poses(&trees[2], diagonal, &t);
+    make_poses(&trees[3], diagonal, &t);
     for (int i = 0; i < TREES; ++i) {
         uint64_t escaped = box_tree_escaped(&trees[i], diagonal);
         if (escaped)

@@ -148,11 +148,6 @@ static bool triangles_touch(const v3 p[3], const v3 q[3]) {
     return true;
 }
 
-static double surface(const fct_box *box) {
-    const float *h = box->half;
-    return (double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0];
-}
-
 bool box_tree_touches(const box_tree *tree, const box_pose *pose, box_visits *visits) {
     enum { HIGHEST = 4096 };
     uint32_t stack[HIGHEST][2], top = 0;
@@ -172,7 +167,7 @@ bool box_tree_touches(const box_tree *tree, const box_pose *pose, box_visits *vi
             if (triangles_touch(p, q)) return true;
             continue;
         }
-        bool first = leaf_b || (!leaf_a && surface(&tree->boxes[a]) >= surface(&tree->boxes[b]));
+        bool first = leaf_b || (!leaf_a && box_surface(&tree->boxes[a]) >= box_surface(&tree->boxes[b]));
         if (top + 2 > HIGHEST) bench_fail("a tree higher than %d", HIGHEST);
         for (int c = 1; c >= 0; --c, ++top) {
             stack[top][0] = first ? tree->child[a][c] : a;

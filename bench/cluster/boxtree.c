@@ -26,8 +26,8 @@ void box_tree_release(box_tree *tree) {
     *tree = (box_tree){0};
 }
 
-/* The box of the listed faces along the given axes; half extents reach past what rounding to float takes. */
-static fct_box fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, const v3 axes[3]) {
+/* Half extents reach past what rounding to float takes. */
+fct_box box_fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, const v3 axes[3]) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     v3 used[3], center = {0, 0, 0};
     fct_box box;
@@ -46,6 +46,26 @@ static fct_box fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, 
     return box;
 }
 
+/* A face without area weighs next to nothing. */
+v3 box_axes(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, v3 axes[3]) {
+    v3 origin = corner(mesh, faces[0], 0), mean = {0, 0, 0};
+    double total = 0, m[6] = {0}, values[3], vectors[3][3];
+    for (uint32_t i = 0; i < count; ++i) {
+        v3 p[3], sum = {0, 0, 0};
+        for (uint32_t k = 0; k < 3; ++k)
+            p[k] = v3_sub(corner(mesh, faces[i], k), origin), sum = v3_add(sum, p[k]);
+        double area = .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))) + DBL_MIN;
+        for (int k = 0; k < 3; ++k) sym3_add_outer(m, area / 12, p[k]);
+        sym3_add_outer(m, area / 12, sum);
+        mean = v3_mad(mean, area / 3, sum);
+        total += area;
+    }
+    sym3_add_outer(m, -1 / total, mean);
+    bench_eigen(m, values, vectors);
+    for (int k = 0; k < 3; ++k) axes[k] = (v3){vectors[k][0], vectors[k][1], vectors[k][2]};
+    return v3_mad(origin, 1 / total, mean);
+}
+
 static const v3 world[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 /* A triangle's own frame: its longest side and its normal. */
@@ -59,7 +79,7 @@ static fct_box fit_face(const fct_mesh *mesh, uint32_t face) {
     if (v3_norm2(axes[0]) == 0) axes[0] = world[0];
     if (v3_norm2(axes[2]) == 0) v3_frame(axes[0], &axes[1], &axes[2]);
     axes[1] = v3_unit(v3_cross(axes[2], axes[0]));
-    return fit(mesh, &face, 1, axes);
+    return box_fit(mesh, &face, 1, axes);
 }
 
 static void fit_faces(box_tree *tree) {
@@ -140,33 +160,10 @@ static uint32_t part(builder *b, const task *t, v3 axis, double at) {
     return left;
 }
 
-/* Axes of the surface's covariance, shortest first, and its mean. A face without area weighs next to nothing.
- */
-static v3 surface_axes(builder *b, const task *t, v3 axes[3]) {
-    const fct_mesh *mesh = b->tree->mesh;
-    const uint32_t *faces = b->faces + t->first;
-    v3 origin = corner(mesh, faces[0], 0), mean = {0, 0, 0};
-    double total = 0, m[6] = {0}, values[3], vectors[3][3];
-    for (uint32_t i = 0; i < t->count; ++i) {
-        v3 p[3], sum = {0, 0, 0};
-        for (uint32_t k = 0; k < 3; ++k)
-            p[k] = v3_sub(corner(mesh, faces[i], k), origin), sum = v3_add(sum, p[k]);
-        double area = .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))) + DBL_MIN;
-        for (int k = 0; k < 3; ++k) sym3_add_outer(m, area / 12, p[k]);
-        sym3_add_outer(m, area / 12, sum);
-        mean = v3_mad(mean, area / 3, sum);
-        total += area;
-    }
-    sym3_add_outer(m, -1 / total, mean);
-    bench_eigen(m, values, vectors);
-    for (int k = 0; k < 3; ++k) axes[k] = (v3){vectors[k][0], vectors[k][1], vectors[k][2]};
-    return v3_mad(origin, 1 / total, mean);
-}
-
 static uint32_t split_oriented(builder *b, const task *t) {
-    v3 axes[3], mean = surface_axes(b, t, axes);
+    v3 axes[3], mean = box_axes(b->tree->mesh, b->faces + t->first, t->count, axes);
     fct_box *box = &b->tree->boxes[t->node];
-    *box = fit(b->tree->mesh, b->faces + t->first, t->count, axes);
+    *box = box_fit(b->tree->mesh, b->faces + t->first, t->count, axes);
     int order[3] = {0, 1, 2};
     for (int i = 0; i < 2; ++i)
         for (int j = 2; j > i; --j)
@@ -238,7 +235,7 @@ static double best_cut(const bin bins[BINS], double low, double step, double *at
 
 static uint32_t split_aligned(builder *b, const task *t) {
     const uint32_t *faces = b->faces + t->first;
-    b->tree->boxes[t->node] = fit(b->tree->mesh, faces, t->count, world);
+    b->tree->boxes[t->node] = box_fit(b->tree->mesh, faces, t->count, world);
     double best = INFINITY, place = 0;
     int axis = 0;
     for (int k = 0; k < 3; ++k) {
@@ -266,7 +263,7 @@ void box_tree_aligned(const fct_mesh *mesh, box_tree *out) {
     double start = bench_seconds();
     build(mesh, split_aligned, out);
     for (uint32_t f = 0; f < mesh->face_count; ++f)
-        out->boxes[out->inner_count + f] = fit(mesh, &f, 1, world);
+        out->boxes[out->inner_count + f] = box_fit(mesh, &f, 1, world);
     out->seconds = bench_seconds() - start;
 }
 
@@ -274,11 +271,7 @@ void box_tree_aligned(const fct_mesh *mesh, box_tree *out) {
 
 double box_tree_area(const box_tree *tree, double diagonal) {
     double area = 0;
-    for (uint32_t i = 0; i < tree->inner_count; ++i) {
-        const float *h = tree->boxes[i].half;
-        double a = (double)h[0], b = (double)h[1], c = (double)h[2];
-        area += 8 * (a * b + b * c + c * a);
-    }
+    for (uint32_t i = 0; i < tree->inner_count; ++i) area += 4 * box_surface(&tree->boxes[i]);
     return area / (diagonal * diagonal);
 }
 

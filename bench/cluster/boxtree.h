@@ -25,7 +25,20 @@ void box_tree_take(const fct_mesh *mesh, const fct_tree *tree, box_tree *out);
 void box_tree_oriented(const fct_mesh *mesh, box_tree *out);
 /* Boxes along the axes of the world, by the surface area heuristic with 16 bins. */
 void box_tree_aligned(const fct_mesh *mesh, box_tree *out);
+/* Our clusters of a cut into `count`, under a top built anew by the surface area heuristic over their boxes.
+ */
+void box_tree_regroup(const fct_mesh *mesh, const fct_tree *tree, uint32_t count, box_tree *out);
 void box_tree_release(box_tree *tree);
+
+/* The box of the listed faces along the given axes. */
+fct_box box_fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, const v3 axes[3]);
+/* Axes of the surface's covariance, shortest first; returns its mean. */
+v3 box_axes(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, v3 axes[3]);
+/* Of the box's surface, a quarter. */
+static inline double box_surface(const fct_box *box) {
+    double a = (double)box->half[0], b = (double)box->half[1], c = (double)box->half[2];
+    return 2 * (a * b + b * c + c * a);
+}
 
 /* Of the inner boxes' surfaces, over the squared diagonal. */
 double box_tree_area(const box_tree *tree, double diagonal);
