@@ -12,12 +12,7 @@
 #include "base/vec.h"
 #include "cluster/cut.h"
 
-enum { GRAIN = 256, NEARBY = 16 };
-
-typedef struct cutter {
-    const fct_packer *packer;
-    const uint32_t *vertex_before; /* per corner: place of the face before it at its vertex */
-} cutter;
+enum { GRAIN = 256, NEARBY = 16, REGION = 1 << 17 };
 
 fct_meshlet_def fct_meshlet_def_default(void) {
     return (fct_meshlet_def){
@@ -26,13 +21,12 @@ fct_meshlet_def fct_meshlet_def_default(void) {
 
 static bool fits(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
-    const cutter *cut = user;
-    const fct_packer *p = cut->packer;
+    const fct_packer *p = user;
     const fct_cluster *c = &p->view->clusters[node];
     if (c->count > p->def.max_triangles) return false;
     uint32_t vertices = 0;
     for (uint32_t f = c->first; f < c->first + c->count; ++f) {
-        const uint32_t *before = cut->vertex_before + 3 * (size_t)f, *t = p->view->triangles + 3 * (size_t)f;
+        const uint32_t *before = p->vertex_before + 3 * (size_t)f, *t = p->view->triangles + 3 * (size_t)f;
         for (int k = 0; k < 3; ++k) {
             bool repeated = (k > 0 && t[k] == t[0]) || (k > 1 && t[k] == t[1]);
             vertices += !repeated && (before[k] == FCT_NONE || before[k] < c->first);
@@ -42,10 +36,15 @@ static bool fits(void *user, uint32_t node, uint32_t thread) {
     return vertices <= p->def.max_vertices;
 }
 
-static bool is_near(void *user, uint32_t node, uint32_t thread) {
+typedef struct size_test {
+    const fct_tree_view *view;
+    uint32_t most;
+} size_test;
+
+static bool is_small(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
-    const cutter *cut = user;
-    return cut->packer->view->clusters[node].count <= NEARBY * cut->packer->def.max_triangles;
+    const size_test *test = user;
+    return test->view->clusters[node].count <= test->most;
 }
 
 static void link_corners(const fct_tree_view *view, uint32_t *last, uint32_t *vertex_before) {
@@ -59,26 +58,9 @@ static void link_corners(const fct_tree_view *view, uint32_t *last, uint32_t *ve
 
 /* --- Pieces --- */
 
-fct_result fct_packer_begin(const fct_env *env, fct_packer *p) {
-    size_t sizes[5] = {p->def.max_triangles * sizeof *p->faces, p->def.max_vertices * sizeof *p->vertices,
-                       p->def.max_vertices * sizeof *p->uses, sizeof *p->face_counts,
-                       sizeof *p->vertex_counts};
-    void **arrays[5] = {(void **)&p->faces, (void **)&p->vertices, (void **)&p->uses,
-                        (void **)&p->face_counts, (void **)&p->vertex_counts};
-    size_t capacity = p->capacity;
-    for (int i = 0; i < 5 && p->count == p->capacity; ++i) {
-        capacity = p->capacity;
-        fct_result result = fct_grow(env, arrays[i], &capacity, (size_t)p->count + 1, sizes[i]);
-        if (result != FCT_OK) return result;
-    }
-    p->capacity = capacity;
-    p->face_counts[p->count] = 0, p->vertex_counts[p->count] = 0;
-    ++p->count;
-    return FCT_OK;
-}
-
-void fct_packer_release(const fct_env *env, fct_packer *p) {
+static void release_packer(const fct_env *env, fct_packer *p) {
     fct_sides_release(env, &p->sides);
+    fct_release(env, p->vertex_before);
     fct_release(env, p->reach);
     fct_release(env, p->home);
     fct_release(env, p->owner);
@@ -89,47 +71,93 @@ void fct_packer_release(const fct_env *env, fct_packer *p) {
     fct_release(env, p->vertex_counts);
 }
 
+/* Cuts the places into runs of at most `most` faces, each of subtrees that are neighbours: bounds[0] = 0 to
+ * bounds[*count - 1], the number of faces. `bounds` holds face_count + 1. */
+static fct_result cut_runs(const fct_env *env, const fct_tree *tree, uint32_t most, uint32_t *bounds,
+                           uint32_t *count) {
+    const fct_tree_view *view = &tree->view;
+    size_test test = {view, most};
+    uint32_t nodes, place = 0, runs = 0;
+    fct_result result = fct_cut_tree(env, tree, "meshlets", is_small, &test, bounds, &nodes);
+    if (result != FCT_OK) return result;
+    for (uint32_t i = 0, begin = 0; i < nodes; ++i) { /* there are never more runs than nodes read */
+        uint32_t faces = fct_node_faces(view, bounds[i]);
+        if (place > begin && place + faces - begin > most) {
+            bounds[runs++] = begin;
+            begin = place;
+        }
+        place += faces;
+        if (i + 1 == nodes) bounds[runs++] = begin;
+    }
+    bounds[runs++] = view->face_count;
+    *count = runs;
+    return FCT_OK;
+}
+
 /* What the tree tells of each place: which part of the mesh it is near to, and how large a meshlet is here.
  */
-static fct_result read_scales(const fct_env *env, const fct_tree *tree, fct_packer *p, uint32_t *nodes,
-                              const uint32_t *vertex_before) {
-    cutter cut = {p, vertex_before};
+static fct_result read_scales(const fct_env *env, const fct_tree *tree, fct_packer *p, uint32_t *scratch) {
     uint32_t count;
-    fct_result result = fct_cut_tree(env, tree, "meshlets", is_near, &cut, nodes, &count);
-    for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
-        uint32_t first = fct_node_first(p->view, nodes[i]), faces = fct_node_faces(p->view, nodes[i]);
-        for (uint32_t f = first; f < first + faces; ++f) p->home[f] = i;
-    }
-    if (result == FCT_OK) result = fct_cut_tree(env, tree, "meshlets", fits, &cut, nodes, &count);
+    fct_result result = cut_runs(env, tree, NEARBY * p->def.max_triangles, scratch, &count);
+    for (uint32_t i = 0; i + 1 < count && result == FCT_OK; ++i)
+        for (uint32_t f = scratch[i]; f < scratch[i + 1]; ++f) p->home[f] = i;
+    if (result == FCT_OK) result = fct_cut_tree(env, tree, "meshlets", fits, p, scratch, &count);
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         fct_cluster c;
-        fct_tree_cluster(tree, nodes[i], &c);
+        fct_tree_cluster(tree, scratch[i], &c);
         float reach = (float)v3_norm(v3_load(c.box_half));
         for (uint32_t f = c.first; f < c.first + c.count; ++f) p->reach[f] = reach;
     }
     return result;
 }
 
+typedef struct piece_run {
+    fct_packer *packer;
+    const uint32_t *bounds;
+} piece_run;
+
+static void fill_pieces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const piece_run *run = user;
+    for (uint32_t f = run->bounds[begin]; f < run->bounds[end]; ++f)
+        fct_packer_add(run->packer, run->packer->owner[f], f);
+}
+
+/* The lists of the pieces that owner tells of. Those of a run are of this run alone. */
+static fct_result make_lists(const fct_env *env, fct_packer *p, const uint32_t *bounds, uint32_t count) {
+    p->faces = fct_allocate(env, p->count, p->def.max_triangles * sizeof *p->faces);
+    p->vertices = fct_allocate(env, p->count, p->def.max_vertices * sizeof *p->vertices);
+    p->uses = fct_allocate(env, p->count, p->def.max_vertices * sizeof *p->uses);
+    p->face_counts = fct_allocate_zero(env, p->count, sizeof *p->face_counts);
+    p->vertex_counts = fct_allocate_zero(env, p->count, sizeof *p->vertex_counts);
+    if (!p->faces || !p->vertices || !p->uses || !p->face_counts || !p->vertex_counts)
+        return fct_fail_memory(env, "meshlets");
+    piece_run run = {p, bounds};
+    fct_parallel_for(env, count - 1, 1, fill_pieces, &run);
+    return FCT_OK;
+}
+
 static fct_result make_pieces(const fct_env *env, const fct_tree *tree, fct_packer *p) {
     const fct_tree_view *view = p->view;
-    uint32_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count;
-    uint32_t *vertex_before = fct_allocate(env, view->face_count, 3 * sizeof *vertex_before);
-    uint32_t *scratch = fct_allocate(env, most, sizeof *scratch);
+    uint32_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count, count;
+    uint32_t *scratch = fct_allocate(env, (size_t)most + 1, sizeof *scratch);
+    p->vertex_before = fct_allocate(env, view->face_count, 3 * sizeof *p->vertex_before);
     p->reach = fct_allocate(env, view->face_count, sizeof *p->reach);
     p->home = fct_allocate(env, view->face_count, sizeof *p->home);
     p->owner = fct_allocate(env, view->face_count, sizeof *p->owner);
-    bool complete = vertex_before && scratch && p->reach && p->home && p->owner;
+    bool complete = scratch && p->vertex_before && p->reach && p->home && p->owner;
     fct_result result = complete ? FCT_OK : fct_fail_memory(env, "meshlets");
     if (result == FCT_OK) {
-        link_corners(view, scratch, vertex_before);
-        result = read_scales(env, tree, p, scratch, vertex_before);
+        link_corners(view, scratch, p->vertex_before);
+        result = read_scales(env, tree, p, scratch);
     }
-    fct_release(env, vertex_before);
-    fct_release(env, scratch);
     if (result == FCT_OK)
         result = fct_sides_build(env, view->triangles, view->face_count, view->vertex_count, &p->sides);
-    if (result == FCT_OK) result = fct_meshlets_grow(env, p);
+    if (result == FCT_OK) result = cut_runs(env, tree, REGION, scratch, &count);
+    if (result == FCT_OK) result = fct_meshlets_grow(env, p, scratch, count);
+    if (result == FCT_OK) result = make_lists(env, p, scratch, count);
     if (result == FCT_OK) result = fct_meshlets_pack(env, p);
+    fct_release(env, scratch);
     return result;
 }
 
@@ -246,7 +274,7 @@ fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct
     if (result == FCT_OK && !numbers) result = fct_fail_memory(env, "meshlets");
     if (result == FCT_OK) result = write_down(env, &p, numbers, numbers + p.count, out);
     fct_release(env, numbers);
-    fct_packer_release(env, &p);
+    release_packer(env, &p);
     if (result != FCT_OK) fct_meshlets_release(env, out);
     return result;
 }

@@ -273,26 +273,31 @@ static void bad_options_are_refused(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Large enough for several regions that grow on their own. */
 static void same_for_every_thread_count(void **state) {
     (void)state;
-    fct_mesh mesh;
+    fct_env env = fct_env_default(), envs[3];
+    fct_mesh mesh = make_sphere(&env, SANITIZED ? 30 : 190);
+    roughen(&mesh, 0.001);
+    fct_tree *tree = tree_of(&env, &mesh, 1);
+    fct_meshlet_def def = fct_meshlet_def_default();
     fct_meshlets m[3];
-    fct_env envs[3];
     for (uint32_t t = 0; t < 3; ++t) {
-        envs[t] = fct_env_default();
+        envs[t] = env;
         envs[t].thread_count = t + 1;
-        mesh = make_sphere(&envs[t], SANITIZED ? 30 : 80);
-        roughen(&mesh, 0.01);
-        m[t] = meshlets_of(&envs[t], &mesh, NULL);
+        assert_int_equal(fct_tree_meshlets(&envs[t], tree, &def, &m[t]), FCT_OK);
         assert_int_equal(m[t].count, m[0].count);
         assert_memory_equal(m[t].meshlets, m[0].meshlets, m[0].count * sizeof *m[0].meshlets);
         assert_memory_equal(m[t].bounds, m[0].bounds, m[0].count * sizeof *m[0].bounds);
         assert_memory_equal(m[t].vertices, m[0].vertices, 4 * (size_t)m[0].vertex_count);
         assert_memory_equal(m[t].triangles, m[0].triangles, m[0].triangle_bytes);
         assert_memory_equal(m[t].faces, m[0].faces, 4 * (size_t)mesh.face_count);
-        fct_mesh_release(&envs[t], &mesh);
     }
+    check_layout(&mesh, &def, &m[0]);
+    assert_true((double)m[0].vertex_count > 0.94 * 64 * m[0].count);
     for (int t = 0; t < 3; ++t) fct_meshlets_release(&envs[t], &m[t]);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
 }
 
 static void survives_no_memory(void **state) {
