@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "cluster/file.h"
+#include "cluster/format.h"
 
 static const char *const path = "test_file.fct";
 
@@ -289,6 +289,53 @@ static void shared_children_end(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
+/* Sets 4 bytes of an entry of a section of node records. */
+static void set_word(unsigned char *bytes, fct_section section, uint32_t entry, size_t offset,
+                     uint32_t value) {
+    fct_format_header h;
+    memcpy(&h, bytes, sizeof h);
+    memcpy(bytes + h.sections[section].offset + entry * sizeof(fct_cluster) + offset, &value, 4);
+}
+
+static void a_node_is_no_child_of_its_own(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    size_t size;
+    unsigned char *bytes = save_small(&env, 3, &size);
+    fct_tree *back;
+    fct_cluster c, children[2];
+    set_word(bytes, FCT_SECTION_NODES, 3, offsetof(fct_cluster, child), 3);
+    assert_int_equal(fct_tree_parse(&env, "circle", bytes, size, &back), FCT_OK);
+    assert_int_equal(fct_tree_cluster(back, 3, &c), FCT_ERROR_DATA);
+    assert_non_null(strstr(quiet.text, "circle: node 3: child out of order"));
+    assert_true(c.count == 0 && c.child[0] == FCT_NONE);
+    assert_int_equal(fct_tree_children(back, 3, children), FCT_ERROR_DATA);
+    assert_int_equal(fct_tree_cluster(back, 4, &c), FCT_OK);
+    fct_tree_destroy(back);
+    free(bytes);
+    assert_int_equal(quiet.alive, 0);
+}
+
+static void the_cut_is_that_of_the_nodes(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    size_t size;
+    unsigned char *bytes = save_small(&env, 8, &size);
+    fct_tree *back;
+    const float other = 2;
+    uint32_t value;
+    memcpy(&value, &other, 4);
+    set_word(bytes, FCT_SECTION_CUT, 0, offsetof(fct_cluster, area), value);
+    assert_int_equal(fct_tree_parse(&env, "other", bytes, size, &back), FCT_OK);
+    assert_int_equal(fct_tree_check(&env, back), FCT_ERROR_DATA);
+    assert_non_null(strstr(quiet.text, "other: entry 0 of the cut"));
+    fct_tree_destroy(back);
+    free(bytes);
+    assert_int_equal(quiet.alive, 0);
+}
+
 /* The section's bytes of a saved tree, found by their content. */
 static unsigned char *find_bytes(unsigned char *bytes, size_t size, const void *what, size_t length) {
     for (size_t i = 512; i + length <= size; ++i)
@@ -390,6 +437,8 @@ int main(void) {
                                        cmocka_unit_test(every_flipped_byte_is_found),
                                        cmocka_unit_test(no_damage_leads_astray),
                                        cmocka_unit_test(shared_children_end),
+                                       cmocka_unit_test(a_node_is_no_child_of_its_own),
+                                       cmocka_unit_test(the_cut_is_that_of_the_nodes),
                                        cmocka_unit_test(endless_numbers_do_not_pass),
                                        cmocka_unit_test(errors_are_told),
                                        cmocka_unit_test(survives_no_memory)};

@@ -4,7 +4,8 @@
 
 #include <float.h>
 
-#include "cluster/tree.h"
+#include "base/file.h"
+#include "cluster/format.h"
 
 typedef struct mistake {
     const char *message;
@@ -217,9 +218,55 @@ static void a_build_counts_as_verifying_does(void **state) {
     }
 }
 
+/* Clusters of the cut that are faces have their numbers in the file; here they are wrong and the checksums
+ * are right. */
+static void wrong_faces_of_the_cut_are_found(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    const char *path = "test_verify.fct";
+    fct_mesh mesh = make_sphere(&env, 10);
+    for (int k = 0; k < 3; ++k) { /* the first face's corner goes far away */
+        uint32_t v = mesh.triangles[0];
+        mesh.positions[3 * v + (uint32_t)k] += 20;
+    }
+    fct_tree *tree, *back;
+    fct_file file;
+    assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    assert_int_equal(fct_file_open(&env, path, &file), FCT_OK);
+    fct_format_header h;
+    unsigned char *bytes = malloc(file.size);
+    memcpy(bytes, file.data, file.size);
+    memcpy(&h, bytes, sizeof h);
+    uint32_t entry = h.cut_count - 1, id; /* ids ascend: leaves are the last */
+    memcpy(&id, bytes + h.sections[FCT_SECTION_CUT_IDS].offset + 4 * entry, 4);
+    assert_true(id >= h.node_count);
+    fct_cluster *leaf = (fct_cluster *)(bytes + h.sections[FCT_SECTION_CUT].offset) + entry;
+    leaf->area *= 2;
+    fct_format_section *cut = &h.sections[FCT_SECTION_CUT];
+    uint64_t hash;
+    fct_format_hash_blocks(&env, bytes + cut->offset, cut->size, &hash);
+    cut->checksum = fct_format_fold(&hash, 1);
+    memcpy(bytes, &h, sizeof h);
+    h.checksum = fct_format_head_checksum(bytes, h.head_size);
+    memcpy(bytes, &h, sizeof h);
+    assert_int_equal(fct_tree_parse(&env, "cut", bytes, file.size, &back), FCT_OK);
+    assert_int_equal(fct_tree_verify(&env, back), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "has an area that is not"));
+    fct_tree_destroy(back);
+    fct_tree_destroy(tree);
+    fct_file_close(&env, &file);
+    fct_mesh_release(&env, &mesh);
+    free(bytes);
+    remove(path);
+    assert_int_equal(r.alive, 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_wrong_number_is_found), cmocka_unit_test(the_first_mistake_is_told),
-        cmocka_unit_test(wrong_counts_are_found), cmocka_unit_test(a_build_counts_as_verifying_does)};
+        cmocka_unit_test(wrong_counts_are_found), cmocka_unit_test(a_build_counts_as_verifying_does),
+        cmocka_unit_test(wrong_faces_of_the_cut_are_found)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
