@@ -37,6 +37,22 @@ static inline d4 d4_sub(d4 a, d4 b) {
 static inline d4 d4_mul(d4 a, d4 b) {
     return _mm256_mul_pd(a, b);
 }
+static inline d4 d4_div(d4 a, d4 b) {
+    return _mm256_div_pd(a, b);
+}
+static inline d4 d4_sqrt(d4 a) {
+    return _mm256_sqrt_pd(a);
+}
+static inline d4 d4_abs(d4 a) {
+    return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
+}
+static inline d4 d4_load(const double *p) {
+    return _mm256_loadu_pd(p);
+}
+/* a_i < b_i ? x_i : y_i */
+static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
+    return _mm256_blendv_pd(y, x, _mm256_cmp_pd(a, b, _CMP_LT_OQ));
+}
 static inline d4 d4_min(d4 a, d4 b) {
     return _mm256_min_pd(a, b);
 }
@@ -198,6 +214,21 @@ static inline d4 d4_sub(d4 a, d4 b) {
 }
 static inline d4 d4_mul(d4 a, d4 b) {
     FCT_D4(a.v[i] * b.v[i]);
+}
+static inline d4 d4_div(d4 a, d4 b) {
+    FCT_D4(a.v[i] / b.v[i]);
+}
+static inline d4 d4_sqrt(d4 a) {
+    FCT_D4(__builtin_sqrt(a.v[i]));
+}
+static inline d4 d4_abs(d4 a) {
+    FCT_D4(__builtin_fabs(a.v[i]));
+}
+static inline d4 d4_load(const double *p) {
+    FCT_D4(p[i]);
+}
+static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
+    FCT_D4(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
 }
 static inline d4 d4_min(d4 a, d4 b) {
     FCT_D4(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
