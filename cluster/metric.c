@@ -55,8 +55,11 @@ void fct_metric_face(const fct_metric *metric, const float *positions, const uin
 }
 
 /* Records turned on their side: one field of eight clusters in each vector. */
-typedef struct lanes {
-    f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+typedef union lanes {
+    struct {
+        f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+    };
+    f8 rows[16];
 } lanes;
 
 _Static_assert(sizeof(fct_record) == 16 * sizeof(float) && sizeof(lanes) == 16 * sizeof(f8),
@@ -77,16 +80,14 @@ static inline f8 dot3(const f8 a[3], const f8 b[3]) {
 
 static inline void load_lanes(const fct_record *records, const fct_pair *pairs, uint32_t count, bool second,
                               lanes *out) {
-    f8 rows[16];
     for (uint32_t i = 0; i < FCT_LANES; ++i) {
         const fct_pair *pair = &pairs[i < count ? i : 0];
         const float *record = records[second ? pair->b : pair->a].covariance;
-        rows[i] = f8_load(record);
-        rows[i + 8] = f8_load(record + 8);
+        out->rows[i] = f8_load(record);
+        out->rows[i + 8] = f8_load(record + 8);
     }
-    f8_transpose(rows);
-    f8_transpose(rows + 8);
-    memcpy(out, rows, sizeof *out);
+    f8_transpose(out->rows);
+    f8_transpose(out->rows + 8);
 }
 
 static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
@@ -236,14 +237,12 @@ void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direct
     load_lanes(records, pairs, count, true, &b);
     join(&a, &b, load_shared(pairs, count), &u);
     u.fit = total_fit(metric, &u);
-    f8 rows[16];
-    memcpy(rows, &u, sizeof rows);
-    f8_transpose(rows);
-    f8_transpose(rows + 8);
+    f8_transpose(u.rows);
+    f8_transpose(u.rows + 8);
     for (uint32_t i = 0; i < count; ++i) {
         float *record = records[pairs[i].a].covariance;
-        f8_store(record, rows[i]);
-        f8_store(record + 8, rows[i + 8]);
+        f8_store(record, u.rows[i]);
+        f8_store(record + 8, u.rows[i + 8]);
         if (!directions) continue;
         fct_direction *da = &directions[pairs[i].a];
         const fct_direction *db = &directions[pairs[i].b];

@@ -252,40 +252,45 @@ static uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, const 
     return count;
 }
 
-/* The same for a list of at most LONG, adding up doubles. Without branches but the loop's, for which way
- * they go could not be foretold. */
-static inline uint32_t renumber_few(const rounds *r, uint32_t i, uint32_t self, const list *l,
-                                    uint32_t count) {
+/* A list of at most LONG, its other ends in registers. */
+typedef struct short_list {
+    uint32_t count;
+    i8 low, high;
+    uint32_t keys[LONG + 1];
+    float shared[LONG + 1];
+} short_list;
+
+/* The same for a short list, adding up doubles. Without branches but the loop's, for which way they go could
+ * not be foretold. */
+static inline void renumber_short(const rounds *r, uint32_t i, uint32_t self, short_list *l) {
     uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
         uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
         i8 wanted = i8_set(other);
-        uint32_t low = i8_eq(i8_load(l->others), wanted), high = i8_eq(i8_load(l->others + 8), wanted);
-        uint32_t there = (low | high << 8) & ((1u << count) - 1),
-                 at = (uint32_t)__builtin_ctz(there | 1u << count);
+        uint32_t equal = i8_eq(l->low, wanted) | i8_eq(l->high, wanted) << 8;
+        uint32_t there = equal & ((1u << l->count) - 1), at = (uint32_t)__builtin_ctz(there | 1u << l->count);
         float sum = l->shared[at];
-        l->others[at] = other;
+        l->low = i8_insert(l->low, at, wanted), l->high = i8_insert(l->high, at - 8, wanted);
         l->shared[at] = (there ? sum : 0) + r->now.shared[from];
         l->keys[at] = (number | own) & MERGED ? OPEN : r->now.keys[from];
-        count += !there && other != self;
+        l->count += !there && other != self;
     }
-    return count;
 }
 
 static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
-    uint32_t others[LONG + SLACK], keys[LONG + SLACK];
-    float shared[LONG + SLACK];
-    list l = {others, keys, shared};
-    memset(others, 0xFF, sizeof others);
-    memset(shared, 0, sizeof shared);
-    uint32_t count = renumber_few(r, i, next, &l, 0);
-    if (mate != FCT_NONE) count = renumber_few(r, mate, next, &l, count);
-    for (uint32_t k = 0; k < count; ++k) {
+    short_list l = {.count = 0, .low = i8_set(OPEN), .high = i8_set(OPEN)};
+    uint32_t others[LONG];
+    memset(l.shared, 0, sizeof l.shared);
+    renumber_short(r, i, next, &l);
+    if (mate != FCT_NONE) renumber_short(r, mate, next, &l);
+    i8_store(others, l.low);
+    i8_store(others + 8, l.high);
+    for (uint32_t k = 0; k < l.count; ++k) {
         r->next.others[place + k] = others[k];
-        r->next.shared[place + k] = shared[k];
-        r->next.keys[place + k] = keys[k];
+        r->next.shared[place + k] = l.shared[k];
+        r->next.keys[place + k] = l.keys[k];
     }
-    return count;
+    return l.count;
 }
 
 static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
