@@ -19,9 +19,12 @@
 #include "base/parallel.h"
 #include "cluster/cone.h"
 
+enum { AHEAD = 12 };
+
 /* Room for one block; corners and normals by place. */
 typedef struct block_scratch {
-    uint32_t order[FCT_BLOCK];
+    uint32_t order[FCT_BLOCK]; /* ids of inner nodes */
+    const fct_sums *parts[FCT_BLOCK][2];
     float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
     fct_sums leaves[FCT_BLOCK], nodes[FCT_BLOCK];
     v3 frames[FCT_BLOCK][3];
@@ -132,17 +135,21 @@ void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cl
     out->first = place, out->count = 1;
 }
 
-/* Inner nodes of the subtree in preorder, in which a node's left child follows it and the right one comes
- * after the left's count - 1 inner nodes. */
-static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t *order) {
-    uint32_t nodes = tree->view.node_count, count = 0, top = 0, stack[FCT_BLOCK];
-    if (root < nodes) stack[top++] = root;
-    while (top > 0) {
-        uint32_t node = stack[--top];
-        const uint32_t *child = tree->links.children[node];
-        order[count++] = node;
-        if (child[1] < nodes) stack[top++] = child[1];
-        if (child[0] < nodes) stack[top++] = child[0];
+/* Inner nodes of the subtree level by level, and where their parts are: the memory of a level's nodes is
+ * asked for while the level above is walked. */
+static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first, block_scratch *s) {
+    uint32_t nodes = tree->view.node_count, count = 0;
+    if (root < nodes) s->order[count++] = root;
+    for (uint32_t i = 0; i < count; ++i) {
+        const fct_node_link *link = &tree->links[s->order[i]];
+        fct_node_link_store(link, &s->records[i]);
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = link->child[k];
+            s->parts[i][k] = child < nodes ? &s->nodes[count] : &s->leaves[child - nodes - first];
+            if (child >= nodes) continue;
+            __builtin_prefetch(&tree->links[child]);
+            s->order[count++] = child;
+        }
     }
     return count;
 }
@@ -164,33 +171,8 @@ static void load_faces(const fct_tree_view *view, size_t first, size_t count, bl
     }
 }
 
-void fct_node_links_store(const fct_node_links *links, uint32_t id, fct_cluster *out) {
-    out->cost = links->costs[id];
-    out->child[0] = links->children[id][0], out->child[1] = links->children[id][1];
-    out->first = links->firsts[id], out->count = links->counts[id];
-}
-
-/* Sums of the block's inner nodes, children before parents. */
-static void sum_nodes(const fct_tree *tree, uint32_t first, uint32_t count, block_scratch *s) {
-    uint32_t nodes = tree->view.node_count;
-    for (uint32_t i = count; i-- > 0;) {
-        uint32_t at = i + 1;
-        const uint32_t *children = tree->links.children[s->order[i]];
-        const fct_sums *parts[2];
-        for (int k = 0; k < 2; ++k) {
-            if (children[k] < nodes) {
-                parts[k] = &s->nodes[at];
-                at += tree->links.counts[children[k]] - 1;
-            } else {
-                parts[k] = &s->leaves[children[k] - nodes - first];
-            }
-        }
-        fct_sums_join(parts[0], parts[1], &s->nodes[i]);
-    }
-}
-
 /* Frames of four nodes, or of what is left. */
-static void frame_nodes(const fct_tree *tree, uint32_t begin, uint32_t count, block_scratch *s) {
+static void frame_nodes(uint32_t begin, uint32_t count, block_scratch *s) {
     const double *matrices[4];
     double values[4][3];
     v3 frames[4][3];
@@ -198,23 +180,26 @@ static void frame_nodes(const fct_tree *tree, uint32_t begin, uint32_t count, bl
     fct_eigen3_four(matrices, values, frames);
     for (uint32_t i = begin; i < count && i < begin + 4; ++i) {
         memcpy(s->frames[i], frames[i - begin], sizeof s->frames[i]);
-        fct_node_links_store(&tree->links, s->order[i], &s->records[i]);
         s->sizes[i] = fct_sums_store(&s->nodes[i], s->frames[i], &s->records[i]);
     }
+}
+
+static inline void ask_for_record(const fct_cluster *c) {
+    for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
 }
 
 /* In passes over its nodes, so that what one node waits for overlaps with another's work. */
 static void describe_block(const describer *d, size_t block, block_scratch *s) {
     const fct_tree *tree = d->tree;
     uint32_t nodes = tree->view.node_count, root = d->outline.blocks[block];
-    uint32_t first = root < nodes ? tree->links.firsts[root] : root - nodes;
-    uint32_t faces = root < nodes ? tree->links.counts[root] : 1;
-    uint32_t count = list_subtree(tree, root, s->order);
+    uint32_t first = root < nodes ? tree->links[root].first : root - nodes;
+    uint32_t faces = root < nodes ? tree->links[root].count : 1;
+    uint32_t count = list_subtree(tree, root, first, s);
     load_faces(&tree->view, first, faces, s);
     fct_points corners = {s->corners[0], s->corners[1], s->corners[2]};
     fct_points normals = {s->normals[0], s->normals[1], s->normals[2]};
-    sum_nodes(tree, first, count, s);
-    for (uint32_t i = 0; i < count; i += 4) frame_nodes(tree, i, count, s);
+    for (uint32_t i = count; i-- > 0;) fct_sums_join(s->parts[i][0], s->parts[i][1], &s->nodes[i]);
+    for (uint32_t i = 0; i < count; i += 4) frame_nodes(i, count, s);
     for (uint32_t i = 0; i < count; ++i) {
         fct_cluster *c = &s->records[i];
         orient(corners, normals, c->first - first, c->first - first + c->count, s->sizes[i], s->frames[i], c);
@@ -223,7 +208,10 @@ static void describe_block(const describer *d, size_t block, block_scratch *s) {
         fct_cluster *c = &s->records[i];
         fit(corners, c->first - first, c->first - first + c->count, c);
     }
-    for (uint32_t i = 0; i < count; ++i) tree->clusters[s->order[i]] = s->records[i];
+    for (uint32_t i = 0; i < count; ++i) {
+        if (i + AHEAD < count) ask_for_record(&tree->clusters[s->order[i + AHEAD]]);
+        tree->clusters[s->order[i]] = s->records[i];
+    }
     d->outline.sums[block] = count ? s->nodes[0] : s->leaves[0];
 }
 
@@ -254,7 +242,7 @@ static void walk(const fct_tree *tree, fct_outline *o) {
         stack[top++] = (visit){tree->roots[r], FCT_NONE, 0};
         while (top > 0) {
             visit v = stack[--top];
-            if (v.node >= view->node_count || tree->links.counts[v.node] <= FCT_BLOCK) {
+            if (v.node >= view->node_count || tree->links[v.node].count <= FCT_BLOCK) {
                 close_upper(o, v.parent, v.side, FCT_IS_BLOCK | o->block_count);
                 if (o->blocks) o->blocks[o->block_count] = v.node;
                 ++o->block_count;
@@ -265,8 +253,8 @@ static void walk(const fct_tree *tree, fct_outline *o) {
                 o->upper[o->upper_count].id = v.node;
                 o->upper[o->upper_count].first_block = o->block_count;
             }
-            stack[top++] = (visit){tree->links.children[v.node][1], o->upper_count, 1};
-            stack[top++] = (visit){tree->links.children[v.node][0], o->upper_count, 0};
+            stack[top++] = (visit){tree->links[v.node].child[1], o->upper_count, 1};
+            stack[top++] = (visit){tree->links[v.node].child[0], o->upper_count, 0};
             ++o->upper_count;
         }
     }
@@ -304,7 +292,8 @@ fct_result fct_tree_describe(fct_tree *tree) {
     if (result == FCT_OK)
         result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 4, describe_blocks, &d);
     if (result == FCT_OK) result = fct_tree_describe_upper(tree, &d.outline);
-    fct_node_links_release(env, &tree->links);
+    fct_release(env, tree->links);
+    tree->links = NULL;
     fct_release(env, d.outline.upper);
     fct_release(env, d.outline.blocks);
     fct_release(env, d.outline.sums);

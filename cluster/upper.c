@@ -94,7 +94,7 @@ static void choose_frames(void *user, size_t begin, size_t end, size_t chunk, ui
         fct_upper *u = &job->outline->upper[i];
         fct_cluster *c = &tree->clusters[u->id];
         v3 frame[3];
-        fct_node_links_store(&tree->links, u->id, c);
+        fct_node_link_store(&tree->links[u->id], c);
         double values[3];
         fct_eigen3(u->sums.covariance, values, frame);
         double size = fct_sums_store(&u->sums, frame, c);
