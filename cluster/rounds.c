@@ -42,6 +42,8 @@ typedef struct rounds {
     fct_work *work;
     bool across;
     uint32_t round;
+    uint32_t start_height; /* of the tallest cluster before the first round; each adds one at most */
+    bool low;              /* every cluster may merge, as far as heights go */
     generation now, next;
     uint32_t *best;                 /* per live cluster: its cheapest neighbour or FCT_NONE */
     uint32_t *renumbered;           /* this round's number to the next's, with MERGED */
@@ -262,35 +264,44 @@ typedef struct short_list {
 
 /* The same for a short list, adding up doubles. Without branches but the loop's, for which way they go could
  * not be foretold. */
-static inline void renumber_short(const rounds *r, uint32_t i, uint32_t self, short_list *l) {
+static inline void renumber_short(const rounds *r, uint32_t i, uint32_t self, bool half, short_list *l) {
     uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
         uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
         i8 wanted = i8_set(other);
-        uint32_t equal = i8_eq(l->low, wanted) | i8_eq(l->high, wanted) << 8;
+        uint32_t equal = i8_eq(l->low, wanted) | (half ? 0 : i8_eq(l->high, wanted) << 8);
         uint32_t there = equal & ((1u << l->count) - 1), at = (uint32_t)__builtin_ctz(there | 1u << l->count);
         float sum = l->shared[at];
-        l->low = i8_insert(l->low, at, wanted), l->high = i8_insert(l->high, at - 8, wanted);
+        l->low = i8_insert(l->low, at, wanted);
+        if (!half) l->high = i8_insert(l->high, at - 8, wanted);
         l->shared[at] = (there ? sum : 0) + r->now.shared[from];
         l->keys[at] = (number | own) & MERGED ? OPEN : r->now.keys[from];
         l->count += !there && other != self;
     }
 }
 
-static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
-    short_list l = {.count = 0, .low = i8_set(OPEN), .high = i8_set(OPEN)};
+/* With `half`, of at most 8 entries. */
+static inline uint32_t join_short(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
+                                  bool half) {
+    short_list l;
     uint32_t others[LONG];
-    memset(l.shared, 0, sizeof l.shared);
-    renumber_short(r, i, next, &l);
-    if (mate != FCT_NONE) renumber_short(r, mate, next, &l);
+    l.count = 0, l.low = l.high = i8_set(OPEN);
+    renumber_short(r, i, next, half, &l);
+    if (mate != FCT_NONE) renumber_short(r, mate, next, half, &l);
     i8_store(others, l.low);
-    i8_store(others + 8, l.high);
+    if (!half) i8_store(others + 8, l.high);
     for (uint32_t k = 0; k < l.count; ++k) {
         r->next.others[place + k] = others[k];
         r->next.shared[place + k] = l.shared[k];
         r->next.keys[place + k] = l.keys[k];
     }
     return l.count;
+}
+
+static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
+                         uint32_t length) {
+    return length <= 8 ? join_short(r, i, mate, next, place, true)
+                       : join_short(r, i, mate, next, place, false);
 }
 
 static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
@@ -310,7 +321,7 @@ static void join_lists(void *user, size_t begin, size_t end, size_t chunk, uint3
         uint32_t next = r->renumbered[i] & ~MERGED, place = r->next.starts[next];
         if (mate != FCT_NONE) length += r->now.lengths[mate];
         r->next.lengths[next] =
-            length <= LONG ? join_few(r, i, mate, next, place) : join_many(r, i, mate, next, place);
+            length <= LONG ? join_few(r, i, mate, next, place, length) : join_many(r, i, mate, next, place);
     }
 }
 
@@ -323,7 +334,8 @@ typedef struct price_queue {
     uint32_t clusters[QUEUE + 8], entries[QUEUE + 8];
 } price_queue;
 
-static bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
+static inline bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
+    if (r->low && !r->work->materials) return true;
     const uint32_t *materials = r->work->materials;
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
 }
@@ -418,6 +430,7 @@ static fct_result one_round(rounds *r, uint32_t *merges) {
     r->now = r->next, r->next = old;
     r->now.count = live;
     ++r->round;
+    r->low = r->start_height + r->round < FCT_FREE_HEIGHT;
     fct_parallel_for(env, live, GRAIN, price_edges, r);
     return FCT_OK;
 }
@@ -502,6 +515,11 @@ static fct_result run(rounds *r) {
     fct_work *work = r->work;
     fct_result result = work->lists.neighbors ? enter_lists(r) : enter_edges(r);
     if (result != FCT_OK) return result;
+    for (uint32_t i = 0; i < r->now.count; ++i) {
+        uint32_t height = work->heights[r->now.slots[i]];
+        if (height > r->start_height) r->start_height = height;
+    }
+    r->low = r->start_height < FCT_FREE_HEIGHT;
     fct_parallel_for(work->env, r->now.count, GRAIN, price_edges, r);
     for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
         result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
