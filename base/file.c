@@ -123,7 +123,7 @@ fct_result fct_file_write_atomic(const fct_env *env, const char *path,
 
 void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use) {
     if (!file->mapped || file->data == empty || !size) return;
-    static const int advices[] = {MADV_RANDOM, MADV_NORMAL, MADV_WILLNEED};
+    static const int advices[] = {MADV_RANDOM, MADV_SEQUENTIAL, MADV_NORMAL};
     uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), begin = offset / page * page;
     (void)!madvise((char *)file->data + begin, offset + size - begin, advices[use]);
 }

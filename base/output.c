@@ -132,11 +132,11 @@ static fct_result copy_spool(fct_output *output) {
     ssize_t got;
     fct_result result = FCT_OK;
     off_t offset = 0;
+    errno = 0;
     while ((got = pread(output->descriptor, block, sizeof block, offset)) > 0) {
         if (fwrite(block, 1, (size_t)got, to) != (size_t)got) break;
         offset += got;
     }
-    errno = got < 0 ? errno : 0;
     if (got || fflush(to) || ferror(to))
         result = fail_output(output->env, standard ? "standard output" : output->path, errno);
     if (!standard && fclose(to) && result == FCT_OK) result = fail_output(output->env, output->path, errno);

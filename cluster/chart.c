@@ -27,7 +27,7 @@ typedef struct opener {
 
 fct_chart_def fct_chart_def_default(void) {
     return (fct_chart_def){.size = sizeof(fct_chart_def),
-                           .max_angle = 0.25 * 3.14159265358979323846,
+                           .max_angle = FCT_HALF_TURN / 4,
                            .max_faces = FCT_NONE,
                            .max_area = INFINITY};
 }
@@ -36,7 +36,7 @@ fct_chart_def fct_chart_def_default(void) {
 static bool within_angle(const fct_tree_view *view, const fct_cluster *c, double limit) {
     const double rounding = 4e-6;
     double cone = (double)c->cone_angle;
-    if (cone <= limit) return true;
+    if (cone <= limit || limit >= FCT_HALF_TURN) return true;
     if (cone > limit + rounding && c->area > 0) return false;
     v3 s = {0, 0, 0};
     for (size_t p = c->first; p < (size_t)c->first + c->count; ++p) s = v3_add(s, fct_face_vector(view, p));

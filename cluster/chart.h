@@ -7,6 +7,8 @@
 #include "cluster/tree.h"
 #include "facetree/partition.h"
 
+#define FCT_HALF_TURN 3.14159265358979323846
+
 typedef struct fct_charter {
     const fct_tree_view *view;
     fct_chart_def def;
@@ -38,7 +40,7 @@ static inline double fct_angle(v3 a, v3 b) {
     if (v3_norm2(u) == 0 || v3_norm2(v) == 0) return 0;
     double chord = v3_norm(v3_sub(u, v));
     return chord < 1.4142 ? 2 * asin(0.5 * chord)
-                          : 3.14159265358979323846 - 2 * asin(fmin(0.5 * v3_norm(v3_add(u, v)), 1));
+                          : FCT_HALF_TURN - 2 * asin(fmin(0.5 * v3_norm(v3_add(u, v)), 1));
 }
 
 /* Whether the face at a place has a vertex twice. */

@@ -3,8 +3,8 @@
  * A tree's clusters end at its own borders, and what is opened leaves small ones beside large ones. In
  * rounds: pairs of neighbours by the share of the smaller one's border that would go, the largest first; a
  * chart takes any number of others or is taken itself. Two disks make a disk where their common vertices are
- * one more than their common edges and a border is left: only the faces of the smaller one are looked at,
- * with a hash set telling which vertices the other has. Rounds end when no pair is left that may join.
+ * one more than their common edges: only the faces of the smaller one are looked at, with a hash set telling
+ * which vertices the other has. Rounds end when no pair is left that may join.
  */
 #include <string.h>
 
@@ -20,11 +20,11 @@ enum { MOST_ROUNDS = 256, STREAM = 4096 };
 typedef struct piece {
     v3 vector; /* area vector */
     double area, perimeter;
-    double cone;             /* all its normals are within this angle of its vector */
-    uint32_t faces, borders; /* sides without a neighbour inside */
-    uint32_t head, tail;     /* of its list of places */
-    bool fixed;              /* no disk: joins none */
-    bool grew, gone, fresh;  /* this round; taken by another; changed in the last round */
+    double cone; /* all its normals are within this angle of its vector */
+    uint32_t faces;
+    uint32_t head, tail;    /* of its list of places */
+    bool fixed;             /* no disk: joins none */
+    bool grew, gone, fresh; /* this round; taken by another; changed in the last round */
 } piece;
 
 typedef struct merger {
@@ -95,9 +95,9 @@ static bool is_crowded(const fct_sides *sides, uint32_t side) {
     return after != FCT_NONE && sides->after[after] != FCT_NONE;
 }
 
-/* Whether chart `small` may be glued to `large`: the common border is one piece of a line, and some border is
- * left. A crowded edge of `small` whose ends `large` has too may be its own: then not. */
-static bool glues_to_disk(merger *m, uint32_t small, uint32_t large, uint32_t *common, double *length) {
+/* Whether chart `small` may be glued to `large`: the common border is one piece of a line. A crowded edge of
+ * `small` whose ends `large` has too may be its own: then not. */
+static bool glues_to_disk(merger *m, uint32_t small, uint32_t large, double *length) {
     const fct_tree_view *view = m->charter->view;
     const fct_sides *sides = &m->charter->sides;
     uint32_t vertices = 0, edges = 0;
@@ -116,9 +116,7 @@ static bool glues_to_disk(merger *m, uint32_t small, uint32_t large, uint32_t *c
             ++edges;
             *length += fct_side_length(view, side);
         }
-    *common = edges;
-    return !crowded && edges > 0 && vertices == edges + 1 &&
-           m->pieces[small].borders + m->pieces[large].borders > 2 * edges;
+    return !crowded && edges > 0 && vertices == edges + 1;
 }
 
 static double widest_angle(const merger *m, uint32_t chart, v3 axis, double enough) {
@@ -135,6 +133,7 @@ static bool keeps_angle(const merger *m, uint32_t small, uint32_t large, double 
     double limit = m->charter->def.max_angle;
     v3 axis = v3_add(a->vector, b->vector);
     *cone = fmax(a->cone + fct_angle(a->vector, axis), b->cone + fct_angle(b->vector, axis));
+    if (limit >= FCT_HALF_TURN) return true;
     if (v3_norm2(axis) > 0 ? *cone <= limit : a->area + b->area == 0) return true;
     if (!(v3_norm2(axis) > 0) || b->faces > STREAM + 16 * a->faces) return false;
     *cone = widest_angle(m, small, axis, limit);
@@ -150,8 +149,7 @@ static bool join(merger *m, uint32_t small, uint32_t large) {
     if (a->faces > c->def.max_faces - b->faces || a->area + b->area > c->def.max_area) return false;
     if (view->materials && view->materials[a->head] != view->materials[b->head]) return false;
     double cone, length;
-    uint32_t common;
-    bool glued = glues_to_disk(m, small, large, &common, &length);
+    bool glued = glues_to_disk(m, small, large, &length);
     if ((!glued && !c->def.any_topology) || !keeps_angle(m, small, large, &cone)) return false;
     for (uint32_t p = a->head; p != FCT_NONE; p = m->next[p]) {
         m->charter->labels[p] = large;
@@ -163,7 +161,6 @@ static bool join(merger *m, uint32_t small, uint32_t large) {
     b->vector = v3_add(a->vector, b->vector);
     b->area += a->area, b->faces += a->faces;
     b->perimeter += a->perimeter - 2 * length;
-    b->borders += a->borders - 2 * common;
     b->cone = cone, b->grew = true, a->gone = true;
     return true;
 }
@@ -232,9 +229,7 @@ static void describe_pieces(merger *m) {
             uint32_t before = c->sides.before[side], after = c->sides.after[side];
             bool inside = (before != FCT_NONE && c->labels[before / 3] == c->labels[p]) ||
                           (after != FCT_NONE && c->labels[after / 3] == c->labels[p]);
-            if (inside) continue;
-            ++item->borders;
-            item->perimeter += fct_side_length(c->view, side);
+            if (!inside) item->perimeter += fct_side_length(c->view, side);
         }
     }
     for (uint32_t i = 0; i < c->count; ++i)

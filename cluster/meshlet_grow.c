@@ -3,8 +3,8 @@
  * A piece begins beside the one before, at the face with the fewest free faces around it, else at the next
  * free place of the tree. It takes faces that bring no new vertex first, then those that would be left alone,
  * then the one nearest to its middle and most like it in direction; the size of the subtree that would fit
- * says what is near. With no free neighbour left it goes on at the next place of the tree, if that is near.
- * O(F x front of a piece), serial: each piece begins where the others left room.
+ * says what is near. With no neighbour left to take it goes on at the next place of the tree, if that is
+ * near. O(F x front of a piece), serial: each piece begins where the others left room.
  */
 #include <string.h>
 
@@ -12,7 +12,7 @@
 #include "cluster/chart.h"
 #include "cluster/meshlet.h"
 
-enum { MOST_FRONT = 3 * FCT_MESHLET_TRIANGLES };
+enum { MOST_FRONT = 3 * FCT_MESHLET_TRIANGLES, LOOKS = 64 };
 
 typedef struct candidate {
     uint32_t face;
@@ -83,6 +83,14 @@ static int rank_of(const grower *g, uint32_t face, uint32_t *fresh) {
     return *fresh == 0 ? 0 : last ? 1 : 2;
 }
 
+/* Whether a face looks away from a piece that is nearly flat: backs of two-sided surfaces share vertices with
+ * their fronts, and together nothing could be culled. */
+static bool is_opposed(const grower *g, const candidate *c) {
+    double flat = 0.8 * g->packer->face_counts[g->piece];
+    return g->packer->def.flatness > 0 && v3_dot(v3_load(c->normal), g->normal) < 0 &&
+           v3_norm(g->normal) > flat;
+}
+
 /* The best face of the front that fits; false where there is none. Drops what is no longer free. */
 static bool choose(grower *g, candidate *chosen) {
     const fct_packer *p = g->packer;
@@ -98,6 +106,7 @@ static bool choose(grower *g, candidate *chosen) {
         }
         uint32_t fresh, at = i++;
         int rank = rank_of(g, c->face, &fresh);
+        if (is_opposed(g, c)) continue;
         if (fresh > room || rank > best_rank || !fct_packer_material(p, c->face, g->piece)) continue;
         double score = v3_norm2(v3_sub(v3_load(c->centroid), middle)) / g->reach;
         score += p->def.flatness * (1 - v3_dot(v3_load(c->normal), normal));
@@ -115,18 +124,28 @@ static uint32_t next_free(grower *g) {
     return g->next_place < faces ? g->next_place : FCT_NONE;
 }
 
-/* Where a piece without free neighbours may go on: at the next free place, if it is of the same home, within
- * twice the reach, and fits. */
-static bool jump(grower *g, candidate *chosen) {
+/* Whether a piece without neighbours to take may go on at a face: of its home, within twice the reach, of its
+ * direction and material, and with room for it. */
+static bool may_jump(const grower *g, uint32_t face, v3 middle, candidate *chosen) {
     const fct_packer *p = g->packer;
-    uint32_t first = p->faces[(size_t)g->piece * p->def.max_triangles], face = next_free(g), fresh;
-    if (g->front_count > 0 || face == FCT_NONE || p->home[face] != p->home[first]) return false;
-    if (!fct_packer_material(p, face, g->piece)) return false;
+    uint32_t fresh;
     rank_of(g, face, &fresh);
     if (fresh > p->def.max_vertices - (uint32_t)p->vertex_counts[g->piece]) return false;
+    if (!fct_packer_material(p, face, g->piece)) return false;
     *chosen = describe(p->view, face);
-    v3 middle = v3_scale(g->middle, 1.0 / p->face_counts[g->piece]);
+    if (is_opposed(g, chosen)) return false;
     return v3_norm2(v3_sub(v3_load(chosen->centroid), middle)) <= 4 * g->reach;
+}
+
+/* The next free place of the tree where the piece may go on. */
+static bool jump(grower *g, candidate *chosen) {
+    const fct_packer *p = g->packer;
+    uint32_t first = p->faces[(size_t)g->piece * p->def.max_triangles], face = next_free(g);
+    v3 middle = v3_scale(g->middle, 1.0 / p->face_counts[g->piece]);
+    for (int look = 0; look < LOOKS && face < p->view->face_count && p->home[face] == p->home[first];
+         ++look, ++face)
+        if (is_free(g, face) && may_jump(g, face, middle, chosen)) return true;
+    return false;
 }
 
 /* Where the next piece begins; FCT_NONE at the end. */

@@ -221,9 +221,9 @@ static uint64_t sweep(refiner *r) {
     return moves;
 }
 
-/* Neighbours of each face in order of their id, and the borders with them. */
-static void list_neighbours(refiner *r) {
-    const fct_dual *dual = &r->dual;
+/* Neighbours of each face in order of their id, and the borders with them, in place of the dual's edges. */
+static void list_neighbours(const fct_env *env, refiner *r) {
+    fct_dual *dual = &r->dual;
     memset(r->first, 0, ((size_t)dual->face_count + 1) * sizeof *r->first);
     for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) ++r->first[dual->edges[e]];
     uint32_t end = 0;
@@ -243,6 +243,9 @@ static void list_neighbours(refiner *r) {
             r->lengths[place] = dual->lengths[e];
         }
     memset(r->seen, 0, (size_t)dual->face_count * sizeof *r->seen);
+    fct_release(env, dual->edges);
+    fct_release(env, dual->lengths);
+    dual->edges = NULL, dual->lengths = NULL;
 }
 
 /* Sums of the clusters, and what the weight and the limit come to. */
@@ -256,11 +259,8 @@ static void prepare(refiner *r, const fct_refine_def *def) {
         at->vector = v3_add(at->vector, a);
         at->perimeter += (double)dual->perimeters[f];
         ++at->count;
-    }
-    for (size_t e = 0; e < dual->edge_count; ++e) {
-        uint32_t label = r->labels[dual->edges[2 * e]];
-        if (label == r->labels[dual->edges[2 * e + 1]])
-            r->regions[label].perimeter -= 2 * (double)dual->lengths[e];
+        for (uint32_t i = r->first[f]; i < r->first[f + 1]; ++i)
+            if (r->labels[r->neighbours[i]] == r->labels[f]) at->perimeter -= (double)r->lengths[i];
     }
     deviation = 2 * area;
     for (uint32_t i = 0; i < r->region_count; ++i) {
@@ -270,11 +270,14 @@ static void prepare(refiner *r, const fct_refine_def *def) {
     /* On flat ground all deviation is rounding, and borders may still be straightened. */
     deviation = fmax(deviation, 1e-6 * area);
     r->weight = r->squares > 0 ? def->perimeter_weight * deviation / r->squares : 0;
-    r->most_squares = r->squares * def->irregularity_limit;
+    r->most_squares = isinf(def->irregularity_limit) ? INFINITY : r->squares * def->irregularity_limit;
 }
 
 static fct_result allocate(const fct_env *env, refiner *r) {
     size_t faces = r->mesh->face_count, ends = 2 * (size_t)r->dual.edge_count;
+    if (ends > UINT32_MAX)
+        return fct_fail(env, FCT_ERROR_DATA, "%zu sides of faces with neighbours, at most %u can be refined",
+                        ends, UINT32_MAX);
     r->first = fct_allocate(env, faces + 1, sizeof *r->first);
     r->neighbours = fct_allocate(env, ends, sizeof *r->neighbours);
     r->lengths = fct_allocate(env, ends, sizeof *r->lengths);
@@ -283,7 +286,7 @@ static fct_result allocate(const fct_env *env, refiner *r) {
     r->seen = fct_allocate(env, faces, sizeof *r->seen);
     r->moved = fct_allocate_zero(env, faces, sizeof *r->moved);
     if (r->first && r->neighbours && r->lengths && r->labels && r->regions && r->seen && r->moved)
-        return fct_heap_create(env, r->mesh->face_count, &r->heap);
+        return FCT_OK;
     return fct_fail_memory(env, "refining a partition");
 }
 
@@ -346,8 +349,11 @@ fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32
     if (result == FCT_OK) result = allocate(env, r);
     if (result == FCT_OK) {
         memcpy(r->labels, labels, (size_t)mesh->face_count * sizeof *labels);
-        list_neighbours(r);
+        list_neighbours(env, r);
         prepare(r, &options);
+        result = fct_heap_create(env, mesh->face_count, &r->heap);
+    }
+    if (result == FCT_OK) {
         done.seconds_dual = fct_seconds() - start;
         result = run_sweeps(env, r, &options, &done);
         done.seconds_sweeps = fct_seconds() - start - done.seconds_dual;

@@ -33,19 +33,31 @@ typedef struct totals {
     v3 vector, first;
 } totals;
 
+typedef struct frame {
+    v3 center, axes[3];
+} frame;
+
 /* Within rounding of a float and of the largest term. */
 static bool alike(double stored, double value, double size) {
     if (size > FLT_MAX) return true; /* held at the end of the range */
     return fabs(stored - value) <= 1e-5 * size + FLT_MIN;
 }
 
-static void add_face(const fct_tree_view *view, size_t place, const fct_box *box, v3 cone, totals *t) {
-    v3 p[3], center = v3_load(box->center);
+/* Library calls of these would be half of the time. */
+static inline double least(double a, double b) {
+    return a < b ? a : b;
+}
+static inline double most(double a, double b) {
+    return a > b ? a : b;
+}
+
+static void add_face(const fct_tree_view *view, size_t place, const frame *box, v3 cone, totals *t) {
+    v3 p[3];
     for (size_t k = 0; k < 3; ++k) {
-        p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]), center);
+        p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]), box->center);
         for (int i = 0; i < 3; ++i) {
-            double x = v3_dot(p[k], v3_load(box->axes[i]));
-            t->lower[i] = fmin(t->lower[i], x), t->upper[i] = fmax(t->upper[i], x);
+            double x = v3_dot(p[k], box->axes[i]);
+            t->lower[i] = least(t->lower[i], x), t->upper[i] = most(t->upper[i], x);
         }
     }
     v3 u = v3_sub(p[1], p[0]), v = v3_sub(p[2], p[0]), s = v3_scale(v3_cross(u, v), 0.5);
@@ -53,9 +65,9 @@ static void add_face(const fct_tree_view *view, size_t place, const fct_box *box
     double area = v3_norm(s), weight = area;
     if (area > 0) {
         sym3_add_outer(t->moment, 1 / area, s);
-        t->narrowest = fmin(t->narrowest, v3_dot(s, cone) / area);
+        t->narrowest = least(t->narrowest, v3_dot(s, cone) / area);
     } else {
-        weight = 1e-20 * fmax(v3_norm2(u), fmax(v3_norm2(v), v3_norm2(v3_sub(v, u))));
+        weight = 1e-20 * most(v3_norm2(u), most(v3_norm2(v), v3_norm2(v3_sub(v, u))));
     }
     t->area += area, t->weight += weight;
     t->vector = v3_add(t->vector, s);
@@ -122,16 +134,18 @@ static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
     v3 cone = v3_unit(v3_load(c->area_vector));
     double diagonal = 2 * v3_norm(v3_load(box.half));
     totals t = {.narrowest = 1};
+    const frame f = {v3_load(box.center), {v3_load(box.axes[0]), v3_load(box.axes[1]), v3_load(box.axes[2])}};
     for (int i = 0; i < 3; ++i) t.lower[i] = INFINITY, t.upper[i] = -INFINITY;
     for (size_t place = c->first; place < (size_t)c->first + c->count; ++place)
-        add_face(view, place, &box, cone, &t);
+        add_face(view, place, &f, cone, &t);
     const char *fault = box_fault(c, &box, &t, diagonal);
+    if (fault) return fault;
+    fault = sums_fault(c, &t);
     if (fault) return fault;
     if (!(c->cone_angle >= 0 && c->cone_angle < 3.1416F)) return "a cone of no angle";
     if (v3_norm2(cone) > 0 && acos(fmax(t.narrowest, -1)) > (double)c->cone_angle + 1e-7)
         return "a face outside its cone of normals";
-    fault = sums_fault(c, &t);
-    return fault ? fault : plane_fault(c, &box, &t, diagonal);
+    return plane_fault(c, &box, &t, diagonal);
 }
 
 static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -196,6 +210,7 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
 fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree) {
     fct_result result = fct_tree_check_sums(env, tree);
     if (result == FCT_OK) result = fct_tree_check_structure(env, tree);
+    fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_USUAL);
     if (result == FCT_OK) result = check_counts(env, tree);
     return result == FCT_OK ? check_geometry(env, tree) : result;
 }

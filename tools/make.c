@@ -51,11 +51,11 @@ static int cylinder(make_mesh *m, uint32_t n) {
     return TOOL_DONE;
 }
 static int grid(make_mesh *m, uint32_t n) {
-    make_grid(m, root(n / 2.));
+    make_sheet(m, root(n / 2.), NULL, 0);
     return TOOL_DONE;
 }
 static int terrain(make_mesh *m, uint32_t n) {
-    make_terrain(m, root(n / 2.), m->t->seed);
+    make_sheet(m, root(n / 2.), make_terrain_height, m->t->seed);
     return TOOL_DONE;
 }
 static int crates(make_mesh *m, uint32_t n) {
@@ -109,9 +109,21 @@ static int find_thing(tool *t, const char *name, int *index) {
     return tool_fail(t, TOOL_USAGE, "cannot make '%s'; 'facetree help make' lists what can be made", name);
 }
 
+/* Sheets need no mesh in memory where the file is a PLY. */
+static bool goes_by_rows(int (*mesh)(make_mesh *m, uint32_t triangles), const char *path) {
+    return (mesh == grid || mesh == terrain) && tool_ends(path, "ply");
+}
+
 static int make_one(tool *t, int index, uint32_t triangles, bool inside, make_result *result) {
     make_mesh m = {.t = t};
     int code = tool_check_output(t, t->output);
+    if (code == TOOL_DONE && goes_by_rows(things[index].mesh, t->output)) {
+        uint32_t n = root(triangles / 2.);
+        result->triangles = 2 * (uint64_t)n * n;
+        json_array_append_new(result->files, json_string(t->output));
+        return make_sheet_file(t, t->output, n, things[index].mesh == grid ? NULL : make_terrain_height,
+                               inside);
+    }
     if (code == TOOL_DONE) code = things[index].mesh(&m, triangles);
     if (code != TOOL_DONE) {
         make_clear(&m);

@@ -45,14 +45,21 @@ void make_box(make_mesh *m, make_point lower, make_point upper, bool bottom, boo
  * end closes it. The outside is on the right of the profile's direction... upwards is outwards. */
 void make_lathe(make_mesh *m, make_point center, const double (*profile)[2], uint32_t count,
                 uint32_t segments);
-/* n x n squares over the unit square in the plane y = 0, facing up. */
-void make_grid(make_mesh *m, uint32_t n);
-/* Hills and valleys by noise over 1 x 1. */
-void make_terrain(make_mesh *m, uint32_t n, uint64_t seed);
+/* Height over a place of the unit square. */
+typedef double make_height(double x, double z, uint64_t seed);
+/* Hills and valleys by noise. */
+make_height make_terrain_height;
+/* n x n squares over the unit square, facing up; height NULL: the plane y = 0. */
+void make_sheet(make_mesh *m, uint32_t n, make_height *height, uint64_t seed);
+/* Its vertex in column i and row j. */
+make_point make_sheet_vertex(uint32_t n, uint32_t i, uint32_t j, make_height *height, uint64_t seed);
 /* Slender boxes at random places and angles in the unit cube. */
 void make_crates(make_mesh *m, uint32_t count, uint64_t seed);
 void make_cylinder(make_mesh *m, uint32_t triangles);
 void make_cube(make_mesh *m, uint32_t triangles);
+
+/* --- a sheet of any size into a PLY file (make_sheet.c); returns an exit code --- */
+int make_sheet_file(tool *t, const char *path, uint32_t n, make_height *height, bool inside);
 
 /* --- noise (make_noise.c) --- */
 /* A hash of three integers and the seed, uniform in [0, 1). */

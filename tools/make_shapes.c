@@ -126,16 +126,17 @@ void make_lathe(make_mesh *m, make_point center, const double (*profile)[2], uin
     }
 }
 
-/* (n + 1)^2 vertices row by row, facing up. */
-static void add_sheet(make_mesh *m, uint32_t n, double (*height)(double x, double z, uint64_t seed),
-                      uint64_t seed) {
+make_point make_sheet_vertex(uint32_t n, uint32_t i, uint32_t j, make_height *height, uint64_t seed) {
+    double x = (double)i / n, z = (double)j / n;
+    return make_p(x, height ? height(x, z, seed) : 0, z);
+}
+
+/* (n + 1)^2 vertices row by row. */
+void make_sheet(make_mesh *m, uint32_t n, make_height *height, uint64_t seed) {
     uint32_t first = (uint32_t)m->vertex_count;
     make_reserve(m, ((size_t)n + 1) * (n + 1), 2 * (size_t)n * n);
     for (uint32_t j = 0; j <= n; ++j)
-        for (uint32_t i = 0; i <= n; ++i) {
-            double x = (double)i / n, z = (double)j / n;
-            make_vertex(m, make_p(x, height ? height(x, z, seed) : 0, z));
-        }
+        for (uint32_t i = 0; i <= n; ++i) make_vertex(m, make_sheet_vertex(n, i, j, height, seed));
     for (uint32_t j = 0; j < n; ++j)
         for (uint32_t i = 0; i < n; ++i) {
             uint32_t a = first + j * (n + 1) + i;
@@ -143,21 +144,13 @@ static void add_sheet(make_mesh *m, uint32_t n, double (*height)(double x, doubl
         }
 }
 
-void make_grid(make_mesh *m, uint32_t n) {
-    add_sheet(m, n, NULL, 0);
-}
-
-static double terrain_height(double x, double z, uint64_t seed) {
+double make_terrain_height(double x, double z, uint64_t seed) {
     double sum = 0, size = .25, frequency = 2;
     for (int octave = 0; octave < 9; ++octave, size *= .48, frequency *= 2.03) {
         double n = make_noise(make_p(x * frequency, 7.3 * octave, z * frequency), seed);
         sum += size * (octave < 3 ? n : n * (.3 + fmax(0, sum) * 3));
     }
     return sum;
-}
-
-void make_terrain(make_mesh *m, uint32_t n, uint64_t seed) {
-    add_sheet(m, n, terrain_height, seed);
 }
 
 /* A random rotation by a uniform unit quaternion. */

@@ -53,15 +53,19 @@ uint64_t bench_roll(bench_dice *dice);
 /* In [0, 1). */
 double bench_unit(bench_dice *dice);
 
-/* Area-weighted means over a partition, from the triangles and their labels. */
+/* Per face, whether it stands for itself: of faces on the same three corners one does if those turned one way
+ * outnumber those turned the other, and none if they cancel; faces with a repeated corner never do. What no
+ * builder can cluster well and some cannot even take. To be freed. */
+bool *bench_single_faces(const fct_mesh *mesh);
+
+/* Area-weighted means over the faces of a partition that stand for themselves. */
 typedef struct bench_quality {
-    uint32_t clusters;      /* that have faces */
-    double deviation;       /* |n_f - N|^2, N the cluster's mean normal: L2,1 */
-    double fit;             /* squared distance to the least-squares plane over the squared diagonal */
-    double irregularity;    /* perimeter^2 / (4 pi area) */
-    double deviation_worst; /* of the cluster with the largest */
+    uint32_t clusters;   /* that have such faces */
+    double deviation;    /* |n_f - N|^2, N the cluster's mean normal: L2,1 */
+    double fit;          /* squared distance to the least-squares plane over the squared diagonal */
+    double irregularity; /* perimeter^2 / (4 pi area) */
 } bench_quality;
-/* Labels below label_count; a face labelled FCT_NONE is a cluster of its own. */
+/* Labels below label_count; a face labelled FCT_NONE belongs to no cluster and must not stand for itself. */
 bench_quality bench_judge(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                           uint32_t label_count);
 

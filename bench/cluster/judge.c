@@ -37,25 +37,55 @@ static void add_face(sums *s, const fct_mesh *mesh, uint32_t face) {
     s->area += area;
 }
 
-static uint32_t *complete(const uint32_t *labels, uint32_t faces, uint32_t *label_count) {
-    uint32_t *out = bench_allocate(faces, sizeof *out);
-    for (uint32_t f = 0; f < faces; ++f) {
-        out[f] = labels[f];
-        if (labels[f] == FCT_NONE)
-            out[f] = (*label_count)++;
-        else if (labels[f] >= *label_count)
-            bench_fail("face %u has label %u of %u", f, labels[f], *label_count);
+typedef struct corners {
+    uint32_t low, middle, high, face;
+    int turn; /* 1 or -1 */
+} corners;
+
+static corners sort_corners(const uint32_t *t, uint32_t face) {
+    corners c = {t[0], t[1], t[2], face, 1};
+    for (int i = 0; i < 3; ++i) {
+        uint32_t *first = i == 1 ? &c.middle : &c.low, *second = i == 1 ? &c.high : &c.middle, swap = *first;
+        if (*first > *second) *first = *second, *second = swap, c.turn = -c.turn;
     }
-    return out;
+    return c;
 }
 
+static int compare_corners(const void *x, const void *y) {
+    const corners *a = x, *b = y;
+    if (a->low != b->low) return a->low < b->low ? -1 : 1;
+    if (a->middle != b->middle) return a->middle < b->middle ? -1 : 1;
+    if (a->high != b->high) return a->high < b->high ? -1 : 1;
+    return a->face < b->face ? -1 : a->face > b->face;
+}
+
+bool *bench_single_faces(const fct_mesh *mesh) {
+    bool *single = bench_allocate(mesh->face_count, sizeof *single);
+    corners *all = bench_allocate(mesh->face_count, sizeof *all);
+    for (uint32_t f = 0; f < mesh->face_count; ++f) all[f] = sort_corners(mesh->triangles + 3 * (size_t)f, f);
+    qsort(all, mesh->face_count, sizeof *all, compare_corners);
+    for (size_t i = 0, end; i < mesh->face_count; i = end) {
+        int sum = 0;
+        for (end = i; end < mesh->face_count && all[end].low == all[i].low &&
+                      all[end].middle == all[i].middle && all[end].high == all[i].high;
+             ++end)
+            sum += all[end].turn;
+        bool flat = all[i].low == all[i].middle || all[i].middle == all[i].high;
+        single[all[i].face] = sum != 0 && !flat;
+    }
+    free(all);
+    return single;
+}
+
+/* Over the whole mesh, doubled faces too, whose borders are those of their clusters. */
 static void add_borders(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels, sums *all) {
     fct_dual dual;
     bench_check(fct_dual_build(env, mesh, &dual), "the dual graph");
-    for (uint32_t f = 0; f < mesh->face_count; ++f) all[labels[f]].perimeter += (double)dual.perimeters[f];
+    for (uint32_t f = 0; f < mesh->face_count; ++f)
+        if (labels[f] != FCT_NONE) all[labels[f]].perimeter += (double)dual.perimeters[f];
     for (size_t e = 0; e < dual.edge_count; ++e) {
         uint32_t a = labels[dual.edges[2 * e]], b = labels[dual.edges[2 * e + 1]];
-        if (a == b) all[a].perimeter -= 2 * (double)dual.lengths[e];
+        if (a == b && a != FCT_NONE) all[a].perimeter -= 2 * (double)dual.lengths[e];
     }
     fct_dual_release(env, &dual);
 }
@@ -70,25 +100,27 @@ static double least_moment(const sums *s) {
 
 bench_quality bench_judge(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                           uint32_t label_count) {
-    uint32_t *full = complete(labels, mesh->face_count, &label_count);
     sums *all = bench_allocate(label_count, sizeof *all);
-    for (uint32_t f = 0; f < mesh->face_count; ++f) add_face(&all[full[f]], mesh, f);
-    add_borders(env, mesh, full, all);
+    bool *single = bench_single_faces(mesh);
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        if (labels[f] >= label_count && (labels[f] != FCT_NONE || single[f]))
+            bench_fail("face %u has label %u of %u", f, labels[f], label_count);
+        if (single[f]) add_face(&all[labels[f]], mesh, f);
+    }
+    add_borders(env, mesh, labels, all);
     double area = 0, diagonal = bench_diagonal(mesh);
     bench_quality q = {0};
     for (uint32_t i = 0; i < label_count; ++i) {
         const sums *s = &all[i];
         q.clusters += s->faces > 0;
         if (!(s->area > 0)) continue;
-        double deviation = 2 * fmax(s->area - v3_norm(s->vector), 0);
-        q.deviation_worst = fmax(q.deviation_worst, deviation / s->area);
-        q.deviation += deviation;
+        q.deviation += 2 * fmax(s->area - v3_norm(s->vector), 0);
         q.fit += least_moment(s) / (diagonal * diagonal);
         q.irregularity += fmax(s->perimeter, 0) * fmax(s->perimeter, 0) / (4 * M_PI);
         area += s->area;
     }
     if (area > 0) q.deviation /= area, q.fit /= area, q.irregularity /= area;
     free(all);
-    free(full);
+    free(single);
     return q;
 }

@@ -1,9 +1,9 @@
 /* bench/cluster/tree.c: builds our tree of one mesh and tells what it took and how good it is.
  *
  * usage: tree MESH METHOD THREADS [K]
- * METHOD is rounds or greedy. With K, the partition into K clusters is judged and boxes are added up, too, on
- * two threads and outside of every measured time and size. Memory is that of the build above what the loaded
- * mesh takes; peak_bytes is the whole process with its mesh.
+ * METHOD is rounds or greedy. With K, the partition into K clusters is judged, refined on one thread and
+ * judged again, and boxes are added up, outside of every measured time and size of the build. Memory is that
+ * of the build above what the loaded mesh takes; peak_bytes is the whole process with its mesh.
  */
 #include <math.h>
 #include <stdio.h>
@@ -75,6 +75,13 @@ static void judge(const fct_mesh *mesh, const fct_tree *tree, uint32_t count) {
     printf(
         ", \"clusters\": %u, \"deviation\": %.6g, \"fit\": %.6g, \"irregularity\": %.6g, \"box_area\": %.6g",
         q.clusters, q.deviation, q.fit, q.irregularity, area / (diagonal * diagonal));
+    fct_env alone = bench_env(1);
+    double start = bench_seconds();
+    bench_check(fct_partition_refine(&alone, mesh, found, NULL, labels, NULL), "the refinement");
+    double seconds = bench_seconds() - start;
+    q = bench_judge(&env, mesh, labels, found);
+    printf(", \"refine_seconds\": %.6g, \"refined_deviation\": %.6g, \"refined_irregularity\": %.6g", seconds,
+           q.deviation, q.irregularity);
     free(labels);
 }
 

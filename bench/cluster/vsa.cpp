@@ -2,20 +2,19 @@
  *
  * usage: vsa MESH K SEEDING
  * SEEDING is random, hierarchical or incremental. Seeding with its five relaxations and 20 iterations are
- * timed; the conversion of the mesh is not. What is no manifold is cut into one first; faces with a repeated
- * corner and doubled ones stay out, and count as clusters without error. The partition is judged as ours is.
+ * timed; the conversion of the mesh is not. What is no manifold is cut into one first; doubled faces stay
+ * out. The partition is judged as ours is.
  */
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Variational_shape_approximation.h>
-#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <map>
 #include <vector>
 
 #include "bench/cluster/bench.h"
@@ -36,42 +35,23 @@ seeding::Seeding_method method_of(const char *name) {
     bench_fail("expected random, hierarchical or incremental, found '%s'", name);
 }
 
-/* Faces on the same three corners: one is kept where those turned one way outnumber those turned the other,
- * none where they cancel, for leaves of no thickness tear CGAL's mesh into thousands of parts. */
-std::vector<bool> choose(const fct_mesh &input) {
-    std::vector<bool> keep(input.face_count, false);
-    std::map<std::array<uint32_t, 3>, std::pair<int, uint32_t>> groups;
-    for (uint32_t f = 0; f < input.face_count; ++f) {
-        std::array<uint32_t, 3> t;
-        std::copy_n(input.triangles + 3 * std::size_t(f), 3, t.begin());
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-        bool forward = t[1] < t[2];
-        if (!forward) std::swap(t[1], t[2]);
-        auto &group = groups.try_emplace(t, 0, f).first->second;
-        group.first += forward ? 1 : -1;
-    }
-    for (const auto &group : groups)
-        if (group.second.first != 0) keep[group.second.second] = true;
-    return keep;
-}
-
 /* kept[i] is the input's face that became face i. */
 Mesh convert(const fct_mesh &input, std::vector<uint32_t> &kept) {
     namespace processing = CGAL::Polygon_mesh_processing;
     std::vector<Kernel::Point_3> points;
     std::vector<std::array<std::size_t, 3>> faces;
-    std::vector<bool> keep = choose(input);
+    bool *single = bench_single_faces(&input);
     for (std::size_t v = 0; v < input.vertex_count; ++v) {
         const float *p = input.positions + 3 * v;
         points.emplace_back(p[0], p[1], p[2]);
     }
     for (std::size_t f = 0; f < input.face_count; ++f) {
         const uint32_t *t = input.triangles + 3 * f;
-        if (!keep[f]) continue;
+        if (!single[f]) continue;
         faces.push_back({t[0], t[1], t[2]});
         kept.push_back(static_cast<uint32_t>(f));
     }
+    std::free(single);
     if (!processing::is_polygon_soup_a_polygon_mesh(faces)) processing::orient_polygon_soup(points, faces);
     Mesh mesh;
     processing::polygon_soup_to_polygon_mesh(points, faces, mesh);

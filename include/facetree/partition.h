@@ -29,7 +29,8 @@ FCT_API fct_result fct_tree_cut_at_distance(const fct_env *env, const fct_tree *
 
 typedef struct fct_chart_def {
     uint32_t size;
-    double max_angle;   /* between a face's normal and the chart's mean normal, radians; default pi / 4 */
+    double max_angle; /* between a face's normal and the chart's mean normal, radians; default pi / 4; from pi
+                         on any */
     uint32_t max_faces; /* a chart; at least 1; default FCT_NONE, no limit */
     double max_area;    /* a chart, unless it is one face; default infinity */
     bool any_topology;  /* charts need not be disks; default false */

@@ -203,7 +203,7 @@ static void every_flipped_byte_is_found(void **state) {
         fct_tree *back;
         size_t size, refused = 0;
         unsigned char *bytes = save_small(&env, n, &size);
-        for (size_t i = 0; i < size; i += n == 3 || i < 4096 ? 1 : 13) {
+        for (size_t i = 0; i < size; i += n == 3 || i < 704 ? 1 : 61) {
             unsigned char old = bytes[i];
             bytes[i] = (unsigned char)(old ^ (i % 3 ? 0x81 : 0xFF));
             if (fct_tree_parse(&env, "flipped", bytes, size, &back) == FCT_OK) {
@@ -218,6 +218,74 @@ static void every_flipped_byte_is_found(void **state) {
         assert_int_equal(refused, 512 + strlen("a sphere") + 1 + 2 * strlen("name 0") + 2);
         free(bytes);
     }
+    assert_int_equal(quiet.alive, 0);
+}
+
+/* Links, ranges and indices made up on purpose: no query leaves the arrays, none runs in circles. */
+static void no_damage_leads_astray(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    env.thread_count = 1;
+    size_t size, head = 576, refused = 0;
+    unsigned char *bytes = save_small(&env, 8, &size), *damaged = malloc(size);
+    fct_tree *back;
+    assert_int_equal(fct_tree_parse(&env, "whole", bytes, size, &back), FCT_OK);
+    fct_tree_view view = fct_tree_get(back);
+    const uint32_t nodes = view.node_count, faces = view.face_count;
+    const uint32_t wrong[] = {0, 1, 2, nodes - 1, nodes, nodes + faces - 1, nodes + faces, faces, FCT_NONE};
+    const size_t count = sizeof wrong / sizeof *wrong;
+    fct_tree_destroy(back);
+    uint32_t random = 12345;
+    for (int round = 0; round < (SANITIZED ? 100 : 1000); ++round) {
+        memcpy(damaged, bytes, size);
+        for (int i = 0; i <= round % 5; ++i) {
+            random = random * 1664525 + 1013904223;
+            size_t at = (head + random % (size - head)) / 4 * 4;
+            random = random * 1664525 + 1013904223;
+            uint32_t value = random >> 28 < count ? wrong[random >> 28] : random % (nodes + faces);
+            memcpy(damaged + at, &value, 4);
+        }
+        if (fct_tree_parse(&env, "damaged", damaged, size, &back) == FCT_OK) {
+            walk(&env, back);
+            fct_tree_destroy(back);
+        } else {
+            ++refused;
+        }
+    }
+    assert_int_equal(refused, 0);
+    free(bytes), free(damaged);
+    assert_int_equal(quiet.alive, 0);
+}
+
+/* Each node's two children are the node after it: walks that trust links visit 2^(F - 1) of them. */
+static void shared_children_end(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    size_t size;
+    unsigned char *bytes = save_small(&env, 8, &size);
+    fct_tree *back;
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 8, &mesh);
+    fct_tree_view view = fct_tree_get(tree);
+    unsigned char *at = bytes;
+    while (memcmp(at, view.clusters, view.node_count * sizeof *view.clusters) != 0) ++at;
+    for (uint32_t i = 0; i < view.node_count; ++i) {
+        const uint32_t links[4] = {i + 1, i + 1, 0, view.face_count};
+        memcpy(at + i * sizeof(fct_cluster) + offsetof(fct_cluster, child), links, sizeof links);
+    }
+    uint32_t *nodes = malloc(4 * (size_t)view.face_count), count;
+    assert_int_equal(fct_tree_parse(&env, "shared", bytes, size, &back), FCT_OK);
+    assert_int_equal(fct_tree_partition(&env, back, view.face_count, nodes, &count), FCT_ERROR_DATA);
+    assert_int_equal(count, 0);
+    assert_non_null(strstr(quiet.text, "shared: node 0: child's range"));
+    walk(&env, back);
+    assert_int_equal(fct_tree_check(&env, back), FCT_ERROR_DATA);
+    fct_tree_destroy(back);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    free(nodes), free(bytes);
     assert_int_equal(quiet.alive, 0);
 }
 
@@ -278,6 +346,9 @@ static void errors_are_told(void **state) {
     assert_non_null(strstr(r.text, "there-is-no-such-file.fct"));
     assert_int_equal(fct_tree_parse(&env, "ply", "ply\nformat ascii 1.0", 20, &tree), FCT_ERROR_DATA);
     assert_non_null(strstr(r.text, "no hierarchy file"));
+    unsigned char old[512] = {0x89, 'F', 'C', 'T', '\r', '\n', 0x1A, '\n', 1, 0, 0, 0, 4, 3, 2, 1};
+    assert_int_equal(fct_tree_parse(&env, "old.fct", old, sizeof old, &tree), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "old.fct: version 1 of the hierarchy file, expected 2"));
     fct_mesh mesh;
     tree = build_small(&env, 2, &mesh);
     assert_int_equal(fct_tree_save(&env, tree, "/nowhere/at/all.fct"), FCT_ERROR_OUTPUT);
@@ -317,6 +388,8 @@ int main(void) {
                                        cmocka_unit_test(one_face_comes_back),
                                        cmocka_unit_test(every_cut_is_refused),
                                        cmocka_unit_test(every_flipped_byte_is_found),
+                                       cmocka_unit_test(no_damage_leads_astray),
+                                       cmocka_unit_test(shared_children_end),
                                        cmocka_unit_test(endless_numbers_do_not_pass),
                                        cmocka_unit_test(errors_are_told),
                                        cmocka_unit_test(survives_no_memory)};

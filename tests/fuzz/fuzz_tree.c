@@ -1,36 +1,28 @@
-/* Whatever the bytes are: an error, or a tree on which nothing that a user may ask crashes or hangs, verified
- * or not. Checksums are mended first, for no mutation would ever get past them. */
+/* Whatever the bytes are: an error, or a tree on which nothing that a user may ask crashes or hangs, checked
+ * or not, verified or not. Checksums are mended first, for no mutation would ever get past them. */
 #include <math.h>
 #include <string.h>
 
-#include <xxhash.h>
-
-#include "cluster/file.h"
+#include "cluster/format.h"
 #include "facetree/bvh.h"
 #include "fuzz/fuzz.h"
 
-/* As docs/hierarchy-file.md has it. */
-enum { HEADER = 448, FILE_SIZE = 16, CHECKSUM = 24, SECTIONS = 128, SECTION = 32 };
-
-static uint64_t get64(const uint8_t *p) {
-    uint64_t value;
-    memcpy(&value, p, sizeof value);
-    return value;
-}
-
-static void put64(uint8_t *p, uint64_t value) {
-    memcpy(p, &value, sizeof value);
-}
-
-static void mend(uint8_t *data, size_t size) {
-    if (size < HEADER) return;
-    for (uint8_t *s = data + SECTIONS; s < data + HEADER; s += SECTION) {
-        uint64_t offset = get64(s + 8), length = get64(s + 16);
-        if (offset <= size && length <= size - offset) put64(s + 24, XXH3_64bits(data + offset, length));
+static void mend(const fct_env *env, uint8_t *data, size_t size) {
+    fct_format_header h;
+    uint64_t hash;
+    if (size < sizeof h) return;
+    memcpy(&h, data, sizeof h);
+    h.file_size = size;
+    for (int i = 0; i < FCT_SECTION_COUNT; ++i) {
+        fct_format_section *s = &h.sections[i];
+        if (s->offset > size || s->size > size - s->offset || s->size > FCT_FORMAT_BLOCK) continue;
+        fct_format_hash_blocks(env, data + s->offset, s->size, &hash);
+        s->checksum = fct_format_fold(&hash, fct_format_block_count(s->size));
     }
-    put64(data + FILE_SIZE, size);
-    put64(data + CHECKSUM, 0);
-    put64(data + CHECKSUM, XXH3_64bits(data, HEADER));
+    memcpy(data, &h, sizeof h);
+    if (h.head_size < sizeof h || h.head_size > size) return;
+    h.checksum = fct_format_head_checksum(data, h.head_size);
+    memcpy(data, &h, sizeof h);
 }
 
 static void shoot(const fct_env *env, const fct_tree *tree) {
@@ -47,27 +39,43 @@ static void shoot(const fct_env *env, const fct_tree *tree) {
     fct_bvh_destroy(bvh);
 }
 
-static void use(const fct_env *env, const fct_tree *tree) {
+/* Partitions and their clusters, one by one. `sound`: the tree has been checked. */
+static void cut(const fct_env *env, const fct_tree *tree, uint32_t *nodes, bool sound) {
     fct_tree_view view = fct_tree_get(tree);
-    uint32_t *nodes = fct_allocate(env, view.face_count, 4), *labels = fct_allocate(env, view.face_count, 4);
     for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 2) {
-        uint32_t count = fct_tree_partition(tree, k, nodes), places = 0;
-        for (uint32_t i = 0; i < count; ++i) {
-            fct_cluster cluster;
+        uint32_t count, places = 0;
+        fct_result result = fct_tree_partition(env, tree, k, nodes, &count);
+        fuzz_require(result == FCT_OK ? count >= k : count == 0 && !sound, "a partition is one or none");
+        for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
+            fct_cluster cluster, child[2];
             fct_box box;
-            fct_tree_cluster(tree, nodes[i], &cluster);
+            result = fct_tree_cluster(tree, nodes[i], &cluster);
+            fuzz_require(result == FCT_OK || !sound, "a checked tree has all clusters");
+            if (result != FCT_OK) break;
             fct_cluster_box(&cluster, &box);
             fuzz_require(cluster.first == places, "clusters follow one another");
             places += cluster.count;
+            if (cluster.count < 2) continue;
+            result = fct_tree_children(tree, nodes[i], child);
+            fuzz_require(result == FCT_OK ? child[0].count + child[1].count == cluster.count : !sound,
+                         "two children make their parent");
+            result = FCT_OK;
         }
-        fuzz_require(places == view.face_count, "a partition has every face once");
-        fct_tree_labels(tree, nodes, count, labels);
+        if (result == FCT_OK) fuzz_require(places == view.face_count, "a partition has every face once");
+    }
+    fuzz_require(fct_tree_count_at_cost(tree, .01) <= view.face_count, "there are no more than all");
+}
+
+static void use_all(const fct_env *env, const fct_tree *tree, uint32_t *nodes, uint32_t *labels) {
+    fct_tree_view view = fct_tree_get(tree);
+    for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 2) {
+        uint32_t count;
+        fuzz_require(fct_tree_partition(env, tree, k, nodes, &count) == FCT_OK, "a partition comes out");
+        fuzz_require(fct_tree_labels(env, tree, nodes, count, labels) == FCT_OK, "labels come out");
         for (uint32_t f = 0; f < view.face_count; ++f) fuzz_require(labels[f] < count, "labels are in range");
         fct_partition_quality quality;
         fct_tree_quality(env, tree, nodes, count, &quality);
     }
-    fct_release(env, nodes);
-    fct_release(env, labels);
     fct_mesh mesh;
     fuzz_require(fct_tree_mesh(env, tree, &mesh) == FCT_OK, "a tree holds a mesh");
     fct_mesh_release(env, &mesh);
@@ -81,13 +89,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     uint8_t *copy = malloc(size + 1);
     if (!copy) return 0;
     memcpy(copy, data, size);
-    mend(copy, size);
+    mend(&env, copy, size);
     fct_result result = fct_tree_parse(&env, "input", copy, size, &tree);
     free(copy);
     fuzz_require((result == FCT_OK) == (tree != NULL), "a failed read leaves no tree");
     if (!tree) return 0;
-    use(&env, tree);
+    uint32_t faces = fct_tree_get(tree).face_count;
+    uint32_t *nodes = fct_allocate(&env, faces, 4), *labels = fct_allocate(&env, faces, 4);
+    cut(&env, tree, nodes, false);
+    if (fct_tree_check(&env, tree) == FCT_OK) {
+        cut(&env, tree, nodes, true);
+        use_all(&env, tree, nodes, labels);
+    }
     fct_tree_verify(&env, tree);
+    fct_release(&env, nodes);
+    fct_release(&env, labels);
     fct_tree_destroy(tree);
     return 0;
 }

@@ -76,6 +76,22 @@ expect 0 info parts.glb --json
 check "vertices have colours" test "$(value vertex_colors)" = true
 expect 0 info parts.ply --json
 check "faces have colours" test "$(value face_colors)" = true
+expect 0 partition sphere.fct -k 20 -o cut.txt --json
+cut=$(value mean_normal_deviation)
+expect 0 partition sphere.fct -k 20 --refine 4 -o refined.txt --json
+keys clusters mean_normal_deviation box_area sweeps moves seconds before
+refined=$(value mean_normal_deviation)
+holds "$refined < $cut && $(value moves) > 0"
+holds "$(value mean_irregularity) <= $(sed -n '/"before"/,$p' out | value mean_irregularity /dev/stdin)"
+check "20 labels on 960 lines" test "$(wc -l <refined.txt) $(sort -u refined.txt | wc -l)" = "960 20"
+check "other labels than the cut's" test "$(cmp -s cut.txt refined.txt; echo $?)" = 1
+expect 0 partition sphere.fct -k 20 --refine 4 --perimeter 0 --irregularity inf -o freely.txt --json
+holds "$(value mean_normal_deviation) < $refined"
+expect 0 partition sphere.fct -k 20 --refine 0 -o same.txt --quiet
+check "no sweep, no change" cmp -s cut.txt same.txt
+expect 0 partition sphere.fct -k 20 --refine 4 -o refined.glb
+expect 0 info refined.glb --json
+holds "$(value faces) == 960"
 expect 0 boxes sphere.fct -k 6 -o boxes.json
 check "boxes tell their geometry" grep -q half_extents boxes.json
 check "six boxes" test "$(grep -c '"center"' boxes.json)" = 6

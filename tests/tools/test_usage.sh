@@ -84,6 +84,10 @@ expect 64 partition cube.off -k 0 -o x
 expect 64 partition cube.off -k 13 -o x
 says "can be cut into 1 to 12 clusters"
 expect 64 partition cube.off -k 2 -o x.stl
+expect 64 partition cube.off -k 2 --refine -1 -o x
+expect 64 partition cube.off -k 2 --perimeter 1 -o x
+expect 64 partition cube.off -k 2 --refine 2 --irregularity .5 -o x
+expect 64 partition cube.off -k 2 --refine 2 --perimeter nan -o x
 expect 64 boxes cube.off
 expect 64 boxes cube.off -k 13
 expect 64 raycast cube.off

@@ -1,0 +1,369 @@
+/* mesh/stream.c: see stream.h.
+ *
+ * A PLY is read in place if its layout follows from its header and size alone: binary, records of vertices of
+ * one size, and faces that are all triangles. Lists have at least three corners, so that where the file is as
+ * long as if all had three, all have. Rows are read into a buffer and converted by the same code that reads
+ * whole files.
+ */
+#define _GNU_SOURCE
+#include "mesh/stream.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "mesh/ply_read.h"
+#include "mesh/ply_value.h"
+
+enum { ROWS = 8192, HEADER_MOST = 1 << 24 };
+
+/* An element of a PLY whose records lie at offset + i * size. */
+typedef struct table {
+    uint64_t offset;
+    size_t size;
+    const fct_ply_property *properties;
+    size_t *offsets; /* of the properties' values in a record */
+    fct_ply_target target;
+} table;
+
+struct fct_stream {
+    const fct_env *env;
+    char *name;
+    fct_stream_info info;
+    uint32_t material_limit;
+    /* a PLY read in place */
+    int descriptor; /* below zero: a spool */
+    char *header_text;
+    fct_ply_header header;
+    table vertices, faces;
+    fct_soup rows; /* values of ROWS records */
+    unsigned char *buffer;
+    bool swap;
+    /* or a spool: positions, triangles, colours, materials */
+    fct_spool spool;
+    uint64_t triangles_at, colors_at, materials_at;
+    char **names; /* of materials */
+};
+
+static fct_result fail_read(const fct_stream *s) {
+    return fct_fail(s->env, FCT_ERROR_INPUT, "%s: cannot be read: %s", s->name,
+                    errno ? strerror(errno) : "it became shorter");
+}
+
+static fct_result read_bytes(const fct_stream *s, uint64_t offset, void *data, size_t size) {
+    size_t got;
+    errno = 0;
+    return fct_read_at(s->descriptor, offset, data, size, &got) && got == size ? FCT_OK : fail_read(s);
+}
+
+/* --- Layout of a PLY --- */
+
+/* Size of the element's records and the offsets in them; 0 if they have no one size. */
+static size_t record_size(const fct_ply_header *h, const fct_ply_element *element, size_t *offsets) {
+    size_t size = 0;
+    bool faces = fct_ply_kind_of(element) == FCT_PLY_FACES;
+    for (size_t i = 0; i < element->property_count; ++i) {
+        const fct_ply_property *p = &h->properties[element->first_property + i];
+        size_t count = 1;
+        if (p->count_type != FCT_PLY_NONE) {
+            bool corners = fct_text_word_is(p->name, p->name_length, "vertex_indices") ||
+                           fct_text_word_is(p->name, p->name_length, "vertex_index");
+            bool places = fct_text_word_is(p->name, p->name_length, "texcoord");
+            if (!faces || (!corners && !places)) return 0;
+            size += fct_ply_size(p->count_type);
+            count = corners ? 3 : 6;
+        }
+        if (offsets) offsets[i] = size;
+        size += count * fct_ply_size(p->type);
+    }
+    return size;
+}
+
+static fct_result bind(fct_stream *s, const fct_text *t, const fct_ply_element *element, table *out) {
+    fct_ply_element rows = *element; /* values of so many records at a time */
+    float *texcoords = NULL;
+    rows.count = ROWS;
+    out->properties = s->header.properties + element->first_property;
+    out->offsets = fct_allocate(s->env, element->property_count, sizeof *out->offsets);
+    if (!out->offsets) return fct_fail_memory(s->env, "a PLY header");
+    out->size = record_size(&s->header, element, out->offsets);
+    fct_result result = fct_ply_bind(t, &s->header, &rows, &s->rows, &texcoords, &out->target);
+    size_t kept = 0; /* columns of positions and of vertices' colours */
+    for (size_t i = 0; i < out->target.column_count; ++i) {
+        const fct_ply_column *c = &out->target.columns[i];
+        bool position = s->rows.positions && c->to >= s->rows.positions && c->to < s->rows.positions + 3;
+        bool color = s->rows.colors && c->to >= s->rows.colors && c->to < s->rows.colors + 3;
+        if (position || color) out->target.columns[kept++] = *c;
+    }
+    out->target.column_count = kept;
+    fct_release(s->env, texcoords);
+    return result;
+}
+
+/* Whether the file can be read in place; finds where its elements lie. */
+static bool lay_out(fct_stream *s, uint64_t body, uint64_t file_size) {
+    const fct_ply_header *h = &s->header;
+    bool vertices = false, faces = false;
+    uint64_t at = body;
+    if (h->format == FCT_PLY_ASCII) return false;
+    for (size_t i = 0; i < h->element_count; ++i) {
+        const fct_ply_element *element = &h->elements[i];
+        fct_ply_kind kind = fct_ply_kind_of(element);
+        size_t size = record_size(h, element, NULL);
+        if (kind == FCT_PLY_STRIPS || !size || element->count > FCT_MESH_LIMIT) return false;
+        if (element->count > (file_size - at) / size) return false;
+        if ((kind == FCT_PLY_VERTICES && vertices) || (kind == FCT_PLY_FACES && faces)) return false;
+        if (kind == FCT_PLY_VERTICES)
+            vertices = true, s->vertices.offset = at, s->info.vertex_count = (uint32_t)element->count;
+        if (kind == FCT_PLY_FACES)
+            faces = true, s->faces.offset = at, s->info.face_count = (uint32_t)element->count;
+        at += element->count * size;
+    }
+    return vertices && faces && at == file_size;
+}
+
+static fct_result open_tables(fct_stream *s, const fct_text *t) {
+    fct_result result = FCT_OK;
+    for (size_t i = 0; result == FCT_OK && i < s->header.element_count; ++i) {
+        fct_ply_kind kind = fct_ply_kind_of(&s->header.elements[i]);
+        if (kind == FCT_PLY_VERTICES) result = bind(s, t, &s->header.elements[i], &s->vertices);
+        if (kind == FCT_PLY_FACES) result = bind(s, t, &s->header.elements[i], &s->faces);
+    }
+    if (result != FCT_OK) return result;
+    size_t row = s->vertices.size > s->faces.size ? s->vertices.size : s->faces.size;
+    s->buffer = fct_allocate(s->env, ROWS, row);
+    if (!s->buffer) return fct_fail_memory(s->env, "a buffer");
+    s->info.colors = s->rows.colors != NULL;
+    s->info.materials = s->rows.materials != NULL;
+    s->info.material_names = s->header.material_names;
+    s->info.material_count = (uint32_t)s->header.material_count;
+    return FCT_OK;
+}
+
+/* The text up to the end of the header; *end NULL: it has no end near enough. */
+static fct_result read_header(fct_stream *s, const char **end) {
+    *end = NULL;
+    for (size_t look = 4096; !*end && look <= HEADER_MOST; look *= 16) {
+        size_t got;
+        fct_release(s->env, s->header_text);
+        s->header_text = fct_allocate(s->env, look, 1);
+        if (!s->header_text) return fct_fail_memory(s->env, "a PLY header");
+        errno = 0;
+        if (!fct_read_at(s->descriptor, 0, s->header_text, look, &got)) return fail_read(s);
+        const char *word = memmem(s->header_text, got, "end_header", strlen("end_header"));
+        if (word) *end = memchr(word, '\n', (size_t)(s->header_text + got - word));
+        if (got < look) break;
+    }
+    return FCT_OK;
+}
+
+/* Opens a regular PLY file; *done tells whether it can be read in place. */
+static fct_result open_ply(fct_stream *s, bool *done) {
+    struct stat status;
+    const char *end;
+    *done = false;
+    s->descriptor = open(s->name, O_RDONLY | O_CLOEXEC);
+    if (s->descriptor < 0) return fail_read(s);
+    if (fstat(s->descriptor, &status) || !S_ISREG(status.st_mode)) return FCT_OK;
+    fct_result result = read_header(s, &end);
+    if (result != FCT_OK || !end) return result;
+    fct_text t = {s->header_text, end + 1, s->env, s->name, 1};
+    result = fct_ply_read_header(&t, &s->header);
+    if (result != FCT_OK) return result;
+    s->swap = s->header.format == FCT_PLY_BIG;
+    *done = lay_out(s, (uint64_t)(t.p - s->header_text), (uint64_t)status.st_size);
+    return *done ? open_tables(s, &t) : FCT_OK;
+}
+
+/* --- Other files --- */
+
+static fct_result spool_mesh(fct_stream *s, const fct_mesh *mesh) {
+    size_t vertices = mesh->vertex_count, faces = mesh->face_count;
+    fct_result result = fct_spool_append(&s->spool, mesh->positions, vertices * 12);
+    s->triangles_at = s->spool.size;
+    if (result == FCT_OK) result = fct_spool_append(&s->spool, mesh->triangles, faces * 12);
+    s->colors_at = s->spool.size;
+    if (result == FCT_OK && mesh->colors) result = fct_spool_append(&s->spool, mesh->colors, vertices * 12);
+    s->materials_at = s->spool.size;
+    if (result == FCT_OK && mesh->materials) result = fct_spool_append(&s->spool, mesh->materials, faces * 4);
+    return result;
+}
+
+static fct_result open_other(fct_stream *s, const char *folder, const char *beside) {
+    fct_mesh mesh;
+    fct_result result = fct_mesh_load(s->env, s->name, &mesh);
+    if (result == FCT_ERROR_MEMORY)
+        fct_fail(s->env, result, "%s: this file is loaded whole; a binary PLY of triangles need not be",
+                 s->name);
+    if (result != FCT_OK) return result;
+    result = fct_spool_open(s->env, folder, beside, &s->spool);
+    if (result == FCT_OK) result = spool_mesh(s, &mesh);
+    s->info = (fct_stream_info){mesh.vertex_count,      mesh.face_count,     mesh.colors != NULL,
+                                mesh.materials != NULL, mesh.material_count, mesh.material_names};
+    s->names = mesh.material_names;
+    mesh.material_names = NULL;
+    fct_mesh_release(s->env, &mesh);
+    return result;
+}
+
+static void forget_ply(fct_stream *s) {
+    if (s->descriptor >= 0) close(s->descriptor);
+    s->descriptor = -1;
+    fct_ply_release_header(s->env, &s->header);
+    s->info = (fct_stream_info){0};
+}
+
+fct_result fct_stream_open(const fct_env *env, const char *path, const char *folder, const char *beside,
+                           fct_stream **out) {
+    *out = NULL;
+    fct_stream *s = fct_allocate_zero(env, 1, sizeof *s);
+    if (!s) return fct_fail_memory(env, "a mesh file");
+    s->env = env, s->descriptor = -1;
+    s->name = fct_copy_text(env, path, strlen(path));
+    fct_result result = s->name ? FCT_OK : fct_fail_memory(env, "a mesh file");
+    bool done = false;
+    size_t length = strlen(path);
+    if (result == FCT_OK && length > 4 && !strcasecmp(path + length - 4, ".ply")) result = open_ply(s, &done);
+    if (result == FCT_OK && !done) {
+        forget_ply(s);
+        result = open_other(s, folder, beside);
+    }
+    s->material_limit = s->info.material_names ? s->info.material_count : s->info.face_count + 65536;
+    if (result == FCT_OK)
+        *out = s;
+    else
+        fct_stream_close(s);
+    return result;
+}
+
+void fct_stream_close(fct_stream *s) {
+    if (!s) return;
+    const fct_env *env = s->env;
+    if (s->names) fct_names_release(env, s->names, s->info.material_count);
+    forget_ply(s);
+    fct_spool_close(&s->spool);
+    fct_soup_release(env, &s->rows);
+    fct_release(env, s->vertices.offsets);
+    fct_release(env, s->faces.offsets);
+    fct_release(env, s->buffer);
+    fct_release(env, s->header_text);
+    fct_release(env, s->name);
+    fct_release(env, s);
+}
+
+fct_stream_info fct_stream_get(const fct_stream *stream) {
+    return stream->info;
+}
+
+/* --- Ranges --- */
+
+static fct_result check_floats(const fct_stream *s, const char *what, uint32_t first, uint32_t count,
+                               const float *values) {
+    bool finite = true;
+    for (size_t i = 0; i < 3 * (size_t)count; ++i) finite &= isfinite(values[i]) != 0;
+    if (finite) return FCT_OK;
+    size_t i = 0;
+    while (isfinite(values[i])) ++i;
+    return fct_fail(s->env, FCT_ERROR_DATA, "%s: vertex %zu: its %s is not finite (%g)", s->name,
+                    first + i / 3, what, (double)values[i]);
+}
+
+static fct_result vertex_rows(fct_stream *s, uint32_t first, uint32_t count, float *positions,
+                              float *colors) {
+    const table *v = &s->vertices;
+    fct_result result = read_bytes(s, v->offset + (uint64_t)first * v->size, s->buffer, count * v->size);
+    if (result != FCT_OK) return result;
+    fct_ply_fill_columns(&v->target, v->properties, s->buffer, v->size, v->offsets, s->swap, false, 0, count);
+    memcpy(positions, s->rows.positions, 12 * (size_t)count);
+    if (colors) memcpy(colors, s->rows.colors, 12 * (size_t)count);
+    return FCT_OK;
+}
+
+fct_result fct_stream_vertices(fct_stream *s, uint32_t first, uint32_t count, float *positions,
+                               float *colors) {
+    fct_result result = FCT_OK;
+    for (uint32_t at = 0; s->descriptor >= 0 && at < count && result == FCT_OK; at += ROWS) {
+        uint32_t rows = count - at < ROWS ? count - at : ROWS;
+        result = vertex_rows(s, first + at, rows, positions + 3 * (size_t)at,
+                             colors ? colors + 3 * (size_t)at : NULL);
+    }
+    if (s->descriptor < 0) {
+        uint64_t from = 12 * (uint64_t)first;
+        result = fct_spool_read(&s->spool, from, positions, 12 * (size_t)count);
+        if (result == FCT_OK && colors)
+            result = fct_spool_read(&s->spool, s->colors_at + from, colors, 12 * (size_t)count);
+    }
+    if (result == FCT_OK) result = check_floats(s, "position", first, count, positions);
+    if (result == FCT_OK && colors) result = check_floats(s, "colour", first, count, colors);
+    return result;
+}
+
+static void load_corners(const fct_stream *s, const unsigned char *p, fct_ply_type type, uint32_t *to) {
+    size_t size = fct_ply_size(type);
+    bool whole = type == FCT_PLY_INT32 || type == FCT_PLY_UINT32;
+    for (size_t k = 0; k < 3; ++k)
+        to[k] =
+            whole ? fct_ply_32(p + 4 * k, s->swap) : fct_ply_id(fct_ply_load(p + k * size, type, s->swap));
+}
+
+static fct_result face_rows(fct_stream *s, uint32_t first, uint32_t count, uint32_t *triangles,
+                            uint32_t *materials) {
+    const table *f = &s->faces;
+    const fct_ply_property *corners = &f->properties[f->target.indices];
+    size_t at = f->offsets[f->target.indices], head = fct_ply_size(corners->count_type);
+    fct_result result = read_bytes(s, f->offset + (uint64_t)first * f->size, s->buffer, count * f->size);
+    if (result != FCT_OK) return result;
+    for (size_t i = 0; i < count; ++i) {
+        const unsigned char *p = s->buffer + i * f->size + at;
+        if (fct_ply_load(p - head, corners->count_type, s->swap) != 3)
+            return fct_fail(s->env, FCT_ERROR_DATA, "%s: face %zu: expected three corners", s->name,
+                            first + i);
+        load_corners(s, p, corners->type, triangles + 3 * i);
+    }
+    if (!materials) return FCT_OK;
+    fct_ply_type type = f->properties[f->target.material].type;
+    const unsigned char *from = s->buffer + f->offsets[f->target.material];
+    for (size_t i = 0; i < count; ++i)
+        materials[i] = fct_ply_id(fct_ply_load(from + i * f->size, type, s->swap));
+    return FCT_OK;
+}
+
+static fct_result check_faces(const fct_stream *s, uint32_t first, uint32_t count, const uint32_t *triangles,
+                              const uint32_t *materials) {
+    uint32_t largest = 0;
+    for (size_t i = 0; i < 3 * (size_t)count; ++i) largest = triangles[i] > largest ? triangles[i] : largest;
+    if (count && largest >= s->info.vertex_count) {
+        size_t i = 0;
+        while (triangles[i] < s->info.vertex_count) ++i;
+        return fct_fail(s->env, FCT_ERROR_DATA,
+                        "%s: face %zu: vertex index %d is out of range, of %u vertices", s->name,
+                        first + i / 3, (int)triangles[i], s->info.vertex_count);
+    }
+    for (size_t i = 0; materials && i < count; ++i)
+        if (materials[i] >= s->material_limit)
+            return fct_fail(s->env, FCT_ERROR_DATA, "%s: face %zu: material %d is out of range", s->name,
+                            first + i, (int)materials[i]);
+    return FCT_OK;
+}
+
+fct_result fct_stream_faces(fct_stream *s, uint32_t first, uint32_t count, uint32_t *triangles,
+                            uint32_t *materials) {
+    fct_result result = FCT_OK;
+    for (uint32_t at = 0; s->descriptor >= 0 && at < count && result == FCT_OK; at += ROWS) {
+        uint32_t rows = count - at < ROWS ? count - at : ROWS;
+        result =
+            face_rows(s, first + at, rows, triangles + 3 * (size_t)at, materials ? materials + at : NULL);
+    }
+    if (s->descriptor < 0) {
+        uint64_t from = s->triangles_at + 12 * (uint64_t)first;
+        result = fct_spool_read(&s->spool, from, triangles, 12 * (size_t)count);
+        from = s->materials_at + 4 * (uint64_t)first;
+        if (result == FCT_OK && materials)
+            result = fct_spool_read(&s->spool, from, materials, 4 * (size_t)count);
+    }
+    return result == FCT_OK ? check_faces(s, first, count, triangles, materials) : result;
+}
