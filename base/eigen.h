@@ -1,4 +1,4 @@
-/* base/eigen.h: eigenvalues and eigenvectors of a symmetric 3x3 matrix, in closed form. */
+/* base/eigen.h: eigenvalues and eigenvectors of symmetric 3x3 matrices, in closed form. */
 #ifndef FCT_BASE_EIGEN_H
 #define FCT_BASE_EIGEN_H
 
@@ -11,5 +11,8 @@
  * A diagonal matrix, so zero and multiples of the identity too, gives the coordinate axes, those of equal
  * value in the order x, y, z. */
 void fct_eigen3(const double m[6], double values[3], v3 vectors[3]);
+
+/* The same for four matrices at once, with the same results; m[i] points to matrix i. */
+void fct_eigen3_four(const double *const m[4], double values[4][3], v3 vectors[4][3]);
 
 #endif

@@ -37,6 +37,22 @@ static inline d4 d4_sub(d4 a, d4 b) {
 static inline d4 d4_mul(d4 a, d4 b) {
     return _mm256_mul_pd(a, b);
 }
+static inline d4 d4_div(d4 a, d4 b) {
+    return _mm256_div_pd(a, b);
+}
+static inline d4 d4_sqrt(d4 a) {
+    return _mm256_sqrt_pd(a);
+}
+static inline d4 d4_abs(d4 a) {
+    return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
+}
+static inline d4 d4_load(const double *p) {
+    return _mm256_loadu_pd(p);
+}
+/* a_i < b_i ? x_i : y_i */
+static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
+    return _mm256_blendv_pd(y, x, _mm256_cmp_pd(a, b, _CMP_LT_OQ));
+}
 static inline d4 d4_min(d4 a, d4 b) {
     return _mm256_min_pd(a, b);
 }
@@ -117,6 +133,14 @@ static inline i8 i8_set(uint32_t a) {
 }
 static inline i8 i8_load(const uint32_t *p) {
     return _mm256_loadu_si256((const __m256i *)(const void *)p);
+}
+static inline void i8_store(uint32_t *p, i8 a) {
+    _mm256_storeu_si256((__m256i *)(void *)p, a);
+}
+/* a with `value` in lane `at`, 0 to 7; elsewhere nothing changes, for any other `at` nothing at all. */
+static inline i8 i8_insert(i8 a, uint32_t at, i8 value) {
+    __m256i lane = _mm256_cmpeq_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_epi32((int)at));
+    return _mm256_blendv_epi8(a, value, lane);
 }
 static inline i8 i8_shift_right(i8 a, int bits) {
     return _mm256_srli_epi32(a, bits);
@@ -199,6 +223,21 @@ static inline d4 d4_sub(d4 a, d4 b) {
 static inline d4 d4_mul(d4 a, d4 b) {
     FCT_D4(a.v[i] * b.v[i]);
 }
+static inline d4 d4_div(d4 a, d4 b) {
+    FCT_D4(a.v[i] / b.v[i]);
+}
+static inline d4 d4_sqrt(d4 a) {
+    FCT_D4(__builtin_sqrt(a.v[i]));
+}
+static inline d4 d4_abs(d4 a) {
+    FCT_D4(__builtin_fabs(a.v[i]));
+}
+static inline d4 d4_load(const double *p) {
+    FCT_D4(p[i]);
+}
+static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
+    FCT_D4(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
+}
 static inline d4 d4_min(d4 a, d4 b) {
     FCT_D4(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
 }
@@ -269,6 +308,13 @@ static inline i8 i8_load(const uint32_t *p) {
     i8 r;
     for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)p[i];
     return r;
+}
+static inline void i8_store(uint32_t *p, i8 a) {
+    for (int i = 0; i < 8; ++i) p[i] = (uint32_t)a.v[i];
+}
+static inline i8 i8_insert(i8 a, uint32_t at, i8 value) {
+    if (at < 8) a.v[at] = value.v[at];
+    return a;
 }
 static inline i8 i8_shift_right(i8 a, int bits) {
     for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] >> bits);

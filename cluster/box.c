@@ -100,8 +100,7 @@ static float above(float value) {
     return value;
 }
 
-bool fct_box_set(const fct_extents *e, const float rotation[4], const float axes[3][3], v3 point,
-                 fct_cluster *cluster) {
+bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_cluster *cluster) {
     /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
     v3 center = point, a[3];
     double size = 0;
@@ -111,7 +110,6 @@ bool fct_box_set(const fct_extents *e, const float rotation[4], const float axes
         center = v3_mad(center, 0.5 * (e->low[k] + e->high[k]) - v3_dot(point, a[k]), a[k]);
         size = greater(size, greater(fabs(e->low[k]), fabs(e->high[k])));
     }
-    memcpy(cluster->box_rotation, rotation, sizeof cluster->box_rotation);
     v3_store(cluster->box_center, center);
     center = v3_load(cluster->box_center);
     for (int k = 0; k < 3; ++k) {

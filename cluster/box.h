@@ -27,10 +27,9 @@ void fct_box_rotation(const v3 frame[3], float rotation[4]);
 void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size_t end,
                      const float axes[3][3]);
 
-/* Centre and half extents of a cluster's box of this rotation from the extents of its points along these very
- * axes; `point` is any of them. False where they leave the range of a float: then they end there. */
-bool fct_box_set(const fct_extents *extents, const float rotation[4], const float axes[3][3], v3 point,
-                 fct_cluster *cluster);
+/* Centre and half extents of a cluster's box from the extents of its points along the axes of its rotation;
+ * `point` is any of them. False where they leave the range of a float: then they end there. */
+bool fct_box_set(const fct_extents *extents, const float axes[3][3], v3 point, fct_cluster *cluster);
 
 /* Turns the frame (u, v, normal) about its normal so that the box of at most 64 of points [begin, end) has
  * the least area. `size` is about the points' distance from each other, above 0. */

@@ -19,11 +19,17 @@
 #include "base/parallel.h"
 #include "cluster/cone.h"
 
+enum { AHEAD = 12 };
+
 /* Room for one block; corners and normals by place. */
 typedef struct block_scratch {
-    uint32_t order[FCT_BLOCK];
+    uint32_t order[FCT_BLOCK]; /* ids of inner nodes */
+    const fct_sums *parts[FCT_BLOCK][2];
     float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
     fct_sums leaves[FCT_BLOCK], nodes[FCT_BLOCK];
+    v3 frames[FCT_BLOCK][3];
+    double sizes[FCT_BLOCK];
+    fct_cluster records[FCT_BLOCK];
 } block_scratch;
 
 typedef struct describer {
@@ -60,19 +66,17 @@ void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out) {
     sym3_add_outer(out->covariance, a->weight * share, d);
 }
 
-double fct_sums_describe(const fct_sums *s, v3 frame[3], fct_cluster *out) {
-    double factor = s->area > (double)FLT_MAX ? (double)FLT_MAX / s->area : 1, values[3];
+double fct_sums_store(const fct_sums *s, v3 frame[3], fct_cluster *out) {
+    double factor = s->area > (double)FLT_MAX ? (double)FLT_MAX / s->area : 1;
     out->area = (float)(s->area * factor);
     v3_store(out->area_vector, v3_scale(s->vector, factor));
     for (int i = 0; i < 6; ++i) out->moment[i] = (float)(s->moment[i] * factor);
     v3_store(out->centroid, s->center);
-    v3 axes[3];
-    fct_eigen3(s->covariance, values, axes);
-    v3 normal = v3_dot(axes[0], s->vector) < 0 ? v3_scale(axes[0], -1) : axes[0];
+    v3 normal = v3_dot(frame[0], s->vector) < 0 ? v3_scale(frame[0], -1) : frame[0];
     v3_store(out->plane, normal);
     double offset = -v3_dot(normal, s->center);
     out->plane[3] = (float)(fabs(offset) < (double)FLT_MAX ? offset : copysign((double)FLT_MAX, offset));
-    frame[0] = axes[2], frame[1] = v3_cross(normal, axes[2]), frame[2] = normal;
+    frame[0] = frame[2], frame[1] = v3_cross(normal, frame[2]), frame[2] = normal;
     double radius = sqrt((s->covariance[0] + s->covariance[3] + s->covariance[5]) / s->weight);
     return radius > 0 && radius < (double)FLT_MAX ? radius : 1;
 }
@@ -85,25 +89,29 @@ static void fit_world(fct_points corners, size_t begin, size_t end, v3 point, fc
     fct_extents extents = fct_extents_none();
     fct_box_axes(world, axes);
     fct_extents_add(&extents, corners, begin, end, (const float(*)[3])axes);
-    fct_box_set(&extents, world, (const float(*)[3])axes, point, out);
+    memcpy(out->box_rotation, world, sizeof world);
+    fct_box_set(&extents, (const float(*)[3])axes, point, out);
 }
 
-/* All but cost and links, from the corners and normals of faces [first, end) of a stream. */
-static void describe(fct_points corners, fct_points normals, const fct_sums *s, size_t first, size_t end,
-                     fct_cluster *out) {
-    v3 frame[3], cone = v3_unit(s->vector);
-    double size = fct_sums_describe(s, frame, out);
-    float rotation[4], axes[3][3], axis[3];
+/* Cone and rotation, from the corners and normals of faces [first, end) of a stream. */
+static void orient(fct_points corners, fct_points normals, size_t first, size_t end, double size, v3 frame[3],
+                   fct_cluster *out) {
+    v3 cone = v3_unit(v3_load(out->area_vector));
+    float axis[3];
     v3_store(axis, cone);
-    bool cancelled = v3_norm2(v3_load(out->area_vector)) == 0;
-    out->cone_angle = fct_cone_angle(cancelled ? 4 : fct_cone_widen(0, normals, first, end, axis));
+    out->cone_angle = fct_cone_angle(v3_norm2(cone) > 0 ? fct_cone_widen(0, normals, first, end, axis) : 4);
     fct_box_turn(corners, 3 * first, 3 * end, size, frame);
-    fct_box_rotation(frame, rotation);
-    fct_box_axes(rotation, axes);
+    fct_box_rotation((const v3 *)frame, out->box_rotation);
+}
+
+/* The box, of its rotation if that can be. */
+static void fit(fct_points corners, size_t first, size_t end, fct_cluster *out) {
+    float axes[3][3];
     fct_extents extents = fct_extents_none();
+    fct_box_axes(out->box_rotation, axes);
     fct_extents_add(&extents, corners, 3 * first, 3 * end, (const float(*)[3])axes);
     v3 point = {(double)corners.x[3 * first], (double)corners.y[3 * first], (double)corners.z[3 * first]};
-    if (!fct_box_set(&extents, rotation, (const float(*)[3])axes, point, out))
+    if (!fct_box_set(&extents, (const float(*)[3])axes, point, out))
         fit_world(corners, 3 * first, 3 * end, point, out);
 }
 
@@ -117,21 +125,31 @@ void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cl
     fct_unit_normal(view->positions, triangle, normal);
     fct_sums s;
     fct_sums_face(view->positions, triangle, &s);
-    describe((fct_points){x, y, z}, (fct_points){normal, normal + 1, normal + 2}, &s, 0, 1, out);
+    double values[3];
+    v3 frame[3];
+    fct_eigen3(s.covariance, values, frame);
+    double size = fct_sums_store(&s, frame, out);
+    fct_points corners = {x, y, z};
+    orient(corners, (fct_points){normal, normal + 1, normal + 2}, 0, 1, size, frame, out);
+    fit(corners, 0, 1, out);
     out->first = place, out->count = 1;
 }
 
-/* Inner nodes of the subtree in preorder, in which a node's left child follows it and the right one comes
- * after the left's count - 1 inner nodes. */
-static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t *order) {
-    uint32_t nodes = tree->view.node_count, count = 0, top = 0, stack[FCT_BLOCK];
-    if (root < nodes) stack[top++] = root;
-    while (top > 0) {
-        uint32_t node = stack[--top];
-        const uint32_t *child = tree->links.children[node];
-        order[count++] = node;
-        if (child[1] < nodes) stack[top++] = child[1];
-        if (child[0] < nodes) stack[top++] = child[0];
+/* Inner nodes of the subtree level by level, and where their parts are: the memory of a level's nodes is
+ * asked for while the level above is walked. */
+static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first, block_scratch *s) {
+    uint32_t nodes = tree->view.node_count, count = 0;
+    if (root < nodes) s->order[count++] = root;
+    for (uint32_t i = 0; i < count; ++i) {
+        const fct_node_link *link = &tree->links[s->order[i]];
+        fct_node_link_store(link, &s->records[i]);
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = link->child[k];
+            s->parts[i][k] = child < nodes ? &s->nodes[count] : &s->leaves[child - nodes - first];
+            if (child >= nodes) continue;
+            __builtin_prefetch(&tree->links[child]);
+            s->order[count++] = child;
+        }
     }
     return count;
 }
@@ -153,38 +171,46 @@ static void load_faces(const fct_tree_view *view, size_t first, size_t count, bl
     }
 }
 
-void fct_node_links_store(const fct_node_links *links, uint32_t id, fct_cluster *out) {
-    out->cost = links->costs[id];
-    out->child[0] = links->children[id][0], out->child[1] = links->children[id][1];
-    out->first = links->firsts[id], out->count = links->counts[id];
+/* Frames of four nodes, or of what is left. */
+static void frame_nodes(uint32_t begin, uint32_t count, block_scratch *s) {
+    const double *matrices[4];
+    double values[4][3];
+    v3 frames[4][3];
+    for (uint32_t i = 0; i < 4; ++i) matrices[i] = s->nodes[begin + i < count ? begin + i : begin].covariance;
+    fct_eigen3_four(matrices, values, frames);
+    for (uint32_t i = begin; i < count && i < begin + 4; ++i) {
+        memcpy(s->frames[i], frames[i - begin], sizeof s->frames[i]);
+        s->sizes[i] = fct_sums_store(&s->nodes[i], s->frames[i], &s->records[i]);
+    }
 }
 
+static inline void ask_for_record(const fct_cluster *c) {
+    for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
+}
+
+/* In passes over its nodes, so that what one node waits for overlaps with another's work. */
 static void describe_block(const describer *d, size_t block, block_scratch *s) {
     const fct_tree *tree = d->tree;
     uint32_t nodes = tree->view.node_count, root = d->outline.blocks[block];
-    uint32_t first = root < nodes ? tree->links.firsts[root] : root - nodes;
-    uint32_t faces = root < nodes ? tree->links.counts[root] : 1;
-    uint32_t count = list_subtree(tree, root, s->order);
+    uint32_t first = root < nodes ? tree->links[root].first : root - nodes;
+    uint32_t faces = root < nodes ? tree->links[root].count : 1;
+    uint32_t count = list_subtree(tree, root, first, s);
     load_faces(&tree->view, first, faces, s);
     fct_points corners = {s->corners[0], s->corners[1], s->corners[2]};
     fct_points normals = {s->normals[0], s->normals[1], s->normals[2]};
-    for (uint32_t i = count; i-- > 0;) {
-        uint32_t id = s->order[i], at = i + 1;
-        const fct_sums *parts[2];
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = tree->links.children[id][k];
-            if (child < nodes) {
-                parts[k] = &s->nodes[at];
-                at += tree->links.counts[child] - 1;
-            } else {
-                parts[k] = &s->leaves[child - nodes - first];
-            }
-        }
-        fct_sums_join(parts[0], parts[1], &s->nodes[i]);
-        fct_cluster c;
-        fct_node_links_store(&tree->links, id, &c);
-        describe(corners, normals, &s->nodes[i], c.first - first, c.first - first + c.count, &c);
-        tree->clusters[id] = c;
+    for (uint32_t i = count; i-- > 0;) fct_sums_join(s->parts[i][0], s->parts[i][1], &s->nodes[i]);
+    for (uint32_t i = 0; i < count; i += 4) frame_nodes(i, count, s);
+    for (uint32_t i = 0; i < count; ++i) {
+        fct_cluster *c = &s->records[i];
+        orient(corners, normals, c->first - first, c->first - first + c->count, s->sizes[i], s->frames[i], c);
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        fct_cluster *c = &s->records[i];
+        fit(corners, c->first - first, c->first - first + c->count, c);
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        if (i + AHEAD < count) ask_for_record(&tree->clusters[s->order[i + AHEAD]]);
+        tree->clusters[s->order[i]] = s->records[i];
     }
     d->outline.sums[block] = count ? s->nodes[0] : s->leaves[0];
 }
@@ -216,7 +242,7 @@ static void walk(const fct_tree *tree, fct_outline *o) {
         stack[top++] = (visit){tree->roots[r], FCT_NONE, 0};
         while (top > 0) {
             visit v = stack[--top];
-            if (v.node >= view->node_count || tree->links.counts[v.node] <= FCT_BLOCK) {
+            if (v.node >= view->node_count || tree->links[v.node].count <= FCT_BLOCK) {
                 close_upper(o, v.parent, v.side, FCT_IS_BLOCK | o->block_count);
                 if (o->blocks) o->blocks[o->block_count] = v.node;
                 ++o->block_count;
@@ -227,8 +253,8 @@ static void walk(const fct_tree *tree, fct_outline *o) {
                 o->upper[o->upper_count].id = v.node;
                 o->upper[o->upper_count].first_block = o->block_count;
             }
-            stack[top++] = (visit){tree->links.children[v.node][1], o->upper_count, 1};
-            stack[top++] = (visit){tree->links.children[v.node][0], o->upper_count, 0};
+            stack[top++] = (visit){tree->links[v.node].child[1], o->upper_count, 1};
+            stack[top++] = (visit){tree->links[v.node].child[0], o->upper_count, 0};
             ++o->upper_count;
         }
     }
@@ -266,7 +292,8 @@ fct_result fct_tree_describe(fct_tree *tree) {
     if (result == FCT_OK)
         result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 4, describe_blocks, &d);
     if (result == FCT_OK) result = fct_tree_describe_upper(tree, &d.outline);
-    fct_node_links_release(env, &tree->links);
+    fct_release(env, tree->links);
+    tree->links = NULL;
     fct_release(env, d.outline.upper);
     fct_release(env, d.outline.blocks);
     fct_release(env, d.outline.sums);

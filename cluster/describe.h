@@ -37,9 +37,9 @@ typedef struct fct_outline {
 void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *out);
 void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out);
 
-/* Writes area, moment, centroid and plane, and gives the frame (u, v, normal) of the surface's PCA, and about
- * the radius of the cluster, 1 where it has none. */
-double fct_sums_describe(const fct_sums *sums, v3 frame[3], fct_cluster *out);
+/* Writes area, moment, centroid and plane, from the eigenvectors of the covariance, which become the frame
+ * (u, v, normal). Returns about the radius of the cluster, 1 where it has none. */
+double fct_sums_store(const fct_sums *sums, v3 frame[3], fct_cluster *out);
 
 /* Describes the upper clusters of a tree whose blocks are done. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe_upper(fct_tree *tree, fct_outline *outline);

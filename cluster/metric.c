@@ -6,8 +6,8 @@
  *
  * Degenerate answers. No area: direction and shape errors weigh nothing in INCREMENT; E_dir is 0 and
  * E_shape 1/2 in MEAN. Points on a line: fit 0. A mean normal that cancels: the plane across the direction in
- * which the points spread least, by the adjugate's largest column. Irregularity is held between 0 and 1e30, a
- * bonus for a border that closes at 1000.
+ * which the points spread least, by the adjugate's largest column. A border that closes earns
+ * a bonus of at most 1000.
  */
 #include "cluster/metric.h"
 
@@ -16,7 +16,6 @@
 #include "base/eigen.h"
 #include "base/simd.h"
 
-#define PI_F 3.14159265f
 #define TINY 1e-30f
 
 fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
@@ -55,8 +54,11 @@ void fct_metric_face(const fct_metric *metric, const float *positions, const uin
 }
 
 /* Records turned on their side: one field of eight clusters in each vector. */
-typedef struct lanes {
-    f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+typedef union lanes {
+    struct {
+        f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+    };
+    f8 rows[16];
 } lanes;
 
 _Static_assert(sizeof(fct_record) == 16 * sizeof(float) && sizeof(lanes) == 16 * sizeof(f8),
@@ -77,16 +79,14 @@ static inline f8 dot3(const f8 a[3], const f8 b[3]) {
 
 static inline void load_lanes(const fct_record *records, const fct_pair *pairs, uint32_t count, bool second,
                               lanes *out) {
-    f8 rows[16];
     for (uint32_t i = 0; i < FCT_LANES; ++i) {
         const fct_pair *pair = &pairs[i < count ? i : 0];
         const float *record = records[second ? pair->b : pair->a].covariance;
-        rows[i] = f8_load(record);
-        rows[i + 8] = f8_load(record + 8);
+        out->rows[i] = f8_load(record);
+        out->rows[i + 8] = f8_load(record + 8);
     }
-    f8_transpose(rows);
-    f8_transpose(rows + 8);
-    memcpy(out, rows, sizeof *out);
+    f8_transpose(out->rows);
+    f8_transpose(out->rows + 8);
 }
 
 static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
@@ -95,23 +95,28 @@ static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
     return f8_load(shared);
 }
 
-static inline f8 irregularity(f8 perimeter, f8 area) {
-    f8 g = f8_div(f8_mul(perimeter, perimeter), f8_mul(f8_set(4 * PI_F), at_least(area, TINY)));
-    return f8_min(g, f8_set(1e30f));
+/* 1 over the union's area, and over its weight, which is the same where the measure is the area. */
+static inline void invert(const fct_metric *metric, const lanes *a, const lanes *b, f8 *area, f8 *weight) {
+    f8 one = f8_set(1);
+    *area = *weight = f8_div(one, at_least(f8_add(a->area, b->area), TINY));
+    if (metric->measure == FCT_FIT_POINTS) *weight = f8_div(one, f8_add(a->weight, b->weight));
 }
 
-/* (8.17) */
-static inline f8 shape_error(const lanes *a, const lanes *b, const lanes *u) {
-    f8 worst = f8_max(irregularity(a->perimeter, a->area), irregularity(b->perimeter, b->area));
-    f8 joined = irregularity(u->perimeter, u->area);
-    f8 error = f8_sub(f8_set(1), f8_div(worst, f8_twice(at_least(joined, TINY))));
-    return f8_if_lt(f8_set(0), worst, at_least(error, -1000), f8_set(0.5f));
+/* (8.17) from perimeters and the shares of the union's area: worst / g = max(pa^2 / a, pb^2 / b) / p^2. */
+static inline f8 shape_error(const lanes *a, const lanes *b, const lanes *u, f8 invert_area) {
+    f8 one = f8_set(1), none = f8_set(0), share = f8_mul(b->area, invert_area),
+       rest = f8_mul(a->area, invert_area);
+    f8 worst = f8_max(f8_mul(f8_mul(a->perimeter, a->perimeter), share),
+                      f8_mul(f8_mul(b->perimeter, b->perimeter), rest));
+    f8 joined = f8_mul(f8_mul(f8_mul(u->perimeter, u->perimeter), share), rest);
+    f8 error = f8_sub(one, f8_div(worst, f8_twice(at_least(joined, TINY))));
+    return f8_if_lt(none, worst, at_least(error, -1000), f8_set(0.5f));
 }
 
 /* Sums of the union about its own centroid; all but its fit. */
-static inline void join(const lanes *a, const lanes *b, f8 shared, lanes *u) {
+static inline void join(const lanes *a, const lanes *b, f8 shared, f8 invert_weight, lanes *u) {
     f8 d[3], weight = f8_add(a->weight, b->weight), none = f8_set(0);
-    f8 share = f8_if_lt(none, weight, f8_div(b->weight, weight), f8_set(0.5f));
+    f8 share = f8_if_lt(none, weight, f8_mul(b->weight, invert_weight), f8_set(0.5f));
     f8 k = f8_mul(a->weight, share);
     for (int i = 0; i < 3; ++i) {
         d[i] = f8_sub(b->centroid[i], a->centroid[i]);
@@ -136,7 +141,7 @@ static inline f8 form(const f8 c[6], const f8 n[3]) {
 
 /* Least spread of the covariance, as a total over the measure: one step of inverse iteration from the mean
  * normal, which is as good as an eigen solve here and a tenth of its time. */
-static inline f8 least_spread(const lanes *u) {
+static inline f8 least_spread(const lanes *u, f8 invert_area) {
     f8 trace = f8_add(f8_add(u->covariance[0], u->covariance[3]), u->covariance[5]);
     f8 invert = f8_div(f8_set(1), at_least(trace, TINY)), c[6];
     for (int i = 0; i < 6; ++i) c[i] = f8_mul(u->covariance[i], invert);
@@ -146,43 +151,43 @@ static inline f8 least_spread(const lanes *u) {
         f8_sub(f8_mul(c[1], c[2]), f8_mul(c[0], c[4])), f8_sub(f8_mul(c[0], c[3]), f8_mul(c[1], c[1]))};
     f8 one = f8_set(1), none = f8_set(0);
     f8 largest = f8_max(f8_max(f8_abs(u->vector[0]), f8_abs(u->vector[1])), f8_abs(u->vector[2]));
-    f8 normalize = f8_div(one, at_least(largest, TINY));
     /* where S cancels: the column of the adjugate with the largest diagonal entry */
     f8 yz = f8_max(adjugate[3], adjugate[5]), x = f8_if_lt(adjugate[0], yz, none, one);
     f8 y = f8_mul(f8_sub(one, x), f8_if_lt(adjugate[3], adjugate[5], none, one));
     f8 start[3] = {x, y, f8_sub(f8_sub(one, x), y)}, s[3], n[3], limit = f8_mul(f8_set(1e-4f), u->area);
-    for (int i = 0; i < 3; ++i) s[i] = f8_if_lt(limit, largest, f8_mul(u->vector[i], normalize), start[i]);
+    for (int i = 0; i < 3; ++i) s[i] = f8_if_lt(limit, largest, f8_mul(u->vector[i], invert_area), start[i]);
     static const int matrix[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     for (int i = 0; i < 3; ++i)
         n[i] = f8_mad(f8_mad(f8_mul(adjugate[matrix[i][0]], s[0]), adjugate[matrix[i][1]], s[1]),
                       adjugate[matrix[i][2]], s[2]);
-    f8 nn = dot3(n, n), ss = dot3(s, s), before = f8_div(form(c, s), at_least(ss, TINY));
-    f8 after = f8_if_lt(f8_set(TINY), nn, f8_div(form(c, n), at_least(nn, TINY)), before);
-    return f8_mul(trace, at_least(f8_min(before, after), 0));
+    f8 nn = dot3(n, n), ss = dot3(s, s), before = form(c, s), after = form(c, n);
+    /* the smaller quotient, after / nn or before / ss */
+    f8 cross = f8_if_lt(f8_set(TINY), nn, f8_mul(after, ss), f8_set(INFINITY)), other = f8_mul(before, nn);
+    f8 spread = f8_div(f8_if_lt(cross, other, after, before), at_least(f8_if_lt(cross, other, nn, ss), TINY));
+    return f8_mul(trace, at_least(spread, 0));
 }
 
-static inline f8 total_fit(const fct_metric *metric, const lanes *u) {
-    f8 spread = least_spread(u);
-    return metric->measure == FCT_FIT_AREA ? spread : f8_div(f8_mul(spread, u->area), u->weight);
+static inline f8 total_fit(const fct_metric *metric, const lanes *u, f8 invert_area, f8 invert_weight) {
+    f8 spread = least_spread(u, invert_area);
+    return metric->measure == FCT_FIT_AREA ? spread : f8_mul(f8_mul(spread, u->area), invert_weight);
 }
 
 /* 2 (|a| + |b| - |a + b|). Near-parallel vectors go by their cross product, for the difference has no digits
  * left on fine meshes. */
-static inline f8 direction_growth(const f8 a[3], const f8 b[3]) {
-    f8 scale = f8_max(f8_sqrt(dot3(a, a)), f8_sqrt(dot3(b, b))),
-       invert = f8_div(f8_set(1), at_least(scale, TINY));
+static inline f8 direction_growth(const lanes *a, const lanes *b, const lanes *u, f8 invert_area) {
     f8 p[3], q[3], s[3];
     for (int i = 0; i < 3; ++i) {
-        p[i] = f8_mul(a[i], invert), q[i] = f8_mul(b[i], invert);
+        p[i] = f8_mul(a->vector[i], invert_area), q[i] = f8_mul(b->vector[i], invert_area);
         s[i] = f8_add(p[i], q[i]);
     }
     f8 cross[3] = {f8_sub(f8_mul(p[1], q[2]), f8_mul(p[2], q[1])),
                    f8_sub(f8_mul(p[2], q[0]), f8_mul(p[0], q[2])),
                    f8_sub(f8_mul(p[0], q[1]), f8_mul(p[1], q[0]))};
     f8 lp = f8_sqrt(dot3(p, p)), lq = f8_sqrt(dot3(q, q)), ls = f8_sqrt(dot3(s, s)), dot = dot3(p, q);
-    f8 product = f8_mul(lp, lq), near = f8_div(dot3(cross, cross), at_least(f8_add(product, dot), TINY));
-    f8 growth = f8_if_lt(f8_set(0), dot, near, f8_sub(product, dot));
-    return f8_div(f8_mul(f8_mul(scale, f8_set(4)), growth), at_least(f8_add(f8_add(lp, lq), ls), TINY));
+    f8 product = f8_mul(lp, lq), sum = f8_add(f8_add(lp, lq), ls), none = f8_set(0);
+    f8 over = f8_if_lt(none, dot, dot3(cross, cross), f8_sub(product, dot));
+    f8 under = f8_if_lt(none, dot, f8_mul(f8_add(product, dot), sum), sum);
+    return f8_mul(f8_mul(u->area, f8_set(4)), f8_div(over, at_least(under, TINY)));
 }
 
 /* (8.18) with an eigen solve, in double. */
@@ -212,17 +217,19 @@ static void mean_costs(const fct_metric *metric, const lanes *u, f8 shape, const
 void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
                       const fct_pair *pairs, uint32_t count, float *costs) {
     lanes a, b, u;
+    f8 invert_area, invert_weight;
     load_lanes(records, pairs, count, false, &a);
     load_lanes(records, pairs, count, true, &b);
-    join(&a, &b, load_shared(pairs, count), &u);
-    f8 shape = shape_error(&a, &b, &u);
+    invert(metric, &a, &b, &invert_area, &invert_weight);
+    join(&a, &b, load_shared(pairs, count), invert_weight, &u);
+    f8 shape = shape_error(&a, &b, &u, invert_area);
     if (metric->cost == FCT_COST_MEAN) {
         mean_costs(metric, &u, shape, directions, pairs, count, costs);
         return;
     }
-    f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u), a.fit), b.fit), 0);
+    f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u, invert_area, invert_weight), a.fit), b.fit), 0);
     f8 cost = f8_mul(f8_set(metric->fit_weight), fit);
-    cost = f8_mad(cost, f8_set(metric->direction_weight), direction_growth(a.vector, b.vector));
+    cost = f8_mad(cost, f8_set(metric->direction_weight), direction_growth(&a, &b, &u, invert_area));
     cost = f8_mad(cost, f8_mul(f8_set(metric->shape_weight), u.area), shape);
     float all[FCT_LANES];
     f8_store(all, cost);
@@ -232,18 +239,18 @@ void fct_metric_costs(const fct_metric *metric, const fct_record *records, const
 void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direction *directions,
                        const fct_pair *pairs, uint32_t count) {
     lanes a, b, u;
+    f8 invert_area, invert_weight;
     load_lanes(records, pairs, count, false, &a);
     load_lanes(records, pairs, count, true, &b);
-    join(&a, &b, load_shared(pairs, count), &u);
-    u.fit = total_fit(metric, &u);
-    f8 rows[16];
-    memcpy(rows, &u, sizeof rows);
-    f8_transpose(rows);
-    f8_transpose(rows + 8);
+    invert(metric, &a, &b, &invert_area, &invert_weight);
+    join(&a, &b, load_shared(pairs, count), invert_weight, &u);
+    u.fit = total_fit(metric, &u, invert_area, invert_weight);
+    f8_transpose(u.rows);
+    f8_transpose(u.rows + 8);
     for (uint32_t i = 0; i < count; ++i) {
         float *record = records[pairs[i].a].covariance;
-        f8_store(record, rows[i]);
-        f8_store(record + 8, rows[i + 8]);
+        f8_store(record, u.rows[i]);
+        f8_store(record + 8, u.rows[i + 8]);
         if (!directions) continue;
         fct_direction *da = &directions[pairs[i].a];
         const fct_direction *db = &directions[pairs[i].b];

@@ -69,27 +69,28 @@ static uint32_t kept_merges(const orderer *o, const fct_tree_def *def) {
 static void number_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     orderer *o = user;
-    const fct_node_links *links = &o->tree->links;
     uint32_t faces = o->work->face_count, kept = o->kept;
     for (size_t i = begin; i < end; ++i) {
         uint32_t m = (uint32_t)o->sorted[kept - 1 - i];
-        links->costs[i] = o->work->costs[m];
+        fct_node_link *link = &o->tree->links[i];
+        link->cost = o->work->costs[m];
         for (int k = 0; k < 2; ++k) {
             uint32_t child = o->work->children[m][k];
-            links->children[i][k] = child < faces ? kept + child : kept - 1 - o->ranks[child - faces];
+            link->child[k] = child < faces ? kept + child : kept - 1 - o->ranks[child - faces];
         }
     }
 }
 
 static void count_faces(const orderer *o) {
-    const fct_node_links *links = &o->tree->links;
+    fct_node_link *links = o->tree->links;
     for (uint32_t i = o->kept; i-- > 0;) {
         uint32_t count = 0;
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = links->children[i][k];
-            count += child < o->kept ? links->counts[child] : 1;
+            uint32_t child = links[i].child[k];
+            count += child < o->kept ? links[child].count : 1;
         }
-        links->counts[i] = count;
+        links[i].count = count;
+        links[i].first = FCT_NONE;
     }
 }
 
@@ -97,30 +98,29 @@ static void count_faces(const orderer *o) {
  * roots. */
 static void place_faces(const orderer *o, uint8_t *depths, uint8_t *held) {
     fct_tree *tree = o->tree;
-    const fct_node_links *links = &tree->links;
+    fct_node_link *links = tree->links;
     fct_tree_view *view = &tree->view;
     uint32_t kept = o->kept, place = 0, roots = 0, deepest = 0;
     uint64_t total = 0;
-    memset(links->firsts, 0xFF, (size_t)kept * sizeof *links->firsts);
     memset(held, 0, view->face_count);
     for (uint32_t i = 0; i < kept; ++i) {
-        if (links->firsts[i] == FCT_NONE) {
+        if (links[i].first == FCT_NONE) {
             tree->roots[roots++] = i;
-            links->firsts[i] = place;
+            links[i].first = place;
             depths[i] = 0;
-            place += links->counts[i];
+            place += links[i].count;
         }
-        uint32_t first = links->firsts[i], depth = depths[i] + 1u;
+        uint32_t first = links[i].first, depth = depths[i] + 1u;
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = links->children[i][k];
+            uint32_t child = links[i].child[k];
             if (child < kept) {
-                links->firsts[child] = first;
+                links[child].first = first;
                 depths[child] = (uint8_t)depth;
-                first += links->counts[child];
+                first += links[child].count;
             } else {
                 tree->face_ids[first] = child - kept;
                 held[child - kept] = 1;
-                links->children[i][k] = kept + first++;
+                links[i].child[k] = kept + first++;
                 total += depth;
                 if (depth > deepest) deepest = depth;
             }
@@ -234,23 +234,6 @@ static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_tree 
     return FCT_OK;
 }
 
-static fct_result allocate_links(const fct_env *env, uint32_t kept, fct_node_links *links) {
-    links->children = fct_allocate(env, kept, sizeof *links->children);
-    links->costs = fct_allocate(env, kept, sizeof *links->costs);
-    links->counts = fct_allocate(env, kept, sizeof *links->counts);
-    links->firsts = fct_allocate(env, kept, sizeof *links->firsts);
-    bool complete = links->children && links->costs && links->counts && links->firsts;
-    return complete ? FCT_OK : fct_fail_memory(env, "the tree");
-}
-
-void fct_node_links_release(const fct_env *env, fct_node_links *links) {
-    fct_release(env, links->children);
-    fct_release(env, links->costs);
-    fct_release(env, links->counts);
-    fct_release(env, links->firsts);
-    *links = (fct_node_links){0};
-}
-
 static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint32_t kept, fct_tree *tree) {
     uint32_t faces = mesh->face_count, vertices = mesh->vertex_count;
     tree->roots = fct_allocate(env, faces - kept, sizeof *tree->roots);
@@ -284,8 +267,11 @@ static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def 
     if (result != FCT_OK) return result;
     fct_parallel_for(env, merges, GRAIN, list_ranks, o);
     o->kept = kept_merges(o, def);
-    result = allocate_links(env, o->kept, &o->tree->links);
-    if (result == FCT_OK) fct_parallel_for(env, o->kept, GRAIN, number_nodes, o);
+    o->tree->links = fct_allocate(env, o->kept, sizeof *o->tree->links);
+    if (o->tree->links)
+        fct_parallel_for(env, o->kept, GRAIN, number_nodes, o);
+    else
+        result = fct_fail_memory(env, "the tree");
     fct_release(env, o->sorted);
     fct_release(env, o->ranks);
     o->sorted = NULL, o->ranks = NULL;

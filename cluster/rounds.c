@@ -42,6 +42,8 @@ typedef struct rounds {
     fct_work *work;
     bool across;
     uint32_t round;
+    uint32_t start_height; /* of the tallest cluster before the first round; each adds one at most */
+    bool low;              /* every cluster may merge, as far as heights go */
     generation now, next;
     uint32_t *best;                 /* per live cluster: its cheapest neighbour or FCT_NONE */
     uint32_t *renumbered;           /* this round's number to the next's, with MERGED */
@@ -252,40 +254,54 @@ static uint32_t renumber_list(const rounds *r, uint32_t i, uint32_t self, const 
     return count;
 }
 
-/* The same for a list of at most LONG, adding up doubles. Without branches but the loop's, for which way
- * they go could not be foretold. */
-static inline uint32_t renumber_few(const rounds *r, uint32_t i, uint32_t self, const list *l,
-                                    uint32_t count) {
+/* A list of at most LONG, its other ends in registers. */
+typedef struct short_list {
+    uint32_t count;
+    i8 low, high;
+    uint32_t keys[LONG + 1];
+    float shared[LONG + 1];
+} short_list;
+
+/* The same for a short list, adding up doubles. Without branches but the loop's, for which way they go could
+ * not be foretold. */
+static inline void renumber_short(const rounds *r, uint32_t i, uint32_t self, bool half, short_list *l) {
     uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
         uint32_t number = r->renumbered[r->now.others[from]], other = number & ~MERGED;
         i8 wanted = i8_set(other);
-        uint32_t low = i8_eq(i8_load(l->others), wanted), high = i8_eq(i8_load(l->others + 8), wanted);
-        uint32_t there = (low | high << 8) & ((1u << count) - 1),
-                 at = (uint32_t)__builtin_ctz(there | 1u << count);
+        uint32_t equal = i8_eq(l->low, wanted) | (half ? 0 : i8_eq(l->high, wanted) << 8);
+        uint32_t there = equal & ((1u << l->count) - 1), at = (uint32_t)__builtin_ctz(there | 1u << l->count);
         float sum = l->shared[at];
-        l->others[at] = other;
+        l->low = i8_insert(l->low, at, wanted);
+        if (!half) l->high = i8_insert(l->high, at - 8, wanted);
         l->shared[at] = (there ? sum : 0) + r->now.shared[from];
         l->keys[at] = (number | own) & MERGED ? OPEN : r->now.keys[from];
-        count += !there && other != self;
+        l->count += !there && other != self;
     }
-    return count;
 }
 
-static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
-    uint32_t others[LONG + SLACK], keys[LONG + SLACK];
-    float shared[LONG + SLACK];
-    list l = {others, keys, shared};
-    memset(others, 0xFF, sizeof others);
-    memset(shared, 0, sizeof shared);
-    uint32_t count = renumber_few(r, i, next, &l, 0);
-    if (mate != FCT_NONE) count = renumber_few(r, mate, next, &l, count);
-    for (uint32_t k = 0; k < count; ++k) {
+/* With `half`, of at most 8 entries. */
+static inline uint32_t join_short(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
+                                  bool half) {
+    short_list l;
+    uint32_t others[LONG];
+    l.count = 0, l.low = l.high = i8_set(OPEN);
+    renumber_short(r, i, next, half, &l);
+    if (mate != FCT_NONE) renumber_short(r, mate, next, half, &l);
+    i8_store(others, l.low);
+    if (!half) i8_store(others + 8, l.high);
+    for (uint32_t k = 0; k < l.count; ++k) {
         r->next.others[place + k] = others[k];
-        r->next.shared[place + k] = shared[k];
-        r->next.keys[place + k] = keys[k];
+        r->next.shared[place + k] = l.shared[k];
+        r->next.keys[place + k] = l.keys[k];
     }
-    return count;
+    return l.count;
+}
+
+static uint32_t join_few(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
+                         uint32_t length) {
+    return length <= 8 ? join_short(r, i, mate, next, place, true)
+                       : join_short(r, i, mate, next, place, false);
 }
 
 static uint32_t join_many(const rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
@@ -305,7 +321,7 @@ static void join_lists(void *user, size_t begin, size_t end, size_t chunk, uint3
         uint32_t next = r->renumbered[i] & ~MERGED, place = r->next.starts[next];
         if (mate != FCT_NONE) length += r->now.lengths[mate];
         r->next.lengths[next] =
-            length <= LONG ? join_few(r, i, mate, next, place) : join_many(r, i, mate, next, place);
+            length <= LONG ? join_few(r, i, mate, next, place, length) : join_many(r, i, mate, next, place);
     }
 }
 
@@ -318,7 +334,8 @@ typedef struct price_queue {
     uint32_t clusters[QUEUE + 8], entries[QUEUE + 8];
 } price_queue;
 
-static bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
+static inline bool may_merge(const rounds *r, uint32_t a, uint32_t b) {
+    if (r->low && !r->work->materials) return true;
     const uint32_t *materials = r->work->materials;
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
 }
@@ -413,6 +430,7 @@ static fct_result one_round(rounds *r, uint32_t *merges) {
     r->now = r->next, r->next = old;
     r->now.count = live;
     ++r->round;
+    r->low = r->start_height + r->round < FCT_FREE_HEIGHT;
     fct_parallel_for(env, live, GRAIN, price_edges, r);
     return FCT_OK;
 }
@@ -497,6 +515,11 @@ static fct_result run(rounds *r) {
     fct_work *work = r->work;
     fct_result result = work->lists.neighbors ? enter_lists(r) : enter_edges(r);
     if (result != FCT_OK) return result;
+    for (uint32_t i = 0; i < r->now.count; ++i) {
+        uint32_t height = work->heights[r->now.slots[i]];
+        if (height > r->start_height) r->start_height = height;
+    }
+    r->low = r->start_height < FCT_FREE_HEIGHT;
     fct_parallel_for(work->env, r->now.count, GRAIN, price_edges, r);
     for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
         result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);

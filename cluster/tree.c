@@ -17,7 +17,7 @@ void fct_tree_destroy(fct_tree *tree) {
     if (!tree) return;
     const fct_env *env = tree->env;
     fct_release(env, tree->clusters);
-    fct_node_links_release(env, &tree->links);
+    fct_release(env, tree->links);
     fct_release(env, tree->roots);
     fct_release(env, tree->face_ids);
     fct_release(env, tree->vertex_ids);

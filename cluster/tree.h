@@ -8,19 +8,19 @@
 #include "base/file.h"
 #include "cluster/work.h"
 
-/* Inner nodes by id, between ordering and description: what a node's record will hold of other nodes. */
-typedef struct fct_node_links {
-    uint32_t (*children)[2];
-    float *costs;
-    uint32_t *counts, *firsts;
-} fct_node_links;
+/* What an inner node's record will hold of other nodes, between ordering and description. */
+typedef struct fct_node_link {
+    uint32_t child[2];
+    uint32_t first, count;
+    float cost;
+} fct_node_link;
 
 struct fct_tree {
     const fct_env *env;
     fct_tree_view view;
     /* What view points to and the tree owns; NULL where it points into the mapped file. */
     fct_cluster *clusters;
-    fct_node_links links;
+    fct_node_link *links; /* by id */
     uint32_t *roots, *face_ids, *vertex_ids, *triangles, *materials;
     float *positions, *colors;
     char **names;
@@ -50,9 +50,12 @@ fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_d
 
 /* Writes the records of all inner nodes; the links are released. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe(fct_tree *tree);
-void fct_node_links_release(const fct_env *env, fct_node_links *links);
 /* A node's links and cost into its record. */
-void fct_node_links_store(const fct_node_links *links, uint32_t id, fct_cluster *out);
+static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *out) {
+    out->cost = link->cost;
+    out->child[0] = link->child[0], out->child[1] = link->child[1];
+    out->first = link->first, out->count = link->count;
+}
 
 /* The attributes of the leaf at a place, but for cost and links. */
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out);

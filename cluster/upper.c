@@ -8,7 +8,9 @@
  */
 #include <string.h>
 
+#include "base/eigen.h"
 #include "base/parallel.h"
+#include "base/simd.h"
 #include "cluster/cone.h"
 #include "cluster/describe.h"
 
@@ -64,19 +66,20 @@ static void measure(const upper_job *job, const fct_cluster *c, int frames, floa
         for (int f = 0; f < frames; ++f)
             fct_extents_add(&out[f], all, from, from + SLICE < end ? from + SLICE : end,
                             (const float(*)[3])axes[f]);
-    size_t last = 3 * ((size_t)c->first + c->count);
-    for (size_t i = 3 * (size_t)c->first; i < last; ++i) {
-        uint32_t v = tree->triangles[i];
-        if (v < begin) {
+    size_t last = 3 * ((size_t)c->first + c->count); /* more than 8 */
+    for (size_t i = 3 * (size_t)c->first; i < last; i += 8) {
+        if (i + 8 > last) i = last - 8;
+        uint32_t mask = i8_lt(i8_load(tree->triangles + i), i8_set(begin));
+        for (; mask; mask &= mask - 1) {
+            uint32_t v = tree->triangles[i + (uint32_t)__builtin_ctz(mask)];
             for (int k = 0; k < 3; ++k) old[k][waiting] = job->positions[k][v];
             ++waiting;
         }
-        if (waiting == OLD || (waiting && i + 1 == last)) {
-            fct_points some = {old[0], old[1], old[2]};
-            for (int f = 0; f < frames; ++f)
-                fct_extents_add(&out[f], some, 0, waiting, (const float(*)[3])axes[f]);
-            waiting = 0;
-        }
+        if (waiting + 8 <= OLD && i + 8 < last) continue;
+        for (int f = 0; f < frames; ++f)
+            fct_extents_add(&out[f], (fct_points){old[0], old[1], old[2]}, 0, waiting,
+                            (const float(*)[3])axes[f]);
+        waiting = 0;
     }
 }
 
@@ -91,8 +94,10 @@ static void choose_frames(void *user, size_t begin, size_t end, size_t chunk, ui
         fct_upper *u = &job->outline->upper[i];
         fct_cluster *c = &tree->clusters[u->id];
         v3 frame[3];
-        fct_node_links_store(&tree->links, u->id, c);
-        double size = fct_sums_describe(&u->sums, frame, c);
+        fct_node_link_store(&tree->links[u->id], c);
+        double values[3];
+        fct_eigen3(u->sums.covariance, values, frame);
+        double size = fct_sums_store(&u->sums, frame, c);
         float corners[3][SAMPLES];
         size_t first = 3 * (size_t)c->first, count = 3 * (size_t)c->count;
         for (size_t s = 0; s < SAMPLES; ++s) {
@@ -123,8 +128,10 @@ static void fit_box(const upper_job *job, const fct_upper *u, fct_cluster *c) {
     for (int f = 1; f < FRAMES; ++f)
         if (fct_box_area(&extents[f]) < fct_box_area(&extents[best])) best = f;
     v3 point = v3_load(job->tree->positions + 3 * (size_t)job->tree->triangles[3 * (size_t)c->first]);
-    if (!fct_box_set(&extents[best], rotations[best], (const float(*)[3])axes[best], point, c))
-        fct_box_set(&extents[1], world, (const float(*)[3])axes[1], point, c);
+    memcpy(c->box_rotation, rotations[best], sizeof c->box_rotation);
+    if (fct_box_set(&extents[best], (const float(*)[3])axes[best], point, c)) return;
+    memcpy(c->box_rotation, world, sizeof world);
+    fct_box_set(&extents[1], (const float(*)[3])axes[1], point, c);
 }
 
 /* --- Cones --- */

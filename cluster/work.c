@@ -122,7 +122,8 @@ void fct_work_release(fct_work *work) {
 
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
     uint32_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
-    return taller < 8 || taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b], !work->steep);
+    return taller < FCT_FREE_HEIGHT ||
+           taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b], !work->steep);
 }
 
 void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,

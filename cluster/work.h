@@ -63,6 +63,7 @@ static inline float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, 
     fct_work_costs(work, &(fct_pair){a, b, shared}, 1, &cost);
     return cost;
 }
+enum { FCT_FREE_HEIGHT = 8 }; /* clusters that are lower may always merge */
 /* Whether the union keeps the height limit. */
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
 /* Notes the merge; slot a holds the union, slot b dies. */
