@@ -1,14 +1,33 @@
-/* tools/boxes.c: facetree boxes: the oriented boxes of K clusters, as JSON or as a mesh of boxes. */
+/* tools/boxes.c: facetree boxes: the oriented boxes of clusters, as JSON or as a mesh of boxes. */
 #include "tools/tool.h"
 
 #include <string.h>
 
-static const struct argp_option options_table[] = {{"clusters", 'k', "K", 0, "The boxes of K clusters", 0},
-                                                   {0}};
+typedef struct box_options {
+    uint32_t clusters; /* 0: not given */
+    tool_length max_distance;
+} box_options;
+
+enum { KEY_MAX_DISTANCE = TOOL_KEY };
+
+static const struct argp_option options_table[] = {
+    {"clusters", 'k', "K", 0, "The boxes of K clusters", 0},
+    {"max-distance", KEY_MAX_DISTANCE, "D", 0,
+     "Of the fewest clusters without a vertex farther than D from its cluster's plane; D% is a share of the "
+     "diagonal",
+     0},
+    {0}};
 
 static error_t parse(int key, char *text, struct argp_state *state) {
-    if (key == 'k') return tool_parse_count32(state, "-k", text, 1, FCT_NONE - 1, state->input);
-    return key == ARGP_KEY_SUCCESS ? 0 : ARGP_ERR_UNKNOWN;
+    box_options *o = state->input;
+    switch (key) {
+    case 'k':
+        return tool_parse_count32(state, "-k", text, 1, FCT_NONE - 1, &o->clusters);
+    case KEY_MAX_DISTANCE:
+        return tool_parse_length(state, "--max-distance", text, &o->max_distance);
+    default:
+        return key == ARGP_KEY_SUCCESS ? 0 : ARGP_ERR_UNKNOWN;
+    }
 }
 
 static json_t *numbers(const float *values, int count) {
@@ -94,33 +113,32 @@ static int write_boxes(tool *t, const fct_cluster *clusters, uint32_t count) {
     return code;
 }
 
-/* The clusters of the partition; of a hierarchy file nothing but these and those above them is read. */
-static int read_clusters(tool *t, const fct_tree *tree, uint32_t wanted, fct_cluster *clusters,
-                         uint32_t *nodes) {
-    uint32_t count;
-    int code = tool_result(t, fct_tree_partition(&t->env, tree, wanted, nodes, &count));
-    for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)
-        code = tool_result(t, fct_tree_cluster(tree, nodes[i], &clusters[i]));
-    return code;
+/* For -k nothing of a hierarchy file is read but the clusters asked for and those above them. */
+static int cut(tool *t, const fct_tree *tree, const box_options *o, uint32_t **nodes, uint32_t *count) {
+    fct_tree_view view = fct_tree_get(tree);
+    if (o->clusters && (o->clusters < view.root_count || o->clusters > view.face_count))
+        return tool_fail(t, TOOL_USAGE, "-k %u: %s can be cut into %u to %u clusters", o->clusters,
+                         t->inputs[0], view.root_count, view.face_count);
+    *nodes = tool_allocate(t, o->clusters ? o->clusters : view.face_count, sizeof **nodes);
+    if (!*nodes) return TOOL_MEMORY;
+    if (o->clusters) return tool_result(t, fct_tree_partition(&t->env, tree, o->clusters, *nodes, count));
+    return tool_result(t, fct_tree_cut_at_distance(&t->env, tree, tool_length_of(tree, o->max_distance),
+                                                   *nodes, count, NULL));
 }
 
 static int run(tool *t, void *options) {
-    uint32_t wanted = *(const uint32_t *)options;
-    if (!wanted) return tool_fail(t, TOOL_USAGE, "expected -k K");
+    const box_options *o = options;
+    if ((o->clusters > 0) == (o->max_distance.value >= 0))
+        return tool_fail(t, TOOL_USAGE, "expected either -k K or --max-distance D");
     fct_tree *tree;
-    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
-    if (code != TOOL_DONE) return code;
-    fct_tree_view view = fct_tree_get(tree);
-    uint32_t *nodes = NULL;
+    uint32_t *nodes = NULL, count = 0;
     fct_cluster *clusters = NULL;
-    if (wanted < view.root_count || wanted > view.face_count)
-        code = tool_fail(t, TOOL_USAGE, "-k %u: %s can be cut into %u to %u clusters", wanted, t->inputs[0],
-                         view.root_count, view.face_count);
-    else if (!(nodes = tool_allocate(t, wanted, sizeof *nodes)) ||
-             !(clusters = tool_allocate(t, wanted, sizeof *clusters)))
-        code = TOOL_MEMORY;
-    if (code == TOOL_DONE) code = read_clusters(t, tree, wanted, clusters, nodes);
-    if (code == TOOL_DONE) code = write_boxes(t, clusters, wanted);
+    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code == TOOL_DONE) code = cut(t, tree, o, &nodes, &count);
+    if (code == TOOL_DONE && !(clusters = tool_allocate(t, count, sizeof *clusters))) code = TOOL_MEMORY;
+    for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)
+        code = tool_result(t, fct_tree_cluster(tree, nodes[i], &clusters[i]));
+    if (code == TOOL_DONE) code = write_boxes(t, clusters, count);
     tool_release(t, nodes);
     tool_release(t, clusters);
     fct_tree_destroy(tree);
@@ -130,8 +148,8 @@ static int run(tool *t, void *options) {
 int tool_boxes(int argc, char **argv) {
     static const tool_command command = {
         .name = "boxes",
-        .synopsis = "IN -k K [-o OUT]",
-        .summary = "oriented boxes of K clusters",
+        .synopsis = "IN (-k K | --max-distance D) [-o OUT]",
+        .summary = "oriented boxes of clusters",
         .text =
             "IN is a mesh or a hierarchy file (.fct). OUT is JSON, or, when it is named as a mesh, a mesh of "
             "boxes "
@@ -144,6 +162,6 @@ int tool_boxes(int argc, char **argv) {
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL};
-    uint32_t clusters = 0;
-    return tool_main(&command, argc, argv, &clusters);
+    box_options options = {.max_distance = {.value = -1}};
+    return tool_main(&command, argc, argv, &options);
 }

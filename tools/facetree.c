@@ -13,7 +13,7 @@ static const struct {
     {"cluster", "build the hierarchy of face clusters of a mesh", tool_cluster},
     {"partition", "cut a mesh into clusters, flat pieces or charts", tool_partition},
     {"meshlets", "cut a mesh into meshlets for mesh shaders", tool_meshlets},
-    {"boxes", "oriented boxes of K clusters", tool_boxes},
+    {"boxes", "oriented boxes of clusters", tool_boxes},
     {"raycast", "shoot rays; check one backend against the other", tool_raycast},
     {"closest", "find the nearest surface points", tool_closest},
     {"bake", "radiosity of a scene to vertex colours", tool_bake},

@@ -9,10 +9,9 @@
 static const double degree = 3.14159265358979323846 / 180;
 
 typedef struct partition_options {
-    uint32_t clusters;     /* 0: not given */
-    double max_cost;       /* negative: not given */
-    double max_distance;   /* negative: not given */
-    bool relative;         /* max_distance is in percent of the diagonal */
+    uint32_t clusters; /* 0: not given */
+    double max_cost;   /* negative: not given */
+    tool_length max_distance;
     double chart_angle;    /* degrees; negative: not given */
     fct_chart_def charts;  /* its other fields */
     bool chart_options;    /* one of them was given */
@@ -74,16 +73,6 @@ static const struct argp_option options_table[] = {
      "With --refine: irregularity may grow to R times its start, or inf (default 1)", 0},
     {0}};
 
-/* A length, or with % a share. */
-static error_t parse_distance(struct argp_state *state, const char *text, partition_options *o) {
-    char number[64];
-    size_t length = strlen(text);
-    o->relative = length > 1 && length < sizeof number && text[length - 1] == '%';
-    if (!o->relative) return tool_parse_real(state, "--max-distance", text, 0, INFINITY, &o->max_distance);
-    snprintf(number, sizeof number, "%.*s", (int)length - 1, text);
-    return tool_parse_real(state, "--max-distance", number, 0, INFINITY, &o->max_distance);
-}
-
 static error_t parse_chart(int key, char *text, struct argp_state *state, partition_options *o) {
     o->chart_options = true;
     switch (key) {
@@ -108,7 +97,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_MAX_COST:
         return tool_parse_real(state, "--max-cost", text, 0, INFINITY, &o->max_cost);
     case KEY_MAX_DISTANCE:
-        return parse_distance(state, text, o);
+        return tool_parse_length(state, "--max-distance", text, &o->max_distance);
     case KEY_CHARTS:
         return tool_parse_real(state, "--charts", text, 0, 180, &o->chart_angle);
     case KEY_MAX_FACES:
@@ -136,13 +125,6 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 
 /* --- Making it --- */
 
-static double diagonal(const fct_tree *tree) {
-    fct_bounds b = fct_tree_get(tree).bounds;
-    double squared = 0;
-    for (int i = 0; i < 3; ++i) squared += pow((double)b.upper[i] - (double)b.lower[i], 2);
-    return sqrt(squared);
-}
-
 static int cut_by_count(tool *t, const partition_options *o, partition *p) {
     fct_tree_view view = fct_tree_get(p->tree);
     uint32_t count = o->clusters ? o->clusters : fct_tree_count_at_cost(p->tree, o->max_cost);
@@ -155,7 +137,7 @@ static int cut_by_count(tool *t, const partition_options *o, partition *p) {
 }
 
 static int cut_by_distance(tool *t, const partition_options *o, partition *p) {
-    double distance = o->relative ? o->max_distance / 100 * diagonal(p->tree) : o->max_distance;
+    double distance = tool_length_of(p->tree, o->max_distance);
     p->nodes = tool_allocate(t, fct_tree_get(p->tree).face_count, sizeof *p->nodes);
     if (!p->nodes) return TOOL_MEMORY;
     return tool_result(
@@ -172,7 +154,7 @@ static int make_partition(tool *t, const partition_options *o, partition *p) {
         p->count = p->charts.charts;
         return code;
     }
-    int code = o->max_distance >= 0 ? cut_by_distance(t, o, p) : cut_by_count(t, o, p);
+    int code = o->max_distance.value >= 0 ? cut_by_distance(t, o, p) : cut_by_count(t, o, p);
     if (code != TOOL_DONE) return code;
     return tool_result(t, fct_tree_labels(&t->env, p->tree, p->nodes, p->count, p->labels));
 }
@@ -278,8 +260,8 @@ static int report(tool *t, const partition_options *o, const partition *p) {
         report_refined(t, &p->refined, p->count, object);
     else
         say_quality(t, "", &q, p->count);
-    if (o->max_distance >= 0) {
-        double whole = diagonal(p->tree);
+    if (o->max_distance.value >= 0) {
+        double whole = tool_diagonal(p->tree);
         tool_say(t, "largest distance to a plane %.6g, %.4g%% of the diagonal", p->largest_distance,
                  whole > 0 ? 100 * p->largest_distance / whole : 0);
         json_object_set_new(object, "largest_distance", json_real(p->largest_distance));
@@ -294,7 +276,7 @@ static int report(tool *t, const partition_options *o, const partition *p) {
 }
 
 static int check_options(tool *t, const partition_options *o) {
-    int ways = (o->clusters > 0) + (o->max_cost >= 0) + (o->max_distance >= 0) + (o->chart_angle >= 0);
+    int ways = (o->clusters > 0) + (o->max_cost >= 0) + (o->max_distance.value >= 0) + (o->chart_angle >= 0);
     if (ways != 1)
         return tool_fail(t, TOOL_USAGE,
                          "expected one of -k K, --max-cost C, --max-distance D and --charts DEGREES");
@@ -302,7 +284,7 @@ static int check_options(tool *t, const partition_options *o) {
         return tool_fail(t, TOOL_USAGE, "expected --charts beside its options");
     if (o->refine.sweep_count == 0 && o->refine_options)
         return tool_fail(t, TOOL_USAGE, "expected --refine beside --perimeter and --irregularity");
-    if (o->refine.sweep_count > 0 && (o->chart_angle >= 0 || o->max_distance >= 0))
+    if (o->refine.sweep_count > 0 && (o->chart_angle >= 0 || o->max_distance.value >= 0))
         return tool_fail(t, TOOL_USAGE, "--refine would not keep what --charts or --max-distance promise");
     if (tool_ends(t->output, "stl")) return tool_fail(t, TOOL_USAGE, "%s: STL holds no colours", t->output);
     if (o->adjacency && !strcmp(o->adjacency, t->output))
@@ -373,7 +355,7 @@ int tool_partition(int argc, char **argv) {
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED};
     partition_options options = {.max_cost = -1,
-                                 .max_distance = -1,
+                                 .max_distance = {.value = -1},
                                  .chart_angle = -1,
                                  .charts = fct_chart_def_default(),
                                  .refine = fct_refine_def_default()};

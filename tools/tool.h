@@ -88,6 +88,12 @@ error_t tool_parse_count32(struct argp_state *state, const char *name, const cha
 /* A finite number in [least, most]; "inf" where most is INFINITY. */
 error_t tool_parse_real(struct argp_state *state, const char *name, const char *text, double least,
                         double most, double *value);
+/* A length of at least 0, or with % a share of the diagonal. */
+typedef struct tool_length {
+    double value; /* negative: not given */
+    bool percent;
+} tool_length;
+error_t tool_parse_length(struct argp_state *state, const char *name, const char *text, tool_length *length);
 /* `names` ends with NULL; *index receives the place of `text` in it. */
 error_t tool_parse_choice(struct argp_state *state, const char *name, const char *text,
                           const char *const *names, int *index);
@@ -157,6 +163,9 @@ void tool_rows_release(tool *t, tool_rows *rows);
 /* --- models (tool_model.c) --- */
 /* A hierarchy from a .fct file or, built with `def` (NULL: the default), from a mesh file. */
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
+/* Of the bounds of the tree's mesh; and a length where it is a share of that. */
+double tool_diagonal(const fct_tree *tree);
+double tool_length_of(const fct_tree *tree, tool_length length);
 /* A mesh from a mesh file or a .fct file. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
 /* Saves a mesh with the given factor on its colours for display. */

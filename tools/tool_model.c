@@ -25,6 +25,17 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
     return tool_context(t, code, path);
 }
 
+double tool_diagonal(const fct_tree *tree) {
+    fct_bounds b = fct_tree_get(tree).bounds;
+    double squared = 0;
+    for (int i = 0; i < 3; ++i) squared += pow((double)b.upper[i] - (double)b.lower[i], 2);
+    return sqrt(squared);
+}
+
+double tool_length_of(const fct_tree *tree, tool_length length) {
+    return length.percent ? length.value / 100 * tool_diagonal(tree) : length.value;
+}
+
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
     if (!tool_ends(path, "fct")) return tool_result(t, fct_mesh_load(&t->env, path, mesh));
     fct_tree *tree;

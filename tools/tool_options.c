@@ -55,6 +55,15 @@ error_t tool_parse_real(struct argp_state *state, const char *name, const char *
     return 0;
 }
 
+error_t tool_parse_length(struct argp_state *state, const char *name, const char *text, tool_length *length) {
+    char number[64];
+    size_t size = strlen(text);
+    length->percent = size > 1 && size < sizeof number && text[size - 1] == '%';
+    if (!length->percent) return tool_parse_real(state, name, text, 0, INFINITY, &length->value);
+    snprintf(number, sizeof number, "%.*s", (int)size - 1, text);
+    return tool_parse_real(state, name, number, 0, INFINITY, &length->value);
+}
+
 error_t tool_parse_choice(struct argp_state *state, const char *name, const char *text,
                           const char *const *names, int *index) {
     char list[256] = "";

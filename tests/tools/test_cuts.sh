@@ -24,6 +24,12 @@ expect 0 partition sphere.fct --max-distance 1% -o - --quiet
 check "labels on standard output" cmp out percent.txt
 for bad in -1 x '%' 1%% nan; do expect 64 partition sphere.fct --max-distance "$bad" -o x.txt; done
 
+expect 0 boxes sphere.fct --max-distance 1% --json
+check "boxes of the same clusters" test "$(value clusters)" = "$(sort -u percent.txt | wc -l)"
+expect 0 boxes sphere.fct --max-distance 1% -o boxes.ply
+expect 64 boxes sphere.fct --max-distance 1% -k 3
+expect 64 boxes sphere.fct
+
 # --- charts ---
 for angle in 5 30 80; do
     expect 0 partition sphere.fct --charts $angle -o charts.txt --json
