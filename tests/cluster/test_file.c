@@ -317,6 +317,27 @@ static void a_node_is_no_child_of_its_own(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
+static void a_head_that_changes_under_a_tree_is_found(void **state) {
+    (void)state;
+    recorder quiet = {0};
+    fct_env env = recorder_env(&quiet);
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 3, &mesh), *back;
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    assert_int_equal(fct_tree_open(&env, path, &back), FCT_OK);
+    FILE *file = fopen(path, "r+b");
+    fseek(file, offsetof(fct_format_header, sections) + offsetof(fct_format_section, offset) + 7, SEEK_SET);
+    fputc(0x7F, file);
+    fclose(file);
+    assert_int_equal(fct_tree_verify(&env, back), FCT_ERROR_DATA);
+    assert_non_null(strstr(quiet.text, "changed since it was opened"));
+    fct_tree_destroy(back);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    unlink(path);
+    assert_int_equal(quiet.alive, 0);
+}
+
 static void the_cut_is_that_of_the_nodes(void **state) {
     (void)state;
     recorder quiet = {0};
@@ -438,6 +459,7 @@ int main(void) {
                                        cmocka_unit_test(no_damage_leads_astray),
                                        cmocka_unit_test(shared_children_end),
                                        cmocka_unit_test(a_node_is_no_child_of_its_own),
+                                       cmocka_unit_test(a_head_that_changes_under_a_tree_is_found),
                                        cmocka_unit_test(the_cut_is_that_of_the_nodes),
                                        cmocka_unit_test(endless_numbers_do_not_pass),
                                        cmocka_unit_test(errors_are_told),
