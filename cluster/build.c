@@ -105,8 +105,7 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     return result;
 }
 
-/* Larger weights would make costs that a float cannot hold. */
-static fct_result check_def(const fct_env *env, const fct_tree_def *def) {
+fct_result fct_tree_check_def(const fct_env *env, const fct_tree_def *def) {
     if (def->size != sizeof *def)
         return fct_fail(env, FCT_ERROR_DATA, "fct_tree_def has size %u, this library's is %zu", def->size,
                         sizeof *def);
@@ -122,7 +121,7 @@ fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tr
                           fct_tree_stats *stats, fct_tree **out) {
     *out = NULL;
     fct_tree_def options = def ? *def : fct_tree_def_default();
-    fct_result result = check_def(env, &options);
+    fct_result result = fct_tree_check_def(env, &options);
     if (result != FCT_OK) return result;
     if (mesh->face_count == 0) return fct_fail(env, FCT_ERROR_DATA, "a mesh without faces has no tree");
     result = fct_mesh_validate(env, mesh);

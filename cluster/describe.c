@@ -115,6 +115,16 @@ static void fit(fct_points corners, size_t first, size_t end, fct_cluster *out) 
         fit_world(corners, 3 * first, 3 * end, point, out);
 }
 
+void fct_faces_describe(fct_points corners, fct_points normals, const fct_sums *sums, size_t first,
+                        size_t end, fct_cluster *out) {
+    double values[3];
+    v3 frame[3];
+    fct_eigen3(sums->covariance, values, frame);
+    double size = fct_sums_store(sums, frame, out);
+    orient(corners, normals, first, end, size, frame, out);
+    fit(corners, first, end, out);
+}
+
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
     const uint32_t *triangle = view->triangles + 3 * (size_t)place;
     float x[3], y[3], z[3], normal[3];
@@ -125,13 +135,7 @@ void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cl
     fct_unit_normal(view->positions, triangle, normal);
     fct_sums s;
     fct_sums_face(view->positions, triangle, &s);
-    double values[3];
-    v3 frame[3];
-    fct_eigen3(s.covariance, values, frame);
-    double size = fct_sums_store(&s, frame, out);
-    fct_points corners = {x, y, z};
-    orient(corners, (fct_points){normal, normal + 1, normal + 2}, 0, 1, size, frame, out);
-    fit(corners, 0, 1, out);
+    fct_faces_describe((fct_points){x, y, z}, (fct_points){normal, normal + 1, normal + 2}, &s, 0, 1, out);
     out->first = place, out->count = 1;
 }
 

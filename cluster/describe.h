@@ -41,6 +41,10 @@ void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out);
  * (u, v, normal). Returns about the radius of the cluster, 1 where it has none. */
 double fct_sums_store(const fct_sums *sums, v3 frame[3], fct_cluster *out);
 
+/* All but cost and links, from the sums, corners and normals of faces [first, end) of a stream. */
+void fct_faces_describe(fct_points corners, fct_points normals, const fct_sums *sums, size_t first,
+                        size_t end, fct_cluster *out);
+
 /* Describes the upper clusters of a tree whose blocks are done. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe_upper(fct_tree *tree, fct_outline *outline);
 

@@ -44,6 +44,9 @@ const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], 
 /* An empty tree that can be destroyed. NULL when memory is out. */
 fct_tree *fct_tree_new(const fct_env *env);
 
+/* Size, weights (larger ones would make costs that a float cannot hold), costs. Errors: DATA. */
+fct_result fct_tree_check_def(const fct_env *env, const fct_tree_def *def);
+
 /* Numbers the nodes of a finished clustering, sets links, roots, depth and face order, and copies the mesh
  * into the tree's order. The work is released. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree);

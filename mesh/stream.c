@@ -217,27 +217,49 @@ static void forget_ply(fct_stream *s) {
     s->info = (fct_stream_info){0};
 }
 
-fct_result fct_stream_open(const fct_env *env, const char *path, const char *folder, const char *beside,
-                           fct_stream **out) {
-    *out = NULL;
-    fct_stream *s = fct_allocate_zero(env, 1, sizeof *s);
+static fct_result new_stream(const fct_env *env, const char *path, fct_stream **out) {
+    fct_stream *s = *out = fct_allocate_zero(env, 1, sizeof *s);
     if (!s) return fct_fail_memory(env, "a mesh file");
     s->env = env, s->descriptor = -1;
     s->name = fct_copy_text(env, path, strlen(path));
-    fct_result result = s->name ? FCT_OK : fct_fail_memory(env, "a mesh file");
-    bool done = false;
+    return s->name ? FCT_OK : fct_fail_memory(env, "a mesh file");
+}
+
+static bool is_ply(const char *path) {
     size_t length = strlen(path);
-    if (result == FCT_OK && length > 4 && !strcasecmp(path + length - 4, ".ply")) result = open_ply(s, &done);
+    return length > 4 && !strcasecmp(path + length - 4, ".ply");
+}
+
+fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bool *known, uint32_t *face_count,
+                                uint32_t *vertex_count) {
+    fct_stream *s;
+    fct_result result = new_stream(env, path, &s);
+    *known = false;
+    if (result == FCT_OK && is_ply(path)) result = open_ply(s, known);
+    if (result != FCT_OK) *known = false;
+    if (*known) *face_count = s->info.face_count, *vertex_count = s->info.vertex_count;
+    fct_stream_close(s);
+    return result;
+}
+
+fct_result fct_stream_open(const fct_env *env, const char *path, const char *folder, const char *beside,
+                           fct_stream **out) {
+    fct_stream *s;
+    fct_result result = new_stream(env, path, &s);
+    bool done = false;
+    *out = NULL;
+    if (result == FCT_OK && is_ply(path)) result = open_ply(s, &done);
     if (result == FCT_OK && !done) {
         forget_ply(s);
         result = open_other(s, folder, beside);
     }
-    s->material_limit = s->info.material_names ? s->info.material_count : s->info.face_count + 65536;
-    if (result == FCT_OK)
-        *out = s;
-    else
+    if (result != FCT_OK) {
         fct_stream_close(s);
-    return result;
+        return result;
+    }
+    s->material_limit = s->info.material_names ? s->info.material_count : s->info.face_count + 65536;
+    *out = s;
+    return FCT_OK;
 }
 
 void fct_stream_close(fct_stream *s) {

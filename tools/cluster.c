@@ -23,8 +23,14 @@ enum {
     KEY_SHAPE,
     KEY_FIT_MEASURE,
     KEY_ROOTS,
-    KEY_MAX_COST
+    KEY_MAX_COST,
+    KEY_TEMPORARY
 };
+
+typedef struct cluster_options {
+    fct_tree_def def;
+    const char *temporary; /* folder, or NULL */
+} cluster_options;
 
 static const struct argp_option options_table[] = {
     {"method", KEY_METHOD, "NAME", 0,
@@ -38,6 +44,10 @@ static const struct argp_option options_table[] = {
      "area: over the surface (default); points: over the corners", 0},
     {"roots", KEY_ROOTS, "N", 0, "Stop at N clusters (default 1)", 0},
     {"max-cost", KEY_MAX_COST, "C", 0, "Make no merge that costs more; what is left over are roots", 0},
+    {"temporary", KEY_TEMPORARY, "FOLDER", 0,
+     "Temporary files of a mesh that does not fit into --max-memory go to FOLDER (default: beside the "
+     "output)",
+     0},
     {0}};
 
 static error_t parse(int key, char *text, struct argp_state *state) {
@@ -47,7 +57,8 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     static const fct_cluster_method method_values[] = {FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS};
     static const fct_cluster_cost cost_values[] = {FCT_COST_INCREMENT, FCT_COST_MEAN};
     static const fct_fit_measure measure_values[] = {FCT_FIT_AREA, FCT_FIT_POINTS};
-    fct_tree_def *def = state->input;
+    cluster_options *options = state->input;
+    fct_tree_def *def = &options->def;
     int index = 0;
     error_t error;
     switch (key) {
@@ -73,6 +84,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         return tool_parse_count32(state, "--roots", text, 1, FCT_NONE - 1, &def->root_count);
     case KEY_MAX_COST:
         return tool_parse_real(state, "--max-cost", text, 0, INFINITY, &def->max_cost);
+    case KEY_TEMPORARY:
+        options->temporary = text;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -80,55 +94,102 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 
 /* --- One file --- */
 
-static json_t *report(const fct_tree *tree, const fct_tree_stats *stats, double read, double write,
-                      double total, const char *output) {
-    fct_tree_view view = fct_tree_get(tree);
+/* The stats' times are those of a build in memory, too. */
+static json_t *report(const fct_large_stats *s, double total, const char *output) {
     struct stat status;
     bool regular = strcmp(output, "-") != 0 && stat(output, &status) == 0 && S_ISREG(status.st_mode);
-    return json_pack("{s:I, s:I, s:I, s:I, s:f, s:{s:f, s:f, s:f, s:f, s:f, s:f}, s:I, s:I}", "faces",
-                     (json_int_t)view.face_count, "vertices", (json_int_t)view.vertex_count, "roots",
-                     (json_int_t)view.root_count, "depth", (json_int_t)view.depth, "mean_depth",
-                     view.mean_depth, "seconds", "read", read, "dual", stats->seconds_dual, "contract",
-                     stats->seconds_contract, "boxes", stats->seconds_boxes, "write", write, "total", total,
-                     "peak_bytes", (json_int_t)tool_peak_bytes(), "file_bytes",
-                     (json_int_t)(regular ? status.st_size : 0));
+    return json_pack("{s:I, s:I, s:I, s:I, s:f, s:I, s:{s:f, s:f, s:f, s:f, s:f, s:f}, s:I, s:I}", "faces",
+                     (json_int_t)s->face_count, "vertices", (json_int_t)s->vertex_count, "roots",
+                     (json_int_t)s->root_count, "depth", (json_int_t)s->depth, "mean_depth", s->mean_depth,
+                     "parts", (json_int_t)s->part_count, "seconds", "read", s->seconds_read, "dual",
+                     s->seconds_dual, "contract", s->seconds_contract, "boxes", s->seconds_boxes, "write",
+                     s->seconds_write, "total", total, "peak_bytes", (json_int_t)tool_peak_bytes(),
+                     "file_bytes", (json_int_t)(regular ? status.st_size : 0));
 }
 
-/* Reads, clusters and writes; *out receives the report. */
-static int cluster_file(tool *t, const fct_tree_def *options, const char *input, const char *output,
-                        json_t **out) {
-    fct_tree_def def = *options;
+static int check_faces(tool *t, const fct_tree_def *def, const char *input, uint32_t faces) {
+    if (faces == 0) return tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", input);
+    if (def->root_count > faces)
+        return tool_fail(t, TOOL_USAGE, "--roots %u: %s has only %u faces", def->root_count, input, faces);
+    return TOOL_DONE;
+}
+
+/* What --max-memory leaves to be allocated. */
+static size_t memory_left(const tool *t) {
+    if (!t->max_memory) return SIZE_MAX;
+    return t->max_memory > t->memory_now ? t->max_memory - t->memory_now : 0;
+}
+
+static bool fits(const tool *t, const fct_tree_def *def, uint32_t faces, uint32_t vertices) {
+    return fct_tree_build_need(faces, vertices, def).in_memory <= memory_left(t);
+}
+
+/* All of it in memory. A mesh that turns out not to fit is given up, with *large set. */
+static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input, const char *output,
+                             bool *large, fct_large_stats *s) {
     fct_mesh mesh = {0};
     fct_tree *tree = NULL;
     fct_tree_stats stats = {0};
     double start = tool_seconds();
-    int code = TOOL_DONE;
-    if (strcmp(input, "-") != 0) code = tool_hash_file(t, input, &def.source_hash);
-    if (code == TOOL_DONE) code = tool_load_mesh(t, input, &mesh);
+    int code = tool_load_mesh(t, input, &mesh);
+    if (code == TOOL_DONE) code = check_faces(t, def, input, mesh.face_count);
     if (code != TOOL_DONE) goto done;
-    if (mesh.face_count == 0) {
-        code = tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", input);
-        goto done;
-    }
-    if (def.root_count > mesh.face_count) {
-        code = tool_fail(t, TOOL_USAGE, "--roots %u: %s has only %u faces", def.root_count, input,
-                         mesh.face_count);
-        goto done;
-    }
-    double read = tool_seconds() - start;
-    const char *slash = strrchr(input, '/');
-    def.source = strcmp(input, "-") == 0 ? "standard input" : slash ? slash + 1 : input;
+    *large = strcmp(input, "-") != 0 && !fits(t, def, mesh.face_count, 0); /* the mesh is there already */
+    if (*large) goto done;
     t->items = mesh.face_count;
     t->unit = "faces";
-    code = tool_result(t, fct_tree_build(&t->env, &mesh, &def, &stats, &tree));
+    double read = tool_seconds();
+    code = tool_result(t, fct_tree_build(&t->env, &mesh, def, &stats, &tree));
     if (tool_context(t, code, input) != TOOL_DONE) goto done;
-    double before = tool_seconds();
+    double built = tool_seconds();
     code = tool_result(t, fct_tree_save(&t->env, tree, output));
-    double end = tool_seconds();
-    if (code == TOOL_DONE) *out = report(tree, &stats, read, end - before, end - start, output);
+    fct_tree_view view = fct_tree_get(tree);
+    *s = (fct_large_stats){view.face_count,     view.vertex_count,
+                           view.root_count,     view.depth,
+                           view.mean_depth,     1,
+                           view.root_count,     read - start,
+                           stats.seconds_dual,  stats.seconds_contract,
+                           stats.seconds_boxes, tool_seconds() - built};
 done:
     fct_tree_destroy(tree);
     fct_mesh_release(&t->env, &mesh);
+    return code;
+}
+
+/* Reads, clusters and writes; *out receives the report. */
+static int cluster_file(tool *t, const cluster_options *options, const char *input, const char *output,
+                        json_t **out) {
+    fct_tree_def def = options->def;
+    fct_large_stats stats = {0};
+    double start = tool_seconds();
+    bool standard = strcmp(input, "-") == 0, known = false, large = false;
+    uint32_t faces = 0, vertices = 0;
+    int code = standard ? TOOL_DONE : tool_hash_file(t, input, &def.source_hash);
+    if (code == TOOL_DONE && t->max_memory && tool_ends(input, "ply"))
+        code = tool_result(t, fct_mesh_file_counts(&t->env, input, &known, &faces, &vertices));
+    if (code == TOOL_DONE && known) code = check_faces(t, &def, input, faces);
+    if (code != TOOL_DONE) return code;
+    const char *slash = strrchr(input, '/');
+    def.source = standard ? "standard input" : slash ? slash + 1 : input;
+    double hashed = tool_seconds() - start;
+    large = known && !fits(t, &def, faces, vertices);
+    if (!large) code = cluster_in_memory(t, &def, input, output, &large, &stats);
+    if (large) {
+        fct_large_def limits = fct_large_def_default();
+        limits.max_memory = memory_left(t);
+        uint64_t least = known ? fct_tree_build_need(faces, vertices, &def).in_parts : 0;
+        if (limits.max_memory < least)
+            return tool_fail(t, TOOL_MEMORY, "%s: --max-memory %zu: a tree of %u faces takes at least %llu",
+                             input, t->max_memory, faces,
+                             (unsigned long long)(least + (t->max_memory - limits.max_memory)));
+        limits.temporary_folder = options->temporary;
+        t->items = faces;
+        t->unit = "faces";
+        code = tool_result(t, fct_tree_build_file(&t->env, input, output, &def, &limits, &stats));
+        tool_context(t, code, input);
+    }
+    stats.seconds_read += hashed;
+    if (code == TOOL_DONE) *out = report(&stats, tool_seconds() - start, output);
     return code;
 }
 
@@ -143,10 +204,10 @@ static void say_report(tool *t, const char *input, const json_t *r) {
              number(r, "file_bytes") / 1e6);
 }
 
-static int cluster_one(tool *t, const fct_tree_def *def) {
+static int cluster_one(tool *t, const cluster_options *options) {
     json_t *r = NULL;
     int code = tool_check_output(t, t->output);
-    if (code == TOOL_DONE) code = cluster_file(t, def, t->inputs[0], t->output, &r);
+    if (code == TOOL_DONE) code = cluster_file(t, options, t->inputs[0], t->output, &r);
     if (code != TOOL_DONE) return code;
     say_report(t, t->inputs[0], r);
     return tool_json(t, r);
@@ -209,24 +270,24 @@ static int add_folder(tool *t, jobs *all, const char *folder) {
 }
 
 /* Never returns: the work of one process, which sends its report through the pipe. */
-static void work(tool *t, const fct_tree_def *def, const job *j, int out, uint32_t processes) {
+static void work(tool *t, const cluster_options *options, const job *j, int out, uint32_t processes) {
     json_t *r = NULL;
     t->env.thread_count = t->threads > processes ? t->threads / processes : 1;
     t->bar_off = true;
     if (t->max_memory) t->max_memory = t->max_memory / processes + 1;
-    int code = cluster_file(t, def, j->input, j->output, &r);
+    int code = cluster_file(t, options, j->input, j->output, &r);
     if (r && json_dumpfd(r, out, JSON_COMPACT))
         code = tool_fail(t, TOOL_INTERNAL, "%s: the report was lost", j->input);
     _exit(tool_env_close(t, code));
 }
 
-static int start(tool *t, const fct_tree_def *def, job *j, uint32_t processes) {
+static int start(tool *t, const cluster_options *options, job *j, uint32_t processes) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC)) return tool_fail(t, TOOL_INTERNAL, "no pipe: %s", strerror(errno));
     j->process = fork();
     if (j->process == 0) {
         close(ends[0]);
-        work(t, def, j, ends[1], processes);
+        work(t, options, j, ends[1], processes);
     }
     close(ends[1]);
     j->pipe = ends[0];
@@ -251,12 +312,12 @@ static void stop_all(const jobs *all) {
 }
 
 /* Keeps `processes` at work until all files are done. */
-static int run_jobs(tool *t, const fct_tree_def *def, jobs *all, uint32_t processes) {
+static int run_jobs(tool *t, const cluster_options *options, jobs *all, uint32_t processes) {
     int code = TOOL_DONE, next = 0, running = 0, finished = 0;
     fflush(NULL);
     while (running > 0 || (next < all->count && code == TOOL_DONE)) {
         if (next < all->count && running < (int)processes && code == TOOL_DONE) {
-            code = start(t, def, all->list + next, processes);
+            code = start(t, options, all->list + next, processes);
             if (code == TOOL_DONE) ++running, ++next;
             continue;
         }
@@ -296,7 +357,7 @@ static json_t *sum_reports(const jobs *all, double seconds) {
                      (json_int_t)bytes, "files", files);
 }
 
-static int cluster_many(tool *t, const fct_tree_def *def) {
+static int cluster_many(tool *t, const cluster_options *options) {
     jobs all = {0};
     int code = TOOL_DONE, failed = 0, worst = TOOL_DONE;
     for (int i = 0; i < t->input_count && code == TOOL_DONE; ++i)
@@ -305,7 +366,7 @@ static int cluster_many(tool *t, const fct_tree_def *def) {
     if (code == TOOL_DONE) code = tool_check_folder(t, t->output);
     if (code != TOOL_DONE) goto done;
     if (!t->threads) t->threads = (uint32_t)sysconf(_SC_NPROCESSORS_ONLN);
-    code = run_jobs(t, def, &all, t->threads < (uint32_t)all.count ? t->threads : (uint32_t)all.count);
+    code = run_jobs(t, options, &all, t->threads < (uint32_t)all.count ? t->threads : (uint32_t)all.count);
     for (int i = all.count - 1; i >= 0; --i)
         if (all.list[i].code != TOOL_DONE) ++failed, worst = all.list[i].code;
     /* Each failure has been told by its process. */
@@ -336,14 +397,21 @@ int tool_cluster(int argc, char **argv) {
         .name = "cluster",
         .synopsis = "IN... -o OUT.fct",
         .summary = "build the hierarchy of face clusters of a mesh",
-        .text = "IN is a mesh file (OBJ, PLY, OFF, STL, OM, GLB; - reads a PLY), OUT.fct the hierarchy file. "
-                "Several "
-                "files, or a folder of them, are clustered over all cores, and -o names a folder that "
-                "receives one "
-                "NAME.fct for each. A scene that finds NAME.fct beside a model NAME.ply opens it.\n\n"
-                "JSON keys: faces, vertices, roots, depth, mean_depth, seconds{read, dual, contract, boxes, "
-                "write, "
-                "total}, peak_bytes, file_bytes; for several files their sums, and files[].",
+        .text =
+            "IN is a mesh file (OBJ, PLY, OFF, STL, OM, GLB; - reads a PLY), OUT.fct the hierarchy file. "
+            "Several "
+            "files, or a folder of them, are clustered over all cores, and -o names a folder that "
+            "receives one "
+            "NAME.fct for each. A scene that finds NAME.fct beside a model NAME.ply opens it.\n\n"
+            "A mesh that does not fit into --max-memory (about 250 bytes a triangle) is cut into parts that "
+            "are "
+            "clustered one by one; temporary files then take as much of the disk as OUT.fct. Only binary PLY "
+            "files of triangles can be larger than memory themselves. 100 million triangles take 1 GB at the "
+            "least; more memory makes fewer parts, not better clusters.\n\n"
+            "JSON keys: faces, vertices, roots, depth, mean_depth, parts, seconds{read, dual, contract, "
+            "boxes, "
+            "write, "
+            "total}, peak_bytes, file_bytes; for several files their sums, and files[].",
         .options = options_table,
         .parse = parse,
         .run = run,
@@ -351,6 +419,6 @@ int tool_cluster(int argc, char **argv) {
         .inputs_max = INT_MAX,
         .output = TOOL_OUTPUT_REQUIRED,
         .output_folder = true};
-    fct_tree_def def = fct_tree_def_default();
-    return tool_main(&command, argc, argv, &def);
+    cluster_options options = {.def = fct_tree_def_default()};
+    return tool_main(&command, argc, argv, &options);
 }

@@ -206,6 +206,42 @@ FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree 
  * what is wrong, MEMORY, CANCELLED. */
 FCT_API fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree);
 
+/* --- From file to file --- */
+
+/* What building takes, in bytes, by estimate: a tree in memory with its mesh, and the least that
+ * fct_tree_build_file can do with. def may be NULL. */
+typedef struct fct_build_need {
+    uint64_t in_memory, in_parts;
+} fct_build_need;
+FCT_API fct_build_need fct_tree_build_need(uint32_t face_count, uint32_t vertex_count,
+                                           const fct_tree_def *def);
+
+typedef struct fct_large_def {
+    uint32_t size;
+    uint64_t max_memory;          /* bytes to be allocated at once; default 4 GiB */
+    const char *temporary_folder; /* NULL, the default: beside the hierarchy file */
+    uint32_t part_faces;          /* faces clustered at once; 0, the default: as many as memory allows */
+} fct_large_def;
+FCT_API fct_large_def fct_large_def_default(void);
+
+typedef struct fct_large_stats {
+    uint32_t face_count, vertex_count, root_count, depth;
+    double mean_depth;
+    uint32_t part_count; /* parts that the mesh was cut into */
+    uint32_t top_count;  /* clusters that parts left to the whole */
+    double seconds_read, seconds_dual, seconds_contract, seconds_boxes, seconds_write;
+} fct_large_stats;
+
+/* From a mesh file to a hierarchy file with neither in memory: the mesh is cut along a space-filling curve
+ * into parts that are clustered one by one, but for what depends on faces of other parts; that is clustered
+ * last, together. Temporary files without names take about as much of the disk as the hierarchy file. Binary
+ * PLY files of triangles are read where they lie, others are loaded once. The same bytes for every thread
+ * count, but not those of fct_tree_build. def, large and stats may be NULL. Errors: INPUT, DATA, OUTPUT,
+ * MEMORY (max_memory is too little, too), CANCELLED. */
+FCT_API fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const char *tree_path,
+                                       const fct_tree_def *def, const fct_large_def *large,
+                                       fct_large_stats *stats);
+
 #ifdef __cplusplus
 }
 #endif

@@ -93,6 +93,11 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
  * MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
 
+/* Counts of a file that can be clustered without being loaded (binary PLY of triangles): *known tells whether
+ * it is one. Reads its header alone. Errors: INPUT, DATA, MEMORY. */
+FCT_API fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bool *known,
+                                        uint32_t *face_count, uint32_t *vertex_count);
+
 typedef struct fct_mesh_save_def {
     uint32_t size;
     float exposure; /* factor on colours before they are clamped for display: PLY bytes, GLB COLOR_0; default
