@@ -214,7 +214,7 @@ def main():
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--only", action="append", choices=["time", "boxes", "adversarial", "large"])
     bench = Bench(parser.parse_args())
-    begin = time.monotonic()
+    begin, moment = time.monotonic(), time.time()
     load = os.getloadavg()[0]
     for part in bench.options.only or ["time", "adversarial", "boxes"]:
         print({"time": "Time, memory and quality", "boxes": "Boxes", "adversarial": "Adversarial meshes",
@@ -224,7 +224,7 @@ def main():
             bench.save(part)
     with open(os.path.join(bench.options.out, "machine.json"), "w") as file:
         json.dump({"processor": processor(), "cores": os.cpu_count(), "load_before": load, "quick": bench.options.quick,
-                   "limit": bench.options.limit, "seconds": time.monotonic() - begin}, file)
+                   "limit": bench.options.limit, "begin": moment, "seconds": time.monotonic() - begin}, file)
 
 
 if __name__ == "__main__":

@@ -245,7 +245,10 @@ def table_yardsticks(boxes):
     for mesh in sorted({r["mesh"] for r in boxes}, key=lambda m: int(next(r["faces"] for r in boxes if r["mesh"] == m))):
         row = [mesh]
         for tree in ("rounds", "regrouped"):
-            pairs = [(value[mesh, tree, q], value[mesh, "obbtree", q]) for q in ("primary", "incoherent", "touching", "apart")]
+            pairs = [(value.get((mesh, tree, q)), value.get((mesh, "obbtree", q))) for q in ("primary", "incoherent", "touching", "apart")]
+            if not all(a and b for a, b in pairs):
+                row += ["-"] * 5
+                continue
             row.append(show(over(float(pairs[0][0]["area"]), float(pairs[0][1]["area"])), "{:.2f}"))
             row += [show(over(float(a["boxes"]), float(b["boxes"])), "{:.2f}") for a, b in pairs]
         rows.append(row)
@@ -373,6 +376,10 @@ def chart(runs, out):
         print(f"no chart: {error}", file=sys.stderr)
 
 
+def is_older(path, moment):
+    return os.path.exists(path) and os.path.getmtime(path) < moment
+
+
 def main():
     out = sys.argv[1]
     runs, hard = Runs(os.path.join(out, "time.csv")), Runs(os.path.join(out, "adversarial.csv"))
@@ -381,6 +388,9 @@ def main():
         with open(os.path.join(out, "machine.json")) as file:
             machine = json.load(file)
         print("\n{processor}, {cores} cores, load {load_before:.1f} before; {seconds:.0f} seconds of measuring".format(**machine))
+        old = [part for part in ("time", "adversarial", "boxes", "large") if is_older(os.path.join(out, part + ".csv"), machine["begin"])]
+        if old:
+            print(f"Of earlier runs: {', '.join(old)}.")
         if machine["load_before"] > .5:
             print("The machine was not idle: times and their ratios are not to be trusted.")
     if runs.meshes:
