@@ -303,13 +303,19 @@ template <class Mesh> class mesh_tree {
     }
     partition cut_at_cost(double max_cost) const { return cut(fct_tree_count_at_cost(tree.get(), max_cost)); }
 
-    // Faces on borders change sides: fct_partition_refine.
+    // What lies on borders changes sides: fct_tree_refine for a cut, fct_partition_refine for what is no cut
+    // any more. On failure the partition is as it was.
     fct_refine_stats refine(partition &parts, const fct_refine_def &def = fct_refine_def_default()) const {
         fct_refine_stats stats{};
+        if (parts.nodes.size() == parts.count)
+            context->check(fct_tree_refine(context->get(), tree.get(), parts.nodes.data(), parts.count, &def,
+                                           parts.labels.data(), &stats));
+        else
+            with_mesh([&](const fct_mesh *mesh) {
+                return fct_partition_refine(context->get(), mesh, parts.count, &def, parts.labels.data(),
+                                            &stats);
+            });
         parts.nodes.clear();
-        with_mesh([&](const fct_mesh *mesh) {
-            return fct_partition_refine(context->get(), mesh, parts.count, &def, parts.labels.data(), &stats);
-        });
         return stats;
     }
     fct_partition_quality quality(const partition &parts) const {

@@ -150,6 +150,10 @@ void refinement_keeps_clusters_and_drops_nodes(void **) {
     auto after = tree.quality(parts);
     assert_true(stats.moves > 0 && after.connected);
     assert_true(after.mean_normal_deviation < before.mean_normal_deviation);
+    fct_refine_def def = fct_refine_def_default();
+    def.perimeter_weight = 0;
+    tree.refine(parts, def); /* no cut any more */
+    assert_true(tree.quality(parts).mean_normal_deviation <= after.mean_normal_deviation);
     assert_int_equal(tree.planes(parts).size(), 12);
     try {
         tree.clusters(parts);
