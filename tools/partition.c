@@ -230,7 +230,7 @@ static void report_charts(tool *t, const fct_chart_stats *s, json_t *object) {
              s->charts, s->non_disks, s->opened_angle, s->opened_limit, s->opened_topology, s->merged);
     tool_say(t, "largest angle %.4g degrees, seams %.6g long, borders of the surface %.6g",
              s->largest_angle / degree, s->seam_length, s->boundary_length);
-    json_object_update(
+    json_object_update_new(
         object, json_pack("{s:I, s:I, s:{s:I, s:I, s:I}, s:I, s:I, s:f, s:f, s:f}", "charts",
                           (json_int_t)s->charts, "non_disks", (json_int_t)s->non_disks, "opened", "angle",
                           (json_int_t)s->opened_angle, "limit", (json_int_t)s->opened_limit, "topology",
