@@ -225,11 +225,14 @@ static void wrong_faces_of_the_cut_are_found(void **state) {
     recorder r = {0};
     fct_env env = recorder_env(&r);
     const char *path = "test_verify.fct";
-    fct_mesh mesh = make_sphere(&env, 10);
-    for (int k = 0; k < 3; ++k) { /* the first face's corner goes far away */
-        uint32_t v = mesh.triangles[0];
-        mesh.positions[3 * v + (uint32_t)k] += 20;
-    }
+    fct_mesh ball = make_sphere(&env, 10), mesh; /* and one face apart, which is merged last of all */
+    assert_int_equal(fct_mesh_create(&env, ball.vertex_count + 3, ball.face_count + 1, 0, &mesh), FCT_OK);
+    memcpy(mesh.positions, ball.positions, 12 * (size_t)ball.vertex_count);
+    memcpy(mesh.triangles, ball.triangles, 12 * (size_t)ball.face_count);
+    const float apart[9] = {20, 0, 0, 21, 0, 0, 20, 1, 0};
+    memcpy(mesh.positions + 3 * (size_t)ball.vertex_count, apart, sizeof apart);
+    for (uint32_t k = 0; k < 3; ++k) mesh.triangles[3 * (size_t)ball.face_count + k] = ball.vertex_count + k;
+    fct_mesh_release(&env, &ball);
     fct_tree *tree, *back;
     fct_file file;
     assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
