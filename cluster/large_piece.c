@@ -491,7 +491,7 @@ static fct_result order(piece *p) {
     p->part->phase_counts[2] = ends[2] - ends[1];
     p->tree = fct_tree_new(&p->env);
     if (!p->tree) return fct_fail_memory(env, "a part of a mesh");
-    p->metric = p->metric;
+    p->metric = p->work.metric;
     fct_result result = fct_tree_order(&p->work, &p->mesh, &def, p->tree);
     fct_work_release(&p->work);
     p->part->node_count = p->tree->view.node_count;

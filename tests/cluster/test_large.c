@@ -239,6 +239,52 @@ static void several_roots(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+static double sum_of_boxes(const fct_tree *tree) {
+    fct_tree_view view = fct_tree_get(tree);
+    double sum = 0;
+    for (uint32_t i = 0; i < view.node_count; ++i) {
+        const float *h = view.clusters[i].box_half;
+        sum += (double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0];
+    }
+    return sum;
+}
+
+/* n loose triangles of size .01 in the unit cube. */
+static fct_mesh make_loose(const fct_env *env, uint32_t n) {
+    fct_mesh mesh = empty_mesh(env, 3 * n, n);
+    for (uint32_t v = 0; v < 3 * n; ++v) {
+        for (uint32_t k = 0; k < 3; ++k)
+            mesh.positions[3 * v + k] = unit_hash(v / 3 * 3 + k) + .01f * unit_hash(9 * v + k);
+        mesh.triangles[v] = v;
+    }
+    return mesh;
+}
+
+/* What no edge connects is joined by proximity, over the borders of parts, and where memory is short within
+ * parts first: the tree is as good a tree of boxes as one that is built in memory. */
+static void loose_triangles(void **state) {
+    (void)state;
+    fct_env env = single();
+    fct_mesh mesh = make_loose(&env, 3000);
+    fct_tree *whole, *tree;
+    assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &whole), FCT_OK);
+    for (int press = 0; press < 2; ++press) {
+        fct_large_def large = parts_of(400);
+        fct_large_stats stats;
+        uint64_t least = fct_tree_build_need(mesh.face_count, mesh.vertex_count, NULL).in_parts;
+        if (press) large.max_memory = least;
+        save(&env, &mesh);
+        assert_int_equal(fct_tree_build_file(&env, mesh_path, tree_path, NULL, &large, &stats), FCT_OK);
+        tree = open_tree(&env);
+        check_tree(tree, &mesh);
+        assert_int_equal(fct_tree_get(tree).component_count, 3000);
+        assert_true(sum_of_boxes(tree) < (press ? 1.3 : 1.02) * sum_of_boxes(whole));
+        fct_tree_destroy(tree);
+    }
+    fct_tree_destroy(whole);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* An edge of 60 faces, a fan of one vertex, duplicates, faces without area, faces that touch nothing. */
 static void odd_shapes(void **state) {
     (void)state;
@@ -266,12 +312,7 @@ static void odd_shapes(void **state) {
     fct_mesh points = empty_mesh(&env, 30, 50);
     for (uint32_t i = 0; i < 150; ++i) points.triangles[i] = hash_of(i) % 30;
     check_parts(&env, &points, 8);
-    fct_mesh loose = empty_mesh(&env, 3000, 1000);
-    for (uint32_t v = 0; v < 3000; ++v) {
-        for (uint32_t k = 0; k < 3; ++k)
-            loose.positions[3 * v + k] = unit_hash(v / 3 * 3 + k) + .01f * unit_hash(9 * v + k);
-        loose.triangles[v] = v;
-    }
+    fct_mesh loose = make_loose(&env, 1000);
     check_parts(&env, &loose, 90);
     for (int scale = -30; scale <= 30; scale += 60) {
         fct_mesh mesh = make_sphere(&env, 10);
