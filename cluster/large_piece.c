@@ -280,7 +280,7 @@ static fct_result press(piece *p, uint32_t limit, uint32_t *slots) {
 static fct_result contract(piece *p) {
     fct_work *work = &p->work;
     fct_large *l = p->large;
-    uint64_t limit = (uint64_t)l->top_limit * work->face_count / l->info.face_count + 256;
+    uint64_t limit = (uint64_t)l->top_limit * work->face_count / l->info.face_count + 16;
     fct_result result = contract_edges(p, !work->materials);
     work->phase_ends[0] = work->materials ? work->merge_count : 0;
     work->phase_ends[1] = work->merge_count;
