@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "base/vec.h"
+#include "cluster/labels.h"
 
 enum { GRAIN = 1 << 15 };
 
@@ -166,12 +167,10 @@ static fct_result list_neighbours(const fct_env *env, uint32_t label_count, fct_
 fct_result fct_labels_adjacency(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                                 uint32_t label_count, fct_adjacency *out) {
     *out = (fct_adjacency){0};
-    for (uint32_t f = 0; f < mesh->face_count; ++f)
-        if (labels[f] >= label_count)
-            return fct_fail(env, FCT_ERROR_DATA, "face %u: expected a label below %u, found %u", f,
-                            label_count, labels[f]);
     fct_sides sides;
-    fct_result result = fct_sides_build(env, mesh->triangles, mesh->face_count, mesh->vertex_count, &sides);
+    fct_result result = fct_labels_check(env, mesh, labels, label_count);
+    if (result != FCT_OK) return result;
+    result = fct_sides_build(env, mesh->triangles, mesh->face_count, mesh->vertex_count, &sides);
     if (result == FCT_OK) result = fct_adjacency_pairs(env, mesh, &sides, labels, out);
     if (result == FCT_OK) result = list_neighbours(env, label_count, out);
     fct_sides_release(env, &sides);

@@ -72,7 +72,7 @@ static fct_result copy_source(const fct_env *env, const fct_tree_def *def, fct_t
 static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts, bool complete,
                               fct_tree *tree) {
     fct_edge_counts all = *counts;
-    fct_result result = complete ? FCT_OK : fct_tree_count_edges(env, &tree->view, &all);
+    fct_result result = complete ? FCT_OK : fct_tree_count_edges(env, &tree->view, FCT_EDGE_PORTION, &all);
     tree->view.boundary_edges = all.boundary, tree->view.nonmanifold_edges = all.nonmanifold;
     tree->view.component_count = all.components;
     return result;

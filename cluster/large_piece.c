@@ -280,7 +280,7 @@ static fct_result press(piece *p, uint32_t limit, uint32_t *slots) {
 static fct_result contract(piece *p) {
     fct_work *work = &p->work;
     fct_large *l = p->large;
-    uint64_t limit = (uint64_t)l->top_limit * work->face_count / l->info.face_count + 256;
+    uint64_t limit = (uint64_t)l->top_limit * work->face_count / l->info.face_count + 16;
     fct_result result = contract_edges(p, !work->materials);
     work->phase_ends[0] = work->materials ? work->merge_count : 0;
     work->phase_ends[1] = work->merge_count;
@@ -491,7 +491,7 @@ static fct_result order(piece *p) {
     p->part->phase_counts[2] = ends[2] - ends[1];
     p->tree = fct_tree_new(&p->env);
     if (!p->tree) return fct_fail_memory(env, "a part of a mesh");
-    p->metric = p->metric;
+    p->metric = p->work.metric;
     fct_result result = fct_tree_order(&p->work, &p->mesh, &def, p->tree);
     fct_work_release(&p->work);
     p->part->node_count = p->tree->view.node_count;

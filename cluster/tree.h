@@ -74,7 +74,9 @@ void fct_tree_measure_bounds(fct_tree *tree);
 typedef struct fct_edge_counts {
     uint32_t boundary, nonmanifold, components;
 } fct_edge_counts;
-/* Counts them anew. Errors: MEMORY, CANCELLED. */
-fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, fct_edge_counts *out);
+enum { FCT_EDGE_PORTION = 1 << 24 };
+/* Counts them anew, about `portion` sides of faces at a time. Errors: MEMORY, CANCELLED. */
+fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, uint32_t portion,
+                                fct_edge_counts *out);
 
 #endif

@@ -195,7 +195,7 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
         same = same && other.view.bounds.lower[k] == view->bounds.lower[k] &&
                other.view.bounds.upper[k] == view->bounds.upper[k];
     if (!same) return fct_fail(env, FCT_ERROR_DATA, "the bounds are not those of the vertices");
-    fct_result result = fct_tree_count_edges(env, view, &counts);
+    fct_result result = fct_tree_count_edges(env, view, FCT_EDGE_PORTION, &counts);
     if (result != FCT_OK) return result;
     if (counts.boundary != view->boundary_edges || counts.nonmanifold != view->nonmanifold_edges ||
         counts.components != view->component_count)

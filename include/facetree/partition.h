@@ -128,8 +128,8 @@ typedef struct fct_adjacency {
     uint32_t *other_pairs; /* 2 pair_count: which pair each of `others` is */
 } fct_adjacency;
 
-/* labels: a number below label_count for each face of the mesh. O(F log F). Errors: DATA (a label out of
- * range), MEMORY, CANCELLED; *out is all zero then. */
+/* labels: a number below label_count for each face of the mesh. O(F log F). Errors: DATA (invalid mesh,
+ * a label out of range), MEMORY, CANCELLED; *out is all zero then. */
 FCT_API fct_result fct_labels_adjacency(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
                                         uint32_t label_count, fct_adjacency *out);
 FCT_API void fct_adjacency_release(const fct_env *env, fct_adjacency *adjacency);

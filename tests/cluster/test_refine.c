@@ -366,7 +366,7 @@ static void torn_and_doubled_sheets(void **state) {
         if (round % 2 == 0) def.perimeter_weight = 0, def.irregularity_limit = INFINITY;
         uint32_t *materials = malloc(4 * (size_t)count);
         for (uint32_t f = 0; f < count; ++f) materials[f] = (kept[f] / 2 % 14 / 3 + kept[f] / 84) % 2;
-        for (uint32_t k = 1; k < count; k = 3 * k + 1) {
+        for (uint32_t k = 1; k < count; k = k < 8 ? k + 1 : 5 * k) {
             refine_tree(&mesh, k, &def, labels);
             mesh.materials = materials, mesh.material_count = 2;
             uint32_t mixed_before = 0, mixed = 0;

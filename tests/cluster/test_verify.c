@@ -208,6 +208,13 @@ static void a_build_counts_as_verifying_does(void **state) {
         assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
         assert_int_equal(fct_tree_verify(&env, tree), FCT_OK);
         assert_int_equal(fct_mesh_inspect(&env, &mesh, &report), FCT_OK);
+        for (uint32_t portion = 1; portion < 32; portion *= 3) { /* the last ones in a single lot */
+            fct_edge_counts counts;
+            assert_int_equal(fct_tree_count_edges(&env, &tree->view, portion, &counts), FCT_OK);
+            assert_int_equal(counts.boundary, report.boundary_edges);
+            assert_int_equal(counts.nonmanifold, report.nonmanifold_edges);
+            assert_int_equal(counts.components, report.components);
+        }
         fct_tree_view view = fct_tree_get(tree);
         assert_int_equal(view.boundary_edges, report.boundary_edges);
         assert_int_equal(view.nonmanifold_edges, report.nonmanifold_edges);

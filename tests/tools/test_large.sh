@@ -37,6 +37,34 @@ awk -v n=$many 'BEGIN { print "OFF"; print 3 * n, n, 0; side = int(n ^ (1 / 3)) 
         print x, y, z; print x + .5, y, z; print x, y + .5, z }
     for (i = 0; i < n; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }' >soup.off
 through soup.off $many 20000
+# A mesh that does not fit is clustered in parts, and the tree is as good; the limit holds for the whole process.
+parts() {
+    expect 0 make terrain --triangles 1000000 -o sheet.ply --max-memory 40M
+    expect 0 cluster sheet.ply -o whole.fct --json
+    holds "$(value parts) == 1"
+    expect 0 cluster sheet.ply -o parts.fct --max-memory 100M --json
+    holds "$(value parts) > 1 && $(value peak_bytes) < 100 * 1048576 && $(value roots) == 1"
+    holds "$(value depth) <= 3 * log($(value faces)) / log(2)"
+    expect 0 info parts.fct --verify --json
+    holds "$(value boundary_edges) == 2828 && $(value components) == 1"
+    for k in 1000 20000; do
+        expect 0 partition whole.fct -k $k -o labels.txt --json
+        local fit=$(value mean_fit) direction=$(value mean_direction) irregularity=$(value mean_irregularity)
+        expect 0 partition parts.fct -k $k -o labels.txt --json
+        holds "$(value mean_fit) < 1.05 * $fit && $(value mean_direction) < 1.05 * $direction"
+        holds "$(value mean_irregularity) < 1.05 * $irregularity"
+    done
+    mkdir folder
+    expect 0 cluster sheet.ply -o again.fct --max-memory 100M --temporary folder --threads 1
+    check "the same bytes" cmp parts.fct again.fct
+    expect 73 cluster sheet.ply -o again.fct --max-memory 100M --temporary nowhere
+    expect 75 cluster sheet.ply -o again.fct --max-memory 20M
+    says "takes at least"
+    check "nothing is left" test -z "$(ls folder)"
+    check "the old file" cmp parts.fct again.fct
+    rm -f sheet.ply whole.fct parts.fct again.fct
+}
+[ "$scale" != 1 ] || parts
 # A limit on memory is an answer, not a crash.
 expect 75 cluster soup.off -o limited.fct --max-memory 20M
 check "no output" test ! -e limited.fct
