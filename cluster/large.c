@@ -7,7 +7,14 @@
 
 /* Bytes, measured: for a face of a part from its loading to its boxes, with 80 for the MEAN cost's sums; for
  * a top; buffers of all kinds. */
-enum { PART_BYTES = 250, MEAN_BYTES = 80, TOP_BYTES = 640, BUFFER_BYTES = 12 << 20, LEAST_PART = 1 << 16 };
+enum {
+    PART_BYTES = 235,
+    VERTEX_BYTES = 32,
+    MEAN_BYTES = 80,
+    TOP_BYTES = 640,
+    BUFFER_BYTES = 12 << 20,
+    LEAST_PART = 1 << 16
+};
 
 fct_large_def fct_large_def_default(void) {
     return (fct_large_def){.size = sizeof(fct_large_def), .max_memory = UINT64_C(4) << 30};
@@ -23,11 +30,16 @@ static uint64_t fixed_bytes(uint64_t vertices) {
     return BUFFER_BYTES + 3 * vertices / 8;
 }
 
+static uint64_t face_bytes(uint64_t faces, uint64_t vertices, bool mean) {
+    return PART_BYTES + (mean ? MEAN_BYTES : 0) + (faces ? VERTEX_BYTES * vertices / faces : 0);
+}
+
 static uint64_t least_bytes(uint64_t faces, uint64_t vertices, bool mean) {
     uint64_t part = faces < LEAST_PART ? faces : LEAST_PART;
-    uint64_t cutting = 6 * vertices, writing = larger(5 * faces, 4 * vertices);
-    uint64_t piece = part * (PART_BYTES + (mean ? MEAN_BYTES : 0));
-    return (fixed_bytes(vertices) + larger(larger(cutting, writing), piece)) / 7 * 8;
+    uint64_t piece = part * face_bytes(faces, vertices, mean);
+    /* 6 bytes a vertex while cutting, 5 a face and then 4 a vertex while writing, beside buffers and tops */
+    uint64_t whole = larger(faces, vertices) * 15 / 2;
+    return (fixed_bytes(vertices) + larger(whole, piece)) / 7 * 8;
 }
 
 fct_build_need fct_tree_build_need(uint32_t face_count, uint32_t vertex_count, const fct_tree_def *def) {
@@ -49,10 +61,10 @@ static fct_result plan(fct_large *l, const fct_large_def *def) {
                         (unsigned long long)(least >> 20) + 1);
     uint64_t room = limit / 8 * 7 - fixed_bytes(vertices);
     l->budget = (size_t)room;
-    uint64_t part = room / (PART_BYTES + (mean ? MEAN_BYTES : 0));
+    uint64_t part = room / face_bytes(faces, vertices, mean);
     part = part / 5 * 4; /* a part may have a quarter more */
     l->part_faces = (uint32_t)(def->part_faces ? def->part_faces : part < INT32_MAX ? part : INT32_MAX);
-    uint64_t tops = room / 8 * 7 / TOP_BYTES; /* boxes take the rest */
+    uint64_t tops = room / 2 / TOP_BYTES;
     l->top_limit = (uint32_t)(tops < INT32_MAX ? tops : INT32_MAX);
     return FCT_OK;
 }

@@ -97,6 +97,10 @@ typedef struct fct_large {
     uint32_t *top_places; /* per entry of top_order: its first face's place; one more: the number of faces */
 } fct_large;
 
+enum { FCT_CURVE_BITS = 10 };
+/* Place on a Hilbert curve of 2^30 cells of the cell x, whose coordinates are below 2^10; x is used up. */
+uint32_t fct_curve_code(uint32_t x[3]);
+
 /* The parts and their faces; bounds; shared vertices. Errors: INPUT, DATA, OUTPUT, MEMORY, CANCELLED. */
 fct_result fct_large_cut(fct_large *large);
 /* Contracts and describes one part after another. Errors: the same. */

@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "cluster/large.h"
 
-enum { BITS = 10, STRETCH_BITS = 20, STRETCHES = 1 << STRETCH_BITS, ROWS = 1 << 16 };
+enum { BITS = FCT_CURVE_BITS, STRETCH_BITS = 20, STRETCHES = 1 << STRETCH_BITS, ROWS = 1 << 16 };
 
 typedef struct cutter {
     fct_large *large;
@@ -31,7 +31,7 @@ typedef struct cutter {
 
 /* The place on the curve of the cell at x: the cell's path down the octree, each octant's axes exchanged and
  * turned as the curve runs through it, and the Gray code of that path undone. */
-static uint32_t curve_code(uint32_t x[3]) {
+uint32_t fct_curve_code(uint32_t x[3]) {
     for (uint32_t q = 1u << (BITS - 1); q > 1; q >>= 1) {
         uint32_t p = q - 1;
         for (int i = 0; i < 3; ++i)
@@ -61,7 +61,7 @@ static void code_vertices(void *user, size_t begin, size_t end, size_t chunk, ui
             double x = ((double)c->positions[3 * v + k] - c->origin[k]) * c->scale;
             cell[k] = x < 0 ? 0 : x < (1 << BITS) ? (uint32_t)x : (1 << BITS) - 1;
         }
-        c->codes[c->first + v] = curve_code(cell);
+        c->codes[c->first + v] = fct_curve_code(cell);
     }
 }
 

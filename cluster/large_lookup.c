@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { NODES = 32, TRIANGLES = 512, VERTICES = 512 }; /* of a block */
+enum { NODES = 8, TRIANGLES = 128, VERTICES = 256 }; /* of a block */
 
 static fct_result fill_nodes(void *user, uint64_t block, void *data) {
     const fct_spool *spool = user;

@@ -422,7 +422,7 @@ static fct_result prepare(assembler *a) {
     if (result == FCT_OK) result = find_roots(a);
     if (result != FCT_OK) return result;
     a->depths = fct_allocate_zero(env, a->view.node_count, 1);
-    size_t window = l->budget / 8 / sizeof *a->window;
+    size_t window = l->budget / 16 / sizeof *a->window;
     a->window_size = window < WINDOW ? (uint32_t)window : WINDOW;
     a->run = fct_allocate(env, a->window_size, sizeof *a->run);
     a->window = fct_allocate(env, a->window_size, sizeof *a->window);
