@@ -2,6 +2,7 @@
 #include <assert.h>
 #include <string.h>
 
+#include "base/pool.h"
 #include "cluster/tree.h"
 
 fct_tree_def fct_tree_def_default(void) {
@@ -77,14 +78,15 @@ static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts,
     return result;
 }
 
-static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
-                        fct_tree_stats *stats, fct_tree *tree) {
+/* Everything up to the face order. `env` is for what goes with the tree, the work's own memory is the pool's.
+ */
+static fct_result build_links(const fct_env *env, const fct_env *pool, const fct_mesh *mesh,
+                              const fct_tree_def *def, double *dual, fct_tree *tree) {
     fct_work work;
-    double start = fct_seconds();
-    fct_result result = fct_work_create(env, mesh, def, &work);
+    fct_result result = fct_work_create(pool, mesh, def, &work);
     if (result != FCT_OK) return result;
-    double dual = fct_seconds();
-    result = make_parts(env, mesh, def, &work);
+    *dual = fct_seconds();
+    result = make_parts(pool, mesh, def, &work);
     work.phase_ends[1] = work.merge_count;
     const fct_edge_counts counts = {work.boundary_edges, work.nonmanifold_edges,
                                     mesh->face_count - work.merge_count};
@@ -99,6 +101,19 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     if (result == FCT_OK) result = copy_source(env, def, tree);
     if (result == FCT_OK) fct_tree_measure_bounds(tree);
     if (result == FCT_OK) result = take_counts(env, &counts, complete, tree);
+    return result;
+}
+
+/* The nodes' memory, the largest part of a tree, serves the contraction first: memory that is touched for the
+ * first time costs more than most of what is done in it. */
+static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                        fct_tree_stats *stats, fct_tree *tree) {
+    double start = fct_seconds(), dual = start;
+    fct_pool pool;
+    tree->clusters = fct_allocate(env, mesh->face_count, sizeof *tree->clusters);
+    if (!tree->clusters) return fct_fail_memory(env, "the tree");
+    fct_pool_create(env, tree->clusters, (size_t)mesh->face_count * sizeof *tree->clusters, &pool);
+    fct_result result = build_links(env, &pool.env, mesh, def, &dual, tree);
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};

@@ -280,7 +280,8 @@ static fct_result prepare(const fct_env *env, describer *d) {
     o->blocks = fct_allocate(env, o->block_count, sizeof *o->blocks);
     o->sums = fct_allocate(env, o->block_count, sizeof *o->sums);
     d->scratch = fct_allocate(env, fct_env_threads(env), sizeof *d->scratch);
-    d->tree->clusters = fct_allocate(env, d->tree->view.node_count, sizeof *d->tree->clusters);
+    if (!d->tree->clusters)
+        d->tree->clusters = fct_allocate(env, d->tree->view.node_count, sizeof *d->tree->clusters);
     d->tree->view.clusters = d->tree->clusters;
     if (!o->upper || !o->blocks || !o->sums || !d->scratch || !d->tree->clusters)
         return fct_fail_memory(env, "boxes");

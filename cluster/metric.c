@@ -1,8 +1,9 @@
 /* cluster/metric.c: fit, direction and shape error of a union, from the records of its parts, eight unions
  * at a time.
  *
- * INCREMENT, C = a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 w E_shape: the growth of the total
- * error. MEAN, E = a1 E_fit + a2 E_dir + a3 E_shape (8.18). E_shape is (8.17), with its factor 2.
+ * INCREMENT, C = a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 (w E_shape + 5e9 wa wb w |xb - xa|^2 (1
+ * - |S| / w)): the growth of the total error. MEAN, E = a1 E_fit + a2 E_dir + a3 E_shape (8.18). E_shape is
+ * (8.17), with its factor 2.
  *
  * Degenerate answers. No area: direction and shape errors weigh nothing in INCREMENT; E_dir is 0 and
  * E_shape 1/2 in MEAN. Points on a line: fit 0. A mean normal that cancels: the plane across the direction in
@@ -16,7 +17,8 @@
 #include "base/eigen.h"
 #include "base/simd.h"
 
-#define TINY 1e-30f
+#define TINY  1e-30f
+#define REACH 5e9f
 
 fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
     bool mean = def->cost == FCT_COST_MEAN;
@@ -214,6 +216,19 @@ static void mean_costs(const fct_metric *metric, const lanes *u, f8 shape, const
     }
 }
 
+/* wa wb w |xb - xa|^2 (1 - |S| / w). It grows with the sixth power of a cluster's size, so that it is nothing
+ * where normals decide and rounds off what no plane fits any more; flat clusters are left alone at any size.
+ */
+static inline f8 reach(const lanes *a, const lanes *b, const lanes *u, f8 invert_area) {
+    f8 d[3], s[3];
+    for (int i = 0; i < 3; ++i) {
+        d[i] = f8_sub(b->centroid[i], a->centroid[i]);
+        s[i] = f8_mul(u->vector[i], invert_area);
+    }
+    f8 bent = at_least(f8_sub(f8_set(1), f8_sqrt(dot3(s, s))), 0);
+    return f8_mul(f8_mul(f8_mul(a->area, b->area), f8_mul(u->area, bent)), dot3(d, d));
+}
+
 void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
                       const fct_pair *pairs, uint32_t count, float *costs) {
     lanes a, b, u;
@@ -230,7 +245,8 @@ void fct_metric_costs(const fct_metric *metric, const fct_record *records, const
     f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u, invert_area, invert_weight), a.fit), b.fit), 0);
     f8 cost = f8_mul(f8_set(metric->fit_weight), fit);
     cost = f8_mad(cost, f8_set(metric->direction_weight), direction_growth(&a, &b, &u, invert_area));
-    cost = f8_mad(cost, f8_mul(f8_set(metric->shape_weight), u.area), shape);
+    f8 form_error = f8_mad(f8_mul(u.area, shape), f8_set(REACH), reach(&a, &b, &u, invert_area));
+    cost = f8_mad(cost, f8_set(metric->shape_weight), form_error);
     float all[FCT_LANES];
     f8_store(all, cost);
     memcpy(costs, all, count * sizeof *costs);

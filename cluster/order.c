@@ -259,6 +259,7 @@ static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def 
     fct_work *work = o->work;
     size_t merges = work->merge_count;
     make_monotone(work);
+    fct_work_release_clusters(work);
     o->sorted = fct_allocate(env, merges, sizeof *o->sorted);
     o->ranks = fct_allocate(env, merges, sizeof *o->ranks);
     if (!o->sorted || !o->ranks) return fct_fail_memory(env, "ordering the tree");
@@ -267,7 +268,7 @@ static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def 
     if (result != FCT_OK) return result;
     fct_parallel_for(env, merges, GRAIN, list_ranks, o);
     o->kept = kept_merges(o, def);
-    o->tree->links = fct_allocate(env, o->kept, sizeof *o->tree->links);
+    o->tree->links = fct_allocate(o->tree->env, o->kept, sizeof *o->tree->links);
     if (o->tree->links)
         fct_parallel_for(env, o->kept, GRAIN, number_nodes, o);
     else
@@ -281,7 +282,7 @@ static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def 
 
 static fct_result place(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
-    fct_result result = allocate_arrays(env, o->mesh, o->kept, o->tree);
+    fct_result result = allocate_arrays(o->tree->env, o->mesh, o->kept, o->tree);
     if (result != FCT_OK) return result;
     uint8_t *depths = fct_allocate(env, o->kept, 1), *held = fct_allocate(env, faces, 1);
     if (depths && held) {
@@ -298,7 +299,7 @@ static fct_result place(const fct_env *env, orderer *o) {
     o->places = fct_allocate(env, fct_chunk_count(faces, GRAIN), sizeof *o->places);
     if (!o->first_uses || !o->renamed || !o->places) return fct_fail_memory(env, "ordering the tree");
     copy_mesh(env, o);
-    return copy_names(env, o->mesh, o->tree);
+    return copy_names(o->tree->env, o->mesh, o->tree);
 }
 
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree) {

@@ -17,7 +17,7 @@
 #include "base/sort.h"
 #include "cluster/work.h"
 
-enum { GRAIN = 1 << 12, FEW = 4096, LONG = 16 };
+enum { GRAIN = 1 << 13, FEW = 4096, LONG = 16 };
 
 #define MERGED 0x80000000u
 

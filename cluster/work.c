@@ -106,17 +106,23 @@ fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_t
     return result == FCT_OK ? fct_work_create_within(env, mesh, &bounds, def, out) : result;
 }
 
-void fct_work_release(fct_work *work) {
+void fct_work_release_clusters(fct_work *work) {
     fct_release(work->env, work->records);
     fct_release(work->env, work->directions);
     fct_release(work->env, work->counts);
     fct_release(work->env, work->heights);
     fct_release(work->env, work->nodes);
-    fct_release(work->env, work->children);
-    fct_release(work->env, work->costs);
     fct_release(work->env, work->edges);
     fct_lists_release(work->env, &work->lists);
+    work->records = NULL, work->directions = NULL, work->counts = NULL, work->heights = NULL;
+    work->nodes = NULL, work->edges = NULL, work->edge_count = 0;
+}
+
+void fct_work_release(fct_work *work) {
     const fct_env *env = work->env;
+    fct_work_release_clusters(work);
+    fct_release(env, work->children);
+    fct_release(env, work->costs);
     *work = (fct_work){.env = env};
 }
 

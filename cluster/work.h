@@ -53,6 +53,8 @@ fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_t
 fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
                                   const fct_tree_def *def, fct_work *out);
 void fct_work_release(fct_work *work);
+/* Releases all but the merges. */
+void fct_work_release_clusters(fct_work *work);
 
 /* Costs of merging count <= FCT_LANES pairs of slots. */
 static inline void fct_work_costs(const fct_work *work, const fct_pair *pairs, uint32_t count, float *costs) {

@@ -299,7 +299,7 @@ static void no_memory_for_odd_shapes(void **state) {
         if (result == FCT_OK) break;
         assert_int_equal(result, FCT_ERROR_MEMORY);
     }
-    assert_true(r.fail_at > 50);
+    assert_true(r.fail_at > 20);
     fct_mesh_release(&plain, &mesh);
 }
 

@@ -205,7 +205,7 @@ static void survives_no_memory(void **state) {
         assert_int_equal(result, FCT_ERROR_MEMORY);
         assert_int_equal(r.alive, before);
     }
-    assert_true(r.fail_at > 50);
+    assert_true(r.fail_at > 20);
     fct_mesh_release(&env, &mesh);
     assert_int_equal(r.alive, 0);
 }
