@@ -14,7 +14,7 @@
 #include "cluster/large_lookup.h"
 
 /* More than MOST opened clusters: the rest counts by its boxes. */
-enum { SAMPLES = 64, STACK = 512, MOST = 1 << 18, FRAMES = 4 };
+enum { SAMPLES = 64, STACK = 512, MOST = 1 << 18, HARD = 1 << 11, FRAMES = 4 };
 
 typedef struct block_faces {
     float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
@@ -151,7 +151,7 @@ static bool reaches(search *s, const fct_cluster *c, bool take) {
 }
 
 static bool find_extents(describer *d, uint32_t node, const float samples[][9], const float axes[3][3],
-                         fct_extents *out) {
+                         fct_extents *out, bool *hard) {
     search s = {.extents = fct_extents_none()};
     place stack[STACK];
     uint32_t top = 0, opened = 0;
@@ -180,6 +180,7 @@ static bool find_extents(describer *d, uint32_t node, const float samples[][9], 
     }
     for (int k = 0; k < 3; ++k) s.extents.low[k] -= s.slack, s.extents.high[k] += s.slack;
     *out = s.extents;
+    *hard |= opened > HARD;
     return true;
 }
 
@@ -198,9 +199,10 @@ static bool fit_box(describer *d, uint32_t node, const v3 frame[3], const float 
     fct_box_rotation(frame, rotations[0]);
     memcpy(rotations[1], world, sizeof world);
     for (int k = 0; k < 2; ++k) rotation_of(d, child_of_upper(d, c->child[k]), rotations[2 + k]);
-    for (int f = 0; f < FRAMES; ++f) {
+    bool hard = false; /* thousands of clusters tie for the farthest point: two frames must do */
+    for (int f = 0; f < FRAMES && !(hard && f > 1); ++f) {
         fct_box_axes(rotations[f], axes[f]);
-        if (!find_extents(d, node, samples, (const float(*)[3])axes[f], &extents[f])) return false;
+        if (!find_extents(d, node, samples, (const float(*)[3])axes[f], &extents[f], &hard)) return false;
         if (fct_box_area(&extents[f]) < fct_box_area(&extents[best])) best = f;
     }
     v3 point = v3_load(samples[0]);
@@ -292,18 +294,31 @@ static void sum_up(describer *d) {
     }
 }
 
-static fct_result describe_all(describer *d, uint8_t *inside) {
+/* Roots of blocks and larger nodes in preorder; what is inside blocks is left out. Returns how many. */
+static uint32_t list_nodes(const fct_large *l, uint32_t *order, uint32_t *stack) {
+    uint32_t count = 0, top = 0;
+    if (l->upper_count > 0) stack[top++] = 0;
+    while (top > 0) {
+        uint32_t node = stack[--top];
+        const fct_cluster *c = &l->upper[node];
+        order[count++] = node;
+        for (int k = 1; k >= 0 && c->count > FCT_BLOCK; --k)
+            if (c->child[k] < l->upper_count) stack[top++] = c->child[k];
+    }
+    return count;
+}
+
+/* In reverse preorder, so that what children have looked up is still there for their parents. */
+static fct_result describe_all(describer *d, uint32_t *order, uint32_t *stack) {
     fct_large *l = d->large;
     sum_up(d);
-    for (uint32_t i = 0; i < l->upper_count; ++i)
-        for (int k = 0; k < 2 && l->upper[i].count <= FCT_BLOCK; ++k)
-            if (l->upper[i].child[k] < l->upper_count) inside[l->upper[i].child[k]] = 1;
-    for (uint32_t i = l->upper_count, done = 0; i-- > 0; ++done) {
-        bool small = l->upper[i].count <= FCT_BLOCK;
-        if (!(small ? inside[i] || describe_block(d, i) : describe_large(d, i)))
+    uint32_t count = list_nodes(l, order, stack);
+    for (uint32_t i = count; i-- > 0;) {
+        bool small = l->upper[order[i]].count <= FCT_BLOCK;
+        if (!(small ? describe_block(d, order[i]) : describe_large(d, order[i])))
             return fct_lookup_result(&d->lookup);
-        if (done % 1024 == 0) {
-            fct_result result = fct_progress(l->env, "boxes of joins", (double)done / l->upper_count);
+        if (i % 1024 == 0) {
+            fct_result result = fct_progress(l->env, "boxes of joins", 1 - (double)i / count);
             if (result != FCT_OK) return result;
         }
     }
@@ -317,20 +332,22 @@ fct_result fct_large_describe(fct_large *large) {
     d.tops = fct_allocate(env, large->top_count, sizeof *d.tops);
     d.upper = fct_allocate(env, large->upper_count, sizeof *d.upper);
     d.faces = fct_allocate(env, 1, sizeof *d.faces);
-    uint8_t *inside = fct_allocate_zero(env, large->upper_count, 1);
+    uint32_t *order = fct_allocate(env, large->upper_count, sizeof *order);
+    uint32_t *stack = fct_allocate(env, large->upper_count, sizeof *stack);
     size_t used = (size_t)large->top_count * 600; /* tops, upper nodes, and their sums */
     fct_result result;
-    if (!d.tops || !d.upper || !d.faces || !inside)
+    if (!d.tops || !d.upper || !d.faces || !order || !stack)
         result = fct_fail_memory(env, "boxes");
     else
         result = fct_lookup_open(large, large->budget > used ? (large->budget - used) / 2 : 0, &d.lookup);
     if (result == FCT_OK) result = fct_spool_read(&large->sums, 0, d.tops, large->top_count * sizeof *d.tops);
-    if (result == FCT_OK) result = describe_all(&d, inside);
+    if (result == FCT_OK) result = describe_all(&d, order, stack);
     fct_lookup_close(&d.lookup);
     fct_release(env, d.tops);
     fct_release(env, d.upper);
     fct_release(env, d.faces);
-    fct_release(env, inside);
+    fct_release(env, order);
+    fct_release(env, stack);
     fct_spool_close(&large->sums);
     large->seconds_boxes += fct_seconds() - start;
     return result;
