@@ -117,9 +117,27 @@ static void diagonal_gives_axes(void **state) {
     assert_true(vectors[0].y == 1 && vectors[1].x == 1 && fabs(vectors[2].z) == 1);
 }
 
+/* Whatever stands in the other lanes. */
+static void four_are_each_as_one(void **state) {
+    (void)state;
+    uint64_t seed = 9;
+    for (int trial = 0; trial < 500; ++trial) {
+        double m[4][6], values[4][3], single[3];
+        v3 vectors[4][3], own[3];
+        for (int i = 0; i < 4; ++i)
+            for (int k = 0; k < 6; ++k) m[i][k] = trial % 5 == i && (k % 5 > 0) && k != 3 ? 0 : next(&seed);
+        fct_eigen3_four((const double *const[4]){m[0], m[1], m[2], m[3]}, values, vectors);
+        for (int i = 0; i < 4; ++i) {
+            fct_eigen3(m[i], single, own);
+            assert_memory_equal(single, values[i], sizeof single);
+            assert_memory_equal(own, vectors[i], sizeof own);
+        }
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(random_matrices), cmocka_unit_test(special_spectra),
-                                       cmocka_unit_test(huge_and_tiny),
-                                       cmocka_unit_test(diagonal_gives_axes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_matrices), cmocka_unit_test(special_spectra), cmocka_unit_test(huge_and_tiny),
+        cmocka_unit_test(four_are_each_as_one), cmocka_unit_test(diagonal_gives_axes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,6 +35,25 @@ static void sorts_and_is_stable(void **state) {
             for (uint32_t threads = 1; threads <= 3; ++threads) check_sorted(counts[c], masks[m], threads);
 }
 
+/* By the upper half alone: the lower halves of equal keys stay in order. */
+static void items_go_by_their_upper_half(void **state) {
+    (void)state;
+    const size_t counts[] = {0, 1, 40, 1000, 200000};
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; ++c) {
+        fct_env env = fct_env_default();
+        uint64_t *items = malloc(counts[c] * sizeof *items + 1);
+        for (size_t i = 0; i < counts[c]; ++i) items[i] = (hash(i) & 0x3FF) << 40 | (~i & 0xFFFFFFFF);
+        assert_int_equal(fct_sort_items(&env, items, counts[c]), FCT_OK);
+        for (size_t i = 0; i < counts[c]; ++i) {
+            assert_int_equal(items[i] >> 40, hash(~items[i] & 0xFFFFFFFF) & 0x3FF);
+            if (i == 0) continue;
+            uint64_t before = items[i - 1], now = items[i];
+            assert_true(before >> 32 < now >> 32 || (before >> 32 == now >> 32 && before > now));
+        }
+        free(items);
+    }
+}
+
 static void float_keys_keep_the_order(void **state) {
     (void)state;
     const float values[] = {-INFINITY, -1e30f, -1, -1e-30f, -0.0f, 0.0f, 1e-40f, 1, 2, 1e30f, INFINITY};
@@ -56,8 +75,8 @@ static void survives_no_memory(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(sorts_and_is_stable),
-                                       cmocka_unit_test(float_keys_keep_the_order),
-                                       cmocka_unit_test(survives_no_memory)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sorts_and_is_stable), cmocka_unit_test(items_go_by_their_upper_half),
+        cmocka_unit_test(float_keys_keep_the_order), cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
