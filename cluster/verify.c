@@ -52,15 +52,16 @@ static inline double most(double a, double b) {
 }
 
 static void add_face(const fct_tree_view *view, size_t place, const frame *box, v3 cone, totals *t) {
-    v3 p[3];
+    v3 q[3], p[3]; /* p from the centre, where small faces may have no digits left */
     for (size_t k = 0; k < 3; ++k) {
-        p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]), box->center);
+        q[k] = v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]);
+        p[k] = v3_sub(q[k], box->center);
         for (int i = 0; i < 3; ++i) {
             double x = v3_dot(p[k], box->axes[i]);
             t->lower[i] = least(t->lower[i], x), t->upper[i] = most(t->upper[i], x);
         }
     }
-    v3 u = v3_sub(p[1], p[0]), v = v3_sub(p[2], p[0]), s = v3_scale(v3_cross(u, v), 0.5);
+    v3 u = v3_sub(q[1], q[0]), v = v3_sub(q[2], q[0]), s = v3_scale(v3_cross(u, v), 0.5);
     v3 middle = v3_mad(p[0], 1.0 / 3, v3_add(u, v));
     double area = v3_norm(s), weight = area;
     if (area > 0) {
