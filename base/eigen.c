@@ -79,7 +79,9 @@ static inline d4 largest_root(d4 r) {
 
 /* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]. */
 static inline void half_angle(d4 x, d4 y, d4 *c, d4 *s) {
-    d4 none = d4_set(0), one = d4_set(1), half = d4_set(0.5);
+    d4 none = d4_set(0), one = d4_set(1), half = d4_set(0.5), largest = d4_max(d4_abs(x), d4_abs(y));
+    d4 scale = d4_if_lt(none, largest, largest, one); /* for squares of tiny numbers have no digits */
+    x = d4_div(x, scale), y = d4_div(y, scale);
     d4 h = d4_sqrt(mad(d4_mul(x, x), y, y)), invert = d4_div(one, d4_if_lt(none, h, h, one));
     d4 cosine = d4_mul(x, invert), sine = d4_mul(y, invert);
     d4 large = d4_sqrt(mad(half, half, d4_abs(cosine))); /* the larger of the two, at least sqrt(1/2) */

@@ -101,6 +101,22 @@ static void huge_and_tiny(void **state) {
         }
 }
 
+/* Off the diagonal next to nothing, down to where its square is no longer a number with digits. */
+static void nearly_diagonal(void **state) {
+    (void)state;
+    for (int power = -330; power < -10; power += 1)
+        for (int which = 0; which < 8; ++which) {
+            double m[6] = {which & 1 ? 1 : 0, 0, 0, 2, 0, which & 1 ? 1 : 0}, values[3];
+            v3 vectors[3];
+            double tiny = 3 * pow(10, power);
+            m[1] = which & 2 ? tiny : 0, m[2] = which & 4 ? -tiny : tiny, m[4] = which & 4 ? tiny : 0;
+            fct_eigen3(m, values, vectors);
+            for (int i = 0; i < 3; ++i)
+                for (int k = 0; k <= i; ++k)
+                    assert_true(fabs(v3_dot(vectors[i], vectors[k]) - (i == k)) < 1e-14);
+        }
+}
+
 static void diagonal_gives_axes(void **state) {
     (void)state;
     const double identity[6] = {2, 0, 0, 2, 0, 2}, zero[6] = {0}, flat[6] = {3, 0, 0, 0, 0, 3};
@@ -137,7 +153,8 @@ static void four_are_each_as_one(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_matrices), cmocka_unit_test(special_spectra), cmocka_unit_test(huge_and_tiny),
+        cmocka_unit_test(random_matrices),      cmocka_unit_test(special_spectra),
+        cmocka_unit_test(huge_and_tiny),        cmocka_unit_test(nearly_diagonal),
         cmocka_unit_test(four_are_each_as_one), cmocka_unit_test(diagonal_gives_axes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
