@@ -106,6 +106,7 @@ class Bench:
                 if row["status"] != "ok":
                     spent[key] = float("inf")
         print("  {:<20}{:>11} faces".format(mesh, self.faces(mesh)), flush=True)
+        self.save(group) # a run that is cut short keeps what it has
 
     def available(self):
         return [b for b in BUILDERS if os.path.exists(self.program(b[0].split("-")[0])) or b[0] in ("rounds", "greedy")]
@@ -206,6 +207,12 @@ def processor():
         return platform.machine()
 
 
+def save_machine(options, moment, begin):
+    with open(os.path.join(options.out, "machine.json"), "w") as file:
+        json.dump({"processor": processor(), "cores": os.cpu_count(), "load_before": options.load, "quick": options.quick,
+                   "limit": options.limit, "begin": moment, "seconds": time.monotonic() - begin}, file)
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("--programs", "--meshes", "--out"):
@@ -219,12 +226,9 @@ def main():
     for part in bench.options.only or ["time", "adversarial", "boxes"]:
         print({"time": "Time, memory and quality", "boxes": "Boxes", "adversarial": "Adversarial meshes",
                "large": "Out of core"}[part], flush=True)
+        save_machine(bench.options, moment, begin)
         getattr(bench, part)()
-        if part in ("time", "adversarial"):
-            bench.save(part)
-    with open(os.path.join(bench.options.out, "machine.json"), "w") as file:
-        json.dump({"processor": processor(), "cores": os.cpu_count(), "load_before": bench.options.load, "quick": bench.options.quick,
-                   "limit": bench.options.limit, "begin": moment, "seconds": time.monotonic() - begin}, file)
+    save_machine(bench.options, moment, begin)
 
 
 if __name__ == "__main__":
