@@ -17,7 +17,7 @@
 #include "base/simd.h"
 #include "base/sort.h"
 
-enum { GRAIN = FCT_ROUND_GRAIN, SLACK = FCT_LIST_SLACK, FEW = 4096, QUEUE = 64, EARLY = 3 };
+enum { GRAIN = FCT_ROUND_GRAIN, SLACK = FCT_LIST_SLACK, FEW = 4096, QUEUE = 128, EARLY = 3 };
 
 /* How much dearer than a cluster's best a merge may be that is taken because the best is taken: in the first
  * rounds, of clusters that no coarse cut shows, and later. */
@@ -41,8 +41,10 @@ static inline uint32_t other_end(const fct_rounds *r, uint32_t i, uint64_t least
 
 static inline void lower_to(const fct_rounds *r, _Atomic uint64_t *least, uint64_t value) {
     uint64_t now = atomic_load_explicit(least, memory_order_relaxed);
-    if (r->alone && value < now) atomic_store_explicit(least, value, memory_order_relaxed);
-    if (r->alone) return;
+    if (r->alone) {
+        atomic_store_explicit(least, value < now ? value : now, memory_order_relaxed);
+        return;
+    }
     while (value < now && !atomic_compare_exchange_weak_explicit(least, &now, value, memory_order_relaxed,
                                                                  memory_order_relaxed))
         continue;
@@ -63,78 +65,107 @@ static float cost_of_key(uint32_t key) {
 
 /* --- Costs --- */
 
-/* Edges to be priced, so that eight at a time are and their clusters' records are asked for beforehand. */
-typedef struct price_queue {
+/* Edges met on a walk over lists, so that what is done with them waits neither for the walk's branches nor
+ * for memory. */
+typedef struct edge_queue {
     uint32_t count;
     uint32_t clusters[QUEUE + SLACK], others[QUEUE + SLACK], entries[QUEUE + SLACK];
-    fct_pair pairs[QUEUE + SLACK];
-} price_queue;
+} edge_queue;
+
+static inline void enqueue(const fct_rounds *r, edge_queue *queue, uint32_t i, uint32_t first, i8 others,
+                           uint32_t mask) {
+    i8 order = i8_load_bytes(r->packing[mask]);
+    i8_store(queue->clusters + queue->count, i8_set(i));
+    i8_store(queue->others + queue->count, i8_lookup8(others, order));
+    i8_store(queue->entries + queue->count, i8_add(i8_set(first), order));
+    queue->count += (uint32_t)__builtin_popcount(mask);
+}
 
 static inline bool may_merge(const fct_rounds *r, uint32_t a, uint32_t b) {
     const uint32_t *materials = r->work->materials;
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
 }
 
-static inline void enqueue(const fct_rounds *r, price_queue *queue, uint32_t i, uint32_t entry) {
-    uint32_t other = r->now.others[entry], a = r->now.slots[i], b = r->now.slots[other], at = queue->count;
-    queue->clusters[at] = i, queue->others[at] = other, queue->entries[at] = entry;
-    queue->pairs[at] = (fct_pair){a, b, r->now.shared[entry]};
-    __builtin_prefetch(&r->work->records[b]);
-    if (r->unbound || may_merge(r, a, b))
-        ++queue->count;
-    else
-        r->now.keys[entry] = FCT_KEY_BLOCKED;
-}
-
-static void price_eight(const fct_rounds *r, const price_queue *queue, uint32_t at, uint32_t count) {
+static void price_eight(const fct_rounds *r, const edge_queue *queue, uint32_t at, const fct_pair *pairs,
+                        uint32_t count) {
     const uint32_t *counts = r->work->counts;
-    const fct_pair *pairs = queue->pairs + at;
     float costs[FCT_LANES];
     fct_work_costs(r->work, pairs, count, costs);
     for (uint32_t k = 0; k < count; ++k) {
         uint32_t faces = counts[pairs[k].a] + counts[pairs[k].b];
         uint32_t key = (fct_float_key(costs[k]) & ~SIZE_BITS) | (31 - (uint32_t)__builtin_clz(faces));
+        if (!r->unbound && !may_merge(r, pairs[k].a, pairs[k].b)) key = FCT_KEY_BLOCKED;
         r->now.keys[queue->entries[at + k]] = key;
         if (key < FCT_KEY_BLOCKED) offer(r, r->least[0], queue->clusters[at + k], queue->others[at + k], key);
     }
 }
 
-/* Prices all but what is left of eights. */
-static void price_queued(const fct_rounds *r, price_queue *queue) {
-    uint32_t done = 0, left = queue->count % FCT_LANES;
-    for (; done + FCT_LANES <= queue->count; done += FCT_LANES) price_eight(r, queue, done, FCT_LANES);
-    for (uint32_t k = 0; k < left; ++k) {
-        queue->clusters[k] = queue->clusters[done + k], queue->others[k] = queue->others[done + k];
-        queue->entries[k] = queue->entries[done + k], queue->pairs[k] = queue->pairs[done + k];
+/* Prices all, or all but what is left of eights. */
+static void price_queued(const fct_rounds *r, edge_queue *queue, bool all) {
+    fct_pair pairs[QUEUE + SLACK];
+    uint32_t done = 0, left = all ? 0 : queue->count % FCT_LANES, count = queue->count - left;
+    for (uint32_t q = 0; q < count; ++q) {
+        uint32_t a = r->now.slots[queue->clusters[q]], b = r->now.slots[queue->others[q]];
+        pairs[q] = (fct_pair){a, b, r->now.shared[queue->entries[q]]};
+        __builtin_prefetch(&r->work->records[b]);
     }
+    for (; done < count; done += FCT_LANES)
+        price_eight(r, queue, done, pairs + done, count - done < FCT_LANES ? count - done : FCT_LANES);
     queue->count = left;
+    if (left == 0) return;
+    i8_store(queue->clusters, i8_load(queue->clusters + count));
+    i8_store(queue->others, i8_load(queue->others + count));
+    i8_store(queue->entries, i8_load(queue->entries + count));
 }
 
-/* The edges of a chunk's clusters to those of higher number: prices them where that is open, and offers them
- * to both ends. */
-static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    fct_rounds *r = user;
+static void offer_queued(const fct_rounds *r, edge_queue *queue) {
+    for (uint32_t q = 0; q < queue->count; ++q)
+        offer(r, r->least[0], queue->clusters[q], queue->others[q], r->now.keys[queue->entries[q]]);
+    queue->count = 0;
+}
+
+/* Lanes of a list from entry k on, to clusters of higher number. */
+static inline uint32_t higher_ends(uint32_t i, i8 others, uint32_t left) {
+    uint32_t within = left < 8 ? (1u << left) - 1 : 0xFF;
+    return within & i8_lt(i8_set(i), others);
+}
+
+/* The edges of clusters [begin, end) to those of higher number: prices them where that is open, and offers
+ * them to both ends. */
+static void price_range(const fct_rounds *r, uint32_t begin, uint32_t end) {
     const fct_generation *now = &r->now;
-    price_queue queue = {.count = 0};
-    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        i8 self = i8_set(i);
+    edge_queue open, known;
+    open.count = known.count = 0;
+    for (uint32_t i = begin; i < end; ++i) {
         uint32_t start = now->starts[i], length = now->lengths[i];
         for (uint32_t k = 0; k < length; k += 8) {
-            uint32_t within = length - k < 8 ? (1u << (length - k)) - 1 : 0xFF;
-            uint32_t mask = within & i8_lt(self, i8_load(now->others + start + k));
-            for (; mask; mask &= mask - 1) {
-                uint32_t entry = start + k + (uint32_t)__builtin_ctz(mask), key = now->keys[entry];
-                if (r->fresh || key == FCT_KEY_OPEN)
-                    enqueue(r, &queue, i, entry);
-                else if (key < FCT_KEY_BLOCKED)
-                    offer(r, r->least[0], i, now->others[entry], key);
+            i8 others = i8_load(now->others + start + k);
+            uint32_t higher = higher_ends(i, others, length - k), unpriced = higher;
+            if (!r->fresh) {
+                i8 keys = i8_load(now->keys + start + k);
+                unpriced &= i8_eq(keys, i8_set(FCT_KEY_OPEN));
+                higher &= ~unpriced & i8_no_more(keys, i8_set(FCT_KEY_BLOCKED - 1));
+                enqueue(r, &known, i, start + k, others, higher);
+                if (known.count >= QUEUE) offer_queued(r, &known);
             }
-            if (queue.count >= QUEUE) price_queued(r, &queue);
+            enqueue(r, &open, i, start + k, others, unpriced);
+            if (open.count >= QUEUE) price_queued(r, &open, false);
         }
     }
-    price_queued(r, &queue);
-    if (queue.count) price_eight(r, &queue, 0, queue.count);
+    offer_queued(r, &known);
+    price_queued(r, &open, true);
+}
+
+static void price_first(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    price_range(user, (uint32_t)begin, (uint32_t)end);
+}
+
+/* What came of a chunk of the round before, whose lists no other chunk's overlap, slack included. */
+static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)begin, (void)end, (void)thread;
+    const fct_rounds *r = user;
+    price_range(r, r->kept[chunk], r->kept[chunk + 1]);
 }
 
 /* --- Pairs --- */
@@ -143,66 +174,78 @@ static inline bool is_frozen(const fct_rounds *r, uint32_t i) {
     return r->work->frozen && r->work->frozen[r->now.slots[i]];
 }
 
-/* The mate of i by what its least was, or how far it may go for another. */
-static inline void find_mate(const fct_rounds *r, uint32_t i, const _Atomic uint64_t *least, bool first) {
-    uint64_t own = atomic_load_explicit(&least[i], memory_order_relaxed);
-    if (own == UINT64_MAX) {
-        if (first) r->mates[i] = FCT_NONE, r->limits[i] = 0;
-        return;
-    }
+/* The other end of a cluster's least edge; itself if it has none. */
+static inline uint32_t best_of(const fct_rounds *r, uint32_t i, uint64_t own) {
     uint32_t other = other_end(r, i, own);
-    bool waits = is_frozen(r, i) || is_frozen(r, other);
-    bool mutual = !waits && atomic_load_explicit(&least[other], memory_order_relaxed) == own;
-    if (mutual || first) r->mates[i] = mutual ? other : FCT_NONE;
-    if (mutual || waits) {
-        r->limits[i] = 0;
-    } else if (first) {
-        float cost = cost_of_key((uint32_t)(own >> 32)),
-              more = cost * (r->round < EARLY ? EARLY_PATIENCE : PATIENCE);
-        r->limits[i] = fct_float_key(more > cost ? more : cost) | SIZE_BITS;
-    }
+    return own == UINT64_MAX ? i : other;
 }
 
+static inline uint64_t least_of(const _Atomic uint64_t *least, uint32_t i) {
+    return atomic_load_explicit(&least[i], memory_order_relaxed);
+}
+
+/* Mates by the least edges of all, and how far those left over may go for another. */
 static void find_mates(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     fct_rounds *r = user;
+    const float patience = r->round < EARLY ? EARLY_PATIENCE : PATIENCE;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        find_mate(r, i, r->least[0], true);
+        uint64_t own = least_of(r->least[0], i);
+        uint32_t other = best_of(r, i, own);
+        float cost = cost_of_key((uint32_t)(own >> 32)), more = cost * patience;
+        uint32_t limit = fct_float_key(more > cost ? more : cost) | SIZE_BITS;
+        bool mutual = (other != i) & (least_of(r->least[0], other) == own), done = mutual | (other == i);
+        if (r->work->frozen && (is_frozen(r, i) || is_frozen(r, other))) mutual = false, done = true;
+        r->mates[i] = mutual ? other : FCT_NONE;
+        r->limits[i] = done ? 0 : limit;
         atomic_store_explicit(&r->least[1][i], UINT64_MAX, memory_order_relaxed);
     }
+}
+
+static void offer_left_over(const fct_rounds *r, edge_queue *queue) {
+    for (uint32_t q = 0; q < queue->count; ++q) {
+        uint32_t i = queue->clusters[q], other = queue->others[q], key = r->now.keys[queue->entries[q]];
+        if (key <= r->limits[other]) offer(r, r->least[1], i, other, key);
+    }
+    queue->count = 0;
 }
 
 /* Offers edges between clusters that have no mate. */
 static void offer_rest(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    fct_rounds *r = user;
+    const fct_rounds *r = user;
     const fct_generation *now = &r->now;
+    edge_queue queue;
+    queue.count = 0;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint32_t limit = r->limits[i], start = now->starts[i];
-        if (limit == 0) continue;
-        for (uint32_t entry = start; entry < start + now->lengths[i]; ++entry) {
-            uint32_t other = now->others[entry];
-            if (other < i) continue;
-            uint32_t key = now->keys[entry];
-            if (key <= limit && key <= r->limits[other]) offer(r, r->least[1], i, other, key);
+        uint32_t start = now->starts[i], length = now->lengths[i];
+        i8 limit = i8_set(r->limits[i]);
+        for (uint32_t k = 0; k < length; k += 8) {
+            i8 others = i8_load(now->others + start + k);
+            uint32_t mask =
+                higher_ends(i, others, length - k) & i8_no_more(i8_load(now->keys + start + k), limit);
+            enqueue(r, &queue, i, start + k, others, mask);
+            if (queue.count >= QUEUE) offer_left_over(r, &queue);
         }
     }
+    offer_left_over(r, &queue);
 }
 
-/* The mates of the rest, and what the next round will have. */
+/* The mates of the rest, and what the next round will have. Of a pair the lower speaks for both. */
 static void count_clusters(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     fct_rounds *r = user;
     uint32_t kept = 0, merged = 0, room = SLACK;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        if (r->mates[i] == FCT_NONE) find_mate(r, i, r->least[1], false);
-        uint32_t mate = r->mates[i];
-        if (mate < i) continue; /* the lower of a pair speaks for both */
-        ++kept;
-        room += r->now.lengths[i];
-        if (mate == FCT_NONE) continue;
-        ++merged;
-        room += r->now.lengths[mate] - 2;
+        uint64_t own = least_of(r->least[1], i);
+        uint32_t other = best_of(r, i, own), mate = r->mates[i];
+        bool mutual = (other != i) & (least_of(r->least[1], other) == own);
+        mate = mutual ? other : mate;
+        r->mates[i] = mate;
+        bool keeps = mate > i, merges = keeps & (mate != FCT_NONE);
+        kept += keeps, merged += merges;
+        room += keeps ? r->now.lengths[i] : 0;
+        room += merges ? r->now.lengths[merges ? mate : i] - 2 : 0;
     }
     r->kept[chunk] = kept, r->merged[chunk] = merged, r->room[chunk] = room;
 }
@@ -227,48 +270,48 @@ static uint32_t entry_of(const fct_generation *g, uint32_t i, uint32_t other) {
 /* Merges to be made, so that their records are asked for beforehand. */
 typedef struct merge_queue {
     uint32_t count, place;
-    fct_pair pairs[QUEUE];
-    float costs[QUEUE];
+    uint32_t clusters[QUEUE + 1], mates[QUEUE + 1];
 } merge_queue;
 
 static void merge_queued(const fct_rounds *r, merge_queue *queue) {
+    fct_pair pairs[QUEUE];
+    float costs[QUEUE];
+    for (uint32_t q = 0; q < queue->count; ++q) {
+        uint32_t i = queue->clusters[q], mate = queue->mates[q], entry = entry_of(&r->now, i, mate);
+        pairs[q] = (fct_pair){r->now.slots[i], r->now.slots[mate], r->now.shared[entry]};
+        costs[q] = cost_of_key(r->now.keys[entry] & ~SIZE_BITS);
+        __builtin_prefetch(&r->work->records[pairs[q].a]);
+        __builtin_prefetch(&r->work->records[pairs[q].b]);
+    }
     for (uint32_t at = 0; at < queue->count; at += FCT_LANES) {
         uint32_t count = queue->count - at < FCT_LANES ? queue->count - at : FCT_LANES;
-        fct_work_merges(r->work, queue->place, queue->pairs + at, queue->costs + at, count);
+        fct_work_merges(r->work, queue->place, pairs + at, costs + at, count);
         queue->place += count;
     }
     queue->count = 0;
 }
 
-static inline void enqueue_merge(const fct_rounds *r, merge_queue *queue, uint32_t i, uint32_t mate) {
-    uint32_t entry = entry_of(&r->now, i, mate), a = r->now.slots[i], b = r->now.slots[mate];
-    __builtin_prefetch(&r->work->records[a]);
-    __builtin_prefetch(&r->work->records[b]);
-    queue->pairs[queue->count] = (fct_pair){a, b, r->now.shared[entry]};
-    queue->costs[queue->count++] = cost_of_key(r->now.keys[entry] & ~SIZE_BITS);
-    if (queue->count == QUEUE) merge_queued(r, queue);
-}
-
 /* Numbers the clusters of the next round and merges. */
 static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)thread;
+    (void)end, (void)thread;
     fct_rounds *r = user;
-    uint32_t next = r->kept[chunk], room = r->room[chunk];
+    uint32_t next = r->kept[chunk], last = r->kept[chunk + 1], room = r->room[chunk];
     merge_queue queue = {.place = r->work->merge_count + r->merged[chunk]};
-    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+    for (uint32_t i = (uint32_t)begin; next < last; ++i) {
         uint32_t mate = r->mates[i];
-        if (mate < i) continue;
+        bool keeps = mate > i, merges = keeps & (mate != FCT_NONE);
+        uint32_t number = next | (merges ? FCT_MERGED : 0);
         r->next.slots[next] = r->now.slots[i];
         r->next.starts[next] = room;
-        room += r->now.lengths[i];
-        r->renumbered[i] = next;
+        r->parents[next] = (uint64_t)mate << 32 | i;
         atomic_store_explicit(&r->least[0][next], UINT64_MAX, memory_order_relaxed);
-        if (mate != FCT_NONE) {
-            room += r->now.lengths[mate] - 2;
-            r->renumbered[i] = r->renumbered[mate] = next | FCT_MERGED;
-            enqueue_merge(r, &queue, i, mate);
-        }
-        ++next;
+        room += keeps ? r->now.lengths[i] : 0;
+        room += merges ? r->now.lengths[merges ? mate : i] - 2 : 0;
+        if (keeps) r->renumbered[i] = r->renumbered[merges ? mate : i] = number;
+        queue.clusters[queue.count] = i, queue.mates[queue.count] = mate;
+        queue.count += merges;
+        next += keeps;
+        if (queue.count == QUEUE) merge_queued(r, &queue);
     }
     merge_queued(r, &queue);
 }
@@ -318,6 +361,7 @@ static fct_result one_round(fct_rounds *r, uint32_t *merges) {
     fct_parallel_for(env, count, GRAIN, count_clusters, r);
     uint32_t live = counts_to_places(r->kept, chunks), room = counts_to_places(r->room, chunks);
     *merges = counts_to_places(r->merged, chunks);
+    r->kept[chunks] = live;
     if (!r->next.slots && !allocate_next(r, live, room)) return fct_fail_memory(env, "clustering");
     fct_parallel_for(env, count, GRAIN, merge_pairs, r);
     r->work->merge_count += *merges;
@@ -328,7 +372,7 @@ static fct_result one_round(fct_rounds *r, uint32_t *merges) {
     ++r->round;
     r->fresh = false;
     r->unbound = !r->work->materials && r->start_height + r->round < FCT_FREE_HEIGHT;
-    fct_parallel_for(env, live, GRAIN, price_edges, r);
+    fct_parallel_for(env, count, GRAIN, price_edges, r);
     return FCT_OK;
 }
 
@@ -379,7 +423,7 @@ static fct_result enter_edges(fct_rounds *r) {
             const fct_edge *edge = &work->edges[e];
             uint32_t a = r->renumbered[k ? edge->b : edge->a], b = r->renumbered[k ? edge->a : edge->b];
             uint32_t entry = now->starts[a] + now->lengths[a]++;
-            now->others[entry] = b, now->shared[entry] = edge->shared, now->keys[entry] = FCT_KEY_OPEN;
+            now->others[entry] = b, now->shared[entry] = edge->shared;
         }
     fct_release(work->env, work->edges);
     work->edges = NULL, work->edge_count = 0;
@@ -415,7 +459,7 @@ static fct_result run(fct_rounds *r) {
     r->unbound = !work->materials && r->start_height < FCT_FREE_HEIGHT;
     for (uint32_t i = 0; i < r->now.count; ++i)
         atomic_store_explicit(&r->least[0][i], UINT64_MAX, memory_order_relaxed);
-    fct_parallel_for(work->env, r->now.count, GRAIN, price_edges, r);
+    fct_parallel_for(work->env, r->now.count, GRAIN, price_first, r);
     for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
         result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
         if (result == FCT_OK) result = one_round(r, &merges);
@@ -428,11 +472,15 @@ static bool allocate_rounds(fct_rounds *r, size_t live) {
     const fct_env *env = r->work->env;
     size_t chunks = fct_chunk_count(live, GRAIN);
     for (int k = 0; k < 2; ++k) r->least[k] = fct_allocate(env, live, sizeof *r->least[k]);
+    r->parents = (uint64_t *)(void *)r->least[1];
     r->mates = fct_allocate(env, live, sizeof *r->mates);
     r->limits = r->renumbered = fct_allocate(env, r->work->face_count, sizeof *r->renumbered);
-    r->kept = fct_allocate(env, chunks, sizeof *r->kept);
+    r->kept = fct_allocate(env, chunks + 1, sizeof *r->kept);
     r->merged = fct_allocate(env, chunks, sizeof *r->merged);
     r->room = fct_allocate(env, chunks, sizeof *r->room);
+    for (uint32_t held = 0; held < 256; ++held)
+        for (uint32_t lane = 0, to = 0; lane < 8; ++lane)
+            if (held >> lane & 1) r->packing[held][to++] = (uint8_t)lane;
     return r->least[0] && r->least[1] && r->mates && r->renumbered && r->kept && r->merged && r->room;
 }
 

@@ -11,7 +11,7 @@
 enum {
     FCT_ROUND_GRAIN = 1 << 13, /* clusters a chunk */
     FCT_LIST_SLACK = 8,        /* entries behind each chunk's lists (and all lists) that may be overwritten */
-    FCT_SHORT_LIST = 64
+    FCT_SHORT_LIST = 100
 };
 
 /* Costs as keys that order like them (fct_float_key), the low bits replaced by log2 of the union's faces. */
@@ -38,23 +38,25 @@ typedef struct fct_rounds {
     fct_work *work;
     bool across, alone; /* alone: one thread */
     bool unbound;       /* every cluster may merge with any neighbour */
-    bool fresh;         /* no edge has a key yet */
+    bool fresh;         /* the first generation: no edge has a key yet */
     uint32_t round;
     uint32_t start_height; /* of the tallest cluster before the first round; each adds one at most */
     fct_generation now, next;
     /* Per live cluster: the least key << 32 | tie of its edges, of all and of those that are left; which of
      * the two arrays is which changes with every pass. */
     _Atomic uint64_t *least[2];
-    uint32_t *mates;                /* per live cluster: what it merges with or FCT_NONE */
-    uint32_t *limits;               /* per live cluster: keys up to which it takes less than its best */
-    uint32_t *renumbered;           /* in the place of limits: this round's number to the next's, | MERGED */
-    uint32_t *kept, *merged, *room; /* per chunk: counts, then places */
+    uint32_t *mates;      /* per live cluster: what it merges with or FCT_NONE */
+    uint32_t *limits;     /* per live cluster: keys up to which it takes less than its best */
+    uint32_t *renumbered; /* in the place of limits: this round's number to the next's, | MERGED */
+    uint64_t *parents;    /* in the place of least[1]: per cluster of the next round, mate << 32 | cluster */
+    uint32_t *kept, *merged, *room; /* per chunk: counts, then places; kept has one more */
+    uint8_t packing[256][8];        /* by which lanes hold something: these lanes first */
     fct_list_scratch *scratch;      /* one a thread */
 } fct_rounds;
 
 #define FCT_MERGED 0x80000000u
 
-/* Chunk body over the live clusters of `now`: writes the lists of `next`. */
+/* Chunk body over the live clusters of `now`: writes the lists of their unions. */
 void fct_rounds_join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
 
 #endif
