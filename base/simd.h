@@ -157,6 +157,21 @@ static inline i8 i8_add(i8 a, i8 b) {
 static inline i8 i8_and(i8 a, i8 b) {
     return _mm256_and_si256(a, b);
 }
+static inline i8 i8_xor(i8 a, i8 b) {
+    return _mm256_xor_si256(a, b);
+}
+/* The lower 32 bits of each product. */
+static inline i8 i8_mul(i8 a, i8 b) {
+    return _mm256_mullo_epi32(a, b);
+}
+/* The bits of eight floats. */
+static inline i8 i8_bits(f8 a) {
+    return _mm256_castps_si256(a);
+}
+/* Each as the nearest float, all below 2^31. */
+static inline f8 f8_from(i8 a) {
+    return _mm256_cvtepi32_ps(a);
+}
 /* a & ~b */
 static inline i8 i8_without(i8 a, i8 b) {
     return _mm256_andnot_si256(b, a);
@@ -362,6 +377,28 @@ static inline i8 i8_add(i8 a, i8 b) {
 static inline i8 i8_and(i8 a, i8 b) {
     for (int i = 0; i < 8; ++i) a.v[i] &= b.v[i];
     return a;
+}
+static inline i8 i8_xor(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] ^= b.v[i];
+    return a;
+}
+static inline i8 i8_mul(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] * (uint32_t)b.v[i]);
+    return a;
+}
+static inline i8 i8_bits(f8 a) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) {
+        union {
+            float f;
+            int32_t bits;
+        } u = {a.v[i]};
+        r.v[i] = u.bits;
+    }
+    return r;
+}
+static inline f8 f8_from(i8 a) {
+    FCT_F8((float)a.v[i]);
 }
 static inline i8 i8_without(i8 a, i8 b) {
     for (int i = 0; i < 8; ++i) a.v[i] &= ~b.v[i];

@@ -33,10 +33,15 @@ static inline uint32_t tie_of(const fct_rounds *r, uint32_t a, uint32_t b) {
     return (x ^ x >> 16) * 0x21F0AAADu;
 }
 
+static inline i8 ties_of(uint32_t round, i8 a, i8 b) {
+    i8 x = i8_mul(i8_xor(i8_xor(a, b), i8_set(round * 0x85EBCA6Bu)), i8_set(0x9E3779B1u));
+    return i8_mul(i8_xor(x, i8_shift_right(x, 16)), i8_set(0x21F0AAADu));
+}
+
 /* The end other than i of the edge that a least of i names. */
-static inline uint32_t other_end(const fct_rounds *r, uint32_t i, uint64_t least) {
+static inline uint32_t other_end(uint32_t round, uint32_t i, uint64_t least) {
     uint32_t x = (uint32_t)least * 0x333C4925u;
-    return (x ^ x >> 16) * 0x0E8B2F51u ^ r->round * 0x85EBCA6Bu ^ i;
+    return (x ^ x >> 16) * 0x0E8B2F51u ^ round * 0x85EBCA6Bu ^ i;
 }
 
 static inline void lower_to(const fct_rounds *r, _Atomic uint64_t *least, uint64_t value) {
@@ -72,9 +77,19 @@ typedef struct edge_queue {
     uint32_t clusters[QUEUE + SLACK], others[QUEUE + SLACK], entries[QUEUE + SLACK];
 } edge_queue;
 
-static inline void enqueue(const fct_rounds *r, edge_queue *queue, uint32_t i, uint32_t first, i8 others,
-                           uint32_t mask) {
-    i8 order = i8_load_bytes(r->packing[mask]);
+/* What walks read, in variables of their own: every store of eight numbers might change it where it lies. */
+typedef struct generation_view {
+    const uint32_t *starts, *lengths, *others, *keys;
+    const uint8_t (*packing)[8];
+} generation_view;
+
+static inline generation_view view(const fct_rounds *r) {
+    return (generation_view){r->now.starts, r->now.lengths, r->now.others, r->now.keys, r->packing};
+}
+
+static inline void enqueue(edge_queue *queue, const uint8_t packing[][8], uint32_t i, uint32_t first,
+                           i8 others, uint32_t mask) {
+    i8 order = i8_load_bytes(packing[mask]);
     i8_store(queue->clusters + queue->count, i8_set(i));
     i8_store(queue->others + queue->count, i8_lookup8(others, order));
     i8_store(queue->entries + queue->count, i8_add(i8_set(first), order));
@@ -86,17 +101,34 @@ static inline bool may_merge(const fct_rounds *r, uint32_t a, uint32_t b) {
     return (r->across || !materials || materials[a] == materials[b]) && fct_work_allowed(r->work, a, b);
 }
 
+/* Keys of costs, unions of so many faces. */
+static inline i8 keys_of(const float costs[FCT_LANES], const uint32_t faces[FCT_LANES]) {
+    i8 bits = i8_bits(f8_load(costs)), sign = i8_set(0x80000000u);
+    i8 order = i8_xor(bits, i8_or(i8_less(bits, i8_set(0)), sign));
+    i8 size = i8_add(i8_shift_right(i8_bits(f8_from(i8_load(faces))), 23), i8_set(0u - 127));
+    return i8_or(i8_without(order, i8_set(SIZE_BITS)), size);
+}
+
+/* pairs has FCT_LANES, of which count are to be priced. */
 static void price_eight(const fct_rounds *r, const edge_queue *queue, uint32_t at, const fct_pair *pairs,
                         uint32_t count) {
-    const uint32_t *counts = r->work->counts;
+    _Atomic uint64_t *least = r->least[0];
+    uint32_t *keys = r->now.keys, faces[FCT_LANES], new_keys[FCT_LANES], ties[FCT_LANES];
     float costs[FCT_LANES];
-    fct_work_costs(r->work, pairs, count, costs);
+    for (uint32_t k = 0; k < FCT_LANES; ++k)
+        faces[k] = r->work->counts[pairs[k].a] + r->work->counts[pairs[k].b];
+    fct_metric_costs(&r->work->metric, r->work->records, r->work->directions, pairs, FCT_LANES, costs);
+    i8_store(new_keys, keys_of(costs, faces));
+    i8_store(ties, ties_of(r->round, i8_load(queue->clusters + at), i8_load(queue->others + at)));
     for (uint32_t k = 0; k < count; ++k) {
-        uint32_t faces = counts[pairs[k].a] + counts[pairs[k].b];
-        uint32_t key = (fct_float_key(costs[k]) & ~SIZE_BITS) | (31 - (uint32_t)__builtin_clz(faces));
-        if (!r->unbound && !may_merge(r, pairs[k].a, pairs[k].b)) key = FCT_KEY_BLOCKED;
-        r->now.keys[queue->entries[at + k]] = key;
-        if (key < FCT_KEY_BLOCKED) offer(r, r->least[0], queue->clusters[at + k], queue->others[at + k], key);
+        uint64_t value = (uint64_t)new_keys[k] << 32 | ties[k];
+        if (new_keys[k] >= FCT_KEY_BLOCKED || (!r->unbound && !may_merge(r, pairs[k].a, pairs[k].b))) {
+            keys[queue->entries[at + k]] = FCT_KEY_BLOCKED;
+            continue;
+        }
+        keys[queue->entries[at + k]] = new_keys[k];
+        lower_to(r, &least[queue->clusters[at + k]], value);
+        lower_to(r, &least[queue->others[at + k]], value);
     }
 }
 
@@ -109,6 +141,7 @@ static void price_queued(const fct_rounds *r, edge_queue *queue, bool all) {
         pairs[q] = (fct_pair){a, b, r->now.shared[queue->entries[q]]};
         __builtin_prefetch(&r->work->records[b]);
     }
+    for (uint32_t q = count; q % FCT_LANES; ++q) pairs[q] = pairs[0];
     for (; done < count; done += FCT_LANES)
         price_eight(r, queue, done, pairs + done, count - done < FCT_LANES ? count - done : FCT_LANES);
     queue->count = left;
@@ -133,22 +166,23 @@ static inline uint32_t higher_ends(uint32_t i, i8 others, uint32_t left) {
 /* The edges of clusters [begin, end) to those of higher number: prices them where that is open, and offers
  * them to both ends. */
 static void price_range(const fct_rounds *r, uint32_t begin, uint32_t end) {
-    const fct_generation *now = &r->now;
+    const generation_view now = view(r);
+    const bool fresh = r->fresh;
     edge_queue open, known;
     open.count = known.count = 0;
     for (uint32_t i = begin; i < end; ++i) {
-        uint32_t start = now->starts[i], length = now->lengths[i];
+        uint32_t start = now.starts[i], length = now.lengths[i];
         for (uint32_t k = 0; k < length; k += 8) {
-            i8 others = i8_load(now->others + start + k);
+            i8 others = i8_load(now.others + start + k);
             uint32_t higher = higher_ends(i, others, length - k), unpriced = higher;
-            if (!r->fresh) {
-                i8 keys = i8_load(now->keys + start + k);
+            if (!fresh) {
+                i8 keys = i8_load(now.keys + start + k);
                 unpriced &= i8_eq(keys, i8_set(FCT_KEY_OPEN));
                 higher &= ~unpriced & i8_no_more(keys, i8_set(FCT_KEY_BLOCKED - 1));
-                enqueue(r, &known, i, start + k, others, higher);
+                enqueue(&known, now.packing, i, start + k, others, higher);
                 if (known.count >= QUEUE) offer_queued(r, &known);
             }
-            enqueue(r, &open, i, start + k, others, unpriced);
+            enqueue(&open, now.packing, i, start + k, others, unpriced);
             if (open.count >= QUEUE) price_queued(r, &open, false);
         }
     }
@@ -170,13 +204,9 @@ static void price_edges(void *user, size_t begin, size_t end, size_t chunk, uint
 
 /* --- Pairs --- */
 
-static inline bool is_frozen(const fct_rounds *r, uint32_t i) {
-    return r->work->frozen && r->work->frozen[r->now.slots[i]];
-}
-
 /* The other end of a cluster's least edge; itself if it has none. */
-static inline uint32_t best_of(const fct_rounds *r, uint32_t i, uint64_t own) {
-    uint32_t other = other_end(r, i, own);
+static inline uint32_t best_of(uint32_t round, uint32_t i, uint64_t own) {
+    uint32_t other = other_end(round, i, own);
     return own == UINT64_MAX ? i : other;
 }
 
@@ -187,18 +217,22 @@ static inline uint64_t least_of(const _Atomic uint64_t *least, uint32_t i) {
 /* Mates by the least edges of all, and how far those left over may go for another. */
 static void find_mates(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    fct_rounds *r = user;
-    const float patience = r->round < EARLY ? EARLY_PATIENCE : PATIENCE;
+    const fct_rounds *r = user;
+    const uint8_t *frozen = r->work->frozen;
+    const uint32_t round = r->round, *slots = r->now.slots;
+    const float patience = round < EARLY ? EARLY_PATIENCE : PATIENCE;
+    uint32_t *mates = r->mates, *limits = r->limits;
+    _Atomic uint64_t *least = r->least[0], *next_least = r->least[1];
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint64_t own = least_of(r->least[0], i);
-        uint32_t other = best_of(r, i, own);
+        uint64_t own = least_of(least, i);
+        uint32_t other = best_of(round, i, own);
         float cost = cost_of_key((uint32_t)(own >> 32)), more = cost * patience;
         uint32_t limit = fct_float_key(more > cost ? more : cost) | SIZE_BITS;
-        bool mutual = (other != i) & (least_of(r->least[0], other) == own), done = mutual | (other == i);
-        if (r->work->frozen && (is_frozen(r, i) || is_frozen(r, other))) mutual = false, done = true;
-        r->mates[i] = mutual ? other : FCT_NONE;
-        r->limits[i] = done ? 0 : limit;
-        atomic_store_explicit(&r->least[1][i], UINT64_MAX, memory_order_relaxed);
+        bool mutual = (other != i) & (least_of(least, other) == own), done = mutual | (other == i);
+        if (frozen && (frozen[slots[i]] || frozen[slots[other]])) mutual = false, done = true;
+        mates[i] = mutual ? other : FCT_NONE;
+        limits[i] = done ? 0 : limit;
+        atomic_store_explicit(&next_least[i], UINT64_MAX, memory_order_relaxed);
     }
 }
 
@@ -214,17 +248,18 @@ static void offer_left_over(const fct_rounds *r, edge_queue *queue) {
 static void offer_rest(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const fct_rounds *r = user;
-    const fct_generation *now = &r->now;
+    const generation_view now = view(r);
+    const uint32_t *limits = r->limits;
     edge_queue queue;
     queue.count = 0;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint32_t start = now->starts[i], length = now->lengths[i];
-        i8 limit = i8_set(r->limits[i]);
+        uint32_t start = now.starts[i], length = now.lengths[i];
+        i8 limit = i8_set(limits[i]);
         for (uint32_t k = 0; k < length; k += 8) {
-            i8 others = i8_load(now->others + start + k);
+            i8 others = i8_load(now.others + start + k);
             uint32_t mask =
-                higher_ends(i, others, length - k) & i8_no_more(i8_load(now->keys + start + k), limit);
-            enqueue(r, &queue, i, start + k, others, mask);
+                higher_ends(i, others, length - k) & i8_no_more(i8_load(now.keys + start + k), limit);
+            enqueue(&queue, now.packing, i, start + k, others, mask);
             if (queue.count >= QUEUE) offer_left_over(r, &queue);
         }
     }
@@ -235,17 +270,19 @@ static void offer_rest(void *user, size_t begin, size_t end, size_t chunk, uint3
 static void count_clusters(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     fct_rounds *r = user;
-    uint32_t kept = 0, merged = 0, room = SLACK;
+    const uint32_t round = r->round, *lengths = r->now.lengths;
+    const _Atomic uint64_t *least = r->least[1];
+    uint32_t kept = 0, merged = 0, room = SLACK, *mates = r->mates;
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint64_t own = least_of(r->least[1], i);
-        uint32_t other = best_of(r, i, own), mate = r->mates[i];
-        bool mutual = (other != i) & (least_of(r->least[1], other) == own);
+        uint64_t own = least_of(least, i);
+        uint32_t other = best_of(round, i, own), mate = mates[i];
+        bool mutual = (other != i) & (least_of(least, other) == own);
         mate = mutual ? other : mate;
-        r->mates[i] = mate;
+        mates[i] = mate;
         bool keeps = mate > i, merges = keeps & (mate != FCT_NONE);
         kept += keeps, merged += merges;
-        room += keeps ? r->now.lengths[i] : 0;
-        room += merges ? r->now.lengths[merges ? mate : i] - 2 : 0;
+        room += keeps ? lengths[i] : 0;
+        room += merges ? lengths[merges ? mate : i] - 2 : 0;
     }
     r->kept[chunk] = kept, r->merged[chunk] = merged, r->room[chunk] = room;
 }
@@ -295,19 +332,20 @@ static void merge_queued(const fct_rounds *r, merge_queue *queue) {
 static void merge_pairs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)end, (void)thread;
     fct_rounds *r = user;
+    const uint32_t *mates = r->mates, *lengths = r->now.lengths, *slots = r->now.slots;
+    uint32_t *next_slots = r->next.slots, *starts = r->next.starts, *renumbered = r->renumbered;
     uint32_t next = r->kept[chunk], last = r->kept[chunk + 1], room = r->room[chunk];
     merge_queue queue = {.place = r->work->merge_count + r->merged[chunk]};
     for (uint32_t i = (uint32_t)begin; next < last; ++i) {
-        uint32_t mate = r->mates[i];
+        uint32_t mate = mates[i];
         bool keeps = mate > i, merges = keeps & (mate != FCT_NONE);
-        uint32_t number = next | (merges ? FCT_MERGED : 0);
-        r->next.slots[next] = r->now.slots[i];
-        r->next.starts[next] = room;
+        next_slots[next] = slots[i];
+        starts[next] = room;
         r->parents[next] = (uint64_t)mate << 32 | i;
         atomic_store_explicit(&r->least[0][next], UINT64_MAX, memory_order_relaxed);
-        room += keeps ? r->now.lengths[i] : 0;
-        room += merges ? r->now.lengths[merges ? mate : i] - 2 : 0;
-        if (keeps) r->renumbered[i] = r->renumbered[merges ? mate : i] = number;
+        room += keeps ? lengths[i] : 0;
+        room += merges ? lengths[merges ? mate : i] - 2 : 0;
+        if (keeps) renumbered[i] = renumbered[merges ? mate : i] = next | (merges ? FCT_MERGED : 0);
         queue.clusters[queue.count] = i, queue.mates[queue.count] = mate;
         queue.count += merges;
         next += keeps;

@@ -64,6 +64,10 @@ static void choosing(void **state) {
     for (int i = 0; i < 8; ++i) assert_int_equal(out[i], u[order[i] & 7] & 7);
     i8_store(out, i8_gather(table, i8_load(places)));
     for (int i = 0; i < 8; ++i) assert_int_equal(out[i], table[places[i]]);
+    i8_store(out, i8_xor(i8_mul(x, i8_set(0x10000001)), y));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], (u[i] * 0x10000001u) ^ v[i]);
+    i8_store(out, i8_shift_right(i8_bits(f8_from(i8_add(y, i8_set(8)))), 23));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], v[i] < 8 ? 130 : 131);
     f8_store(chosen, f8_only(f8_load(a), same));
     for (int i = 0; i < 8; ++i) assert_true(chosen[i] == (u[i] == v[i] ? a[i] : 0));
     f8_store(chosen, f8_if(same, f8_load(a), f8_load(b)));
