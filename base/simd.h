@@ -59,6 +59,16 @@ static inline d4 d4_min(d4 a, d4 b) {
 static inline d4 d4_max(d4 a, d4 b) {
     return _mm256_max_pd(a, b);
 }
+/* The x, y and z of four points. */
+static inline void d4_load_points(const float *const p[4], d4 out[3]) {
+    __m128 ab = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), (const __m64 *)(const void *)p[0]),
+                             (const __m64 *)(const void *)p[1]);
+    __m128 cd = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), (const __m64 *)(const void *)p[2]),
+                             (const __m64 *)(const void *)p[3]);
+    out[0] = _mm256_cvtps_pd(_mm_shuffle_ps(ab, cd, 0x88));
+    out[1] = _mm256_cvtps_pd(_mm_shuffle_ps(ab, cd, 0xDD));
+    out[2] = _mm256_cvtps_pd(_mm_setr_ps(p[0][2], p[1][2], p[2][2], p[3][2]));
+}
 static inline f8 f8_set(float a) {
     return _mm256_set1_ps(a);
 }
@@ -67,6 +77,10 @@ static inline f8 f8_load(const float *p) {
 }
 static inline void f8_store(float *p, f8 a) {
     _mm256_storeu_ps(p, a);
+}
+/* Both fours as floats. */
+static inline f8 f8_narrow(d4 low, d4 high) {
+    return _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low));
 }
 static inline f8 f8_add(f8 a, f8 b) {
     return _mm256_add_ps(a, b);
@@ -136,6 +150,12 @@ static inline i8 i8_load(const uint32_t *p) {
 }
 static inline void i8_store(uint32_t *p, i8 a) {
     _mm256_storeu_si256((__m256i *)(void *)p, a);
+}
+/* The upper halves of eight numbers. */
+static inline i8 i8_load_upper(const uint64_t *p) {
+    f8 a = _mm256_loadu_ps((const float *)(const void *)p);
+    f8 b = _mm256_loadu_ps((const float *)(const void *)(p + 4));
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(a, b, 0xDD)), 0xD8);
 }
 static inline i8 i8_shift_right(i8 a, int bits) {
     return _mm256_srli_epi32(a, bits);
@@ -288,6 +308,10 @@ static inline d4 d4_min(d4 a, d4 b) {
 static inline d4 d4_max(d4 a, d4 b) {
     FCT_D4(a.v[i] > b.v[i] ? a.v[i] : b.v[i]);
 }
+static inline void d4_load_points(const float *const p[4], d4 out[3]) {
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 4; ++i) out[k].v[i] = (double)p[i][k];
+}
 static inline f8 f8_set(float a) {
     FCT_F8(a);
 }
@@ -296,6 +320,9 @@ static inline f8 f8_load(const float *p) {
 }
 static inline void f8_store(float *p, f8 a) {
     for (int i = 0; i < 8; ++i) p[i] = a.v[i];
+}
+static inline f8 f8_narrow(d4 low, d4 high) {
+    FCT_F8((float)(i < 4 ? low.v[i] : high.v[i - 4]));
 }
 static inline f8 f8_add(f8 a, f8 b) {
     FCT_F8(a.v[i] + b.v[i]);
@@ -355,6 +382,11 @@ static inline i8 i8_load(const uint32_t *p) {
 }
 static inline void i8_store(uint32_t *p, i8 a) {
     for (int i = 0; i < 8; ++i) p[i] = (uint32_t)a.v[i];
+}
+static inline i8 i8_load_upper(const uint64_t *p) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)(p[i] >> 32);
+    return r;
 }
 static inline i8 i8_shift_right(i8 a, int bits) {
     for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] >> bits);

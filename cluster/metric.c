@@ -33,28 +33,6 @@ fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
     return metric;
 }
 
-void fct_metric_face(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
-                     float perimeter, fct_record *record, fct_direction *direction) {
-    v3 p[3];
-    for (int k = 0; k < 3; ++k)
-        p[k] = v3_scale(v3_sub(v3_load(positions + 3 * (size_t)triangle[k]), metric->origin), metric->scale);
-    v3 center = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1.0 / 3);
-    v3 vector = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
-    double area = v3_norm(vector), covariance[6] = {0};
-    bool points = metric->measure == FCT_FIT_POINTS;
-    for (int k = 0; k < 3; ++k) sym3_add_outer(covariance, points ? 1 : area / 12, v3_sub(p[k], center));
-    for (int i = 0; i < 6; ++i) record->covariance[i] = (float)covariance[i];
-    v3_store(record->centroid, center);
-    v3_store(record->vector, vector);
-    record->weight = points ? 3 : (float)area;
-    record->area = (float)area;
-    record->perimeter = (float)(perimeter * metric->scale);
-    record->fit = 0;
-    if (!direction) return;
-    *direction = (fct_direction){.vector = {vector.x, vector.y, vector.z}, .area = area};
-    if (area > 0) sym3_add_outer(direction->moment, 1 / area, vector);
-}
-
 /* Records turned on their side: one field of eight clusters in each vector. */
 typedef union lanes {
     struct {
@@ -77,6 +55,84 @@ static inline f8 at_least(f8 a, float least) {
 }
 static inline f8 dot3(const f8 a[3], const f8 b[3]) {
     return f8_mad(f8_mad(f8_mul(a[0], b[0]), a[1], b[1]), a[2], b[2]);
+}
+
+/* The sums of a triangle, as doubles. */
+typedef struct face_sums {
+    d4 covariance[6], centroid[3], vector[3], area;
+} face_sums;
+
+/* Of four triangles, by their corners in the mesh's coordinates. */
+static inline void sum_faces(const fct_metric *metric, const d4 corners[3][3], face_sums *out) {
+    const double origin[3] = {metric->origin.x, metric->origin.y, metric->origin.z};
+    d4 third = d4_set(1.0 / 3), scale = d4_set(metric->scale), spokes[3][3], *s = out->vector;
+    for (int k = 0; k < 3; ++k) { /* from the centroid */
+        d4 p = d4_mul(d4_sub(corners[1][k], corners[0][k]), scale);
+        d4 q = d4_mul(d4_sub(corners[2][k], corners[0][k]), scale), center = d4_mul(d4_add(p, q), third);
+        spokes[0][k] = d4_sub(d4_set(0), center);
+        spokes[1][k] = d4_sub(p, center), spokes[2][k] = d4_sub(q, center);
+        out->centroid[k] = d4_add(d4_mul(d4_sub(corners[0][k], d4_set(origin[k])), scale), center);
+    }
+    /* half the cross product of two sides is 3/2 times that of two spokes */
+    for (int k = 0; k < 3; ++k) {
+        int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+        s[k] = d4_mul(d4_set(1.5),
+                      d4_sub(d4_mul(spokes[1][i], spokes[2][j]), d4_mul(spokes[1][j], spokes[2][i])));
+    }
+    out->area = d4_sqrt(d4_add(d4_add(d4_mul(s[0], s[0]), d4_mul(s[1], s[1])), d4_mul(s[2], s[2])));
+    d4 weight = metric->measure == FCT_FIT_POINTS ? d4_set(1) : d4_mul(out->area, d4_set(1.0 / 12));
+    static const int rows[6] = {0, 0, 0, 1, 1, 2}, columns[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        d4 sum = d4_mul(spokes[0][rows[i]], spokes[0][columns[i]]);
+        for (int c = 1; c < 3; ++c) sum = d4_add(sum, d4_mul(spokes[c][rows[i]], spokes[c][columns[i]]));
+        out->covariance[i] = d4_mul(sum, weight);
+    }
+}
+
+void fct_metric_faces(const fct_metric *metric, const float *positions, const uint32_t *triangles,
+                      const float *perimeters, uint32_t count, fct_record *records) {
+    face_sums sums[2];
+    lanes out;
+    float borders[FCT_LANES];
+    for (int half = 0; half < 2; ++half) {
+        d4 corners[3][3];
+        for (uint32_t c = 0; c < 3; ++c) {
+            const float *p[4];
+            for (uint32_t i = 0; i < 4; ++i) {
+                uint32_t face = 4 * (uint32_t)half + i;
+                p[i] = positions + 3 * (size_t)triangles[3 * (face < count ? face : 0) + c];
+            }
+            d4_load_points(p, corners[c]);
+        }
+        sum_faces(metric, corners, &sums[half]);
+    }
+    for (uint32_t i = 0; i < FCT_LANES; ++i) borders[i] = perimeters[i < count ? i : 0];
+    for (int i = 0; i < 6; ++i) out.covariance[i] = f8_narrow(sums[0].covariance[i], sums[1].covariance[i]);
+    for (int k = 0; k < 3; ++k) {
+        out.centroid[k] = f8_narrow(sums[0].centroid[k], sums[1].centroid[k]);
+        out.vector[k] = f8_narrow(sums[0].vector[k], sums[1].vector[k]);
+    }
+    out.area = f8_narrow(sums[0].area, sums[1].area);
+    out.weight = metric->measure == FCT_FIT_POINTS ? f8_set(3) : out.area;
+    out.perimeter = f8_load(borders);
+    out.fit = f8_set(0);
+    f8_transpose(out.rows);
+    f8_transpose(out.rows + 8);
+    for (uint32_t i = 0; i < count; ++i) {
+        f8_store(records[i].covariance, out.rows[i]);
+        f8_store(records[i].covariance + 8, out.rows[i + 8]);
+    }
+}
+
+void fct_metric_direction(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
+                          fct_direction *direction) {
+    v3 p[3];
+    for (int k = 0; k < 3; ++k) p[k] = v3_load(positions + 3 * (size_t)triangle[k]);
+    v3 a = v3_scale(v3_sub(p[1], p[0]), metric->scale), b = v3_scale(v3_sub(p[2], p[0]), metric->scale);
+    v3 vector = v3_scale(v3_cross(a, b), 0.5);
+    double area = v3_norm(vector);
+    *direction = (fct_direction){.vector = {vector.x, vector.y, vector.z}, .area = area};
+    if (area > 0) sym3_add_outer(direction->moment, 1 / area, vector);
 }
 
 static inline void load_lanes(const fct_record *records, const fct_pair *pairs, uint32_t count, bool second,

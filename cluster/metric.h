@@ -37,17 +37,20 @@ typedef struct fct_metric {
 /* Weights below zero in def become the defaults of its cost. */
 fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds);
 
-/* The record of one triangle; direction may be NULL. perimeter in the mesh's unit. */
-void fct_metric_face(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
-                     float perimeter, fct_record *record, fct_direction *direction);
-
 /* Two clusters, by their records' numbers, and the border they share (unit model). */
 typedef struct fct_pair {
     uint32_t a, b;
     float shared;
 } fct_pair;
 
-enum { FCT_LANES = 8 }; /* pairs worked on at once */
+enum { FCT_LANES = 8 }; /* pairs or triangles worked on at once */
+
+/* The records of count <= FCT_LANES triangles; perimeters in the unit model. */
+void fct_metric_faces(const fct_metric *metric, const float *positions, const uint32_t *triangles,
+                      const float *perimeters, uint32_t count, fct_record *records);
+/* What MEAN needs of one triangle besides. */
+void fct_metric_direction(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
+                          fct_direction *direction);
 
 /* Costs of merging count <= FCT_LANES pairs. The same for (a, b) as for (b, a) but for rounding. directions
  * only for MEAN. A NaN is never returned. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/simd.h"
 
 enum { GRAIN = 1 << 13 };
 
@@ -22,15 +23,23 @@ uint32_t fct_height_limit(uint32_t count, bool mild) {
 static void bound_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     face_job *job = user;
-    fct_bounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (size_t i = 3 * begin; i < 3 * end; ++i) {
-        const float *p = job->mesh->positions + 3 * (size_t)job->mesh->triangles[i];
-        for (int k = 0; k < 3; ++k) {
-            bounds.lower[k] = p[k] < bounds.lower[k] ? p[k] : bounds.lower[k];
-            bounds.upper[k] = p[k] > bounds.upper[k] ? p[k] : bounds.upper[k];
-        }
+    d4 lower[3], upper[3], points[3];
+    for (int k = 0; k < 3; ++k) lower[k] = d4_set(INFINITY), upper[k] = d4_set(-INFINITY);
+    for (size_t corner = 3 * begin, last = 3 * end - 1; corner <= last; corner += 4) {
+        const float *p[4];
+        for (size_t i = 0; i < 4; ++i)
+            p[i] = job->mesh->positions +
+                   3 * (size_t)job->mesh->triangles[corner + i < last ? corner + i : last];
+        d4_load_points(p, points);
+        for (int k = 0; k < 3; ++k)
+            lower[k] = d4_min(lower[k], points[k]), upper[k] = d4_max(upper[k], points[k]);
     }
-    job->bounds[chunk] = bounds;
+    for (int k = 0; k < 3; ++k) {
+        float low[4], high[4];
+        d4_store_floats(low, lower[k]), d4_store_floats(high, upper[k]);
+        job->bounds[chunk].lower[k] = fminf(fminf(low[0], low[1]), fminf(low[2], low[3]));
+        job->bounds[chunk].upper[k] = fmaxf(fmaxf(high[0], high[1]), fmaxf(high[2], high[3]));
+    }
 }
 
 /* Of the vertices that faces use. */
@@ -49,22 +58,18 @@ static fct_result bound_mesh(const fct_env *env, const fct_mesh *mesh, fct_bound
     return FCT_OK;
 }
 
-/* Records, and borders in the unit model. */
 static void make_records(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     face_job *job = user;
     fct_work *work = job->work;
-    const fct_lists *lists = &work->lists;
-    for (size_t f = begin; f < end; ++f) {
-        fct_metric_face(&work->metric, job->mesh->positions, job->mesh->triangles + 3 * f,
-                        lists->perimeters[f], &work->records[f],
-                        work->directions ? &work->directions[f] : NULL);
-        work->counts[f] = 1;
-        work->heights[f] = 0;
-        work->nodes[f] = (uint32_t)f;
-        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
-            lists->lengths[i] = (float)((double)lists->lengths[i] * work->metric.scale);
-    }
+    const float *positions = job->mesh->positions;
+    for (size_t f = begin; f < end; f += FCT_LANES)
+        fct_metric_faces(&work->metric, positions, job->mesh->triangles + 3 * f, work->lists.perimeters + f,
+                         end - f < FCT_LANES ? (uint32_t)(end - f) : FCT_LANES, work->records + f);
+    for (size_t f = begin; f < end && work->directions; ++f)
+        fct_metric_direction(&work->metric, positions, job->mesh->triangles + 3 * f, &work->directions[f]);
+    for (size_t f = begin; f < end; ++f) work->counts[f] = 1, work->nodes[f] = (uint32_t)f;
+    memset(work->heights + begin, 0, end - begin);
 }
 
 static fct_result allocate_clusters(fct_work *work, bool directions) {
@@ -86,7 +91,7 @@ fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, cons
                                   const fct_tree_def *def, fct_work *out) {
     *out = (fct_work){.env = env, .face_count = mesh->face_count, .materials = mesh->materials};
     out->metric = fct_metric_make(def, bounds);
-    fct_result result = fct_lists_build(env, mesh, &out->lists);
+    fct_result result = fct_lists_build(env, mesh, out->metric.scale, &out->lists);
     if (result == FCT_OK) result = allocate_clusters(out, def->cost == FCT_COST_MEAN);
     if (result != FCT_OK) {
         fct_work_release(out);

@@ -1,4 +1,5 @@
-/* dual/dual.c: the dual graph as pairs of neighbouring faces in (a, b) order: the upper half of the lists. */
+/* dual/dual.c: the dual graph as pairs of neighbouring faces in (a, b) order: the upper half of the lists,
+ * each sorted. */
 #include "facetree/dual.h"
 
 #include "base/parallel.h"
@@ -25,14 +26,18 @@ static void count_edges(void *user, size_t begin, size_t end, size_t chunk, uint
 static void write_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     writer *w = user;
+    const fct_lists *lists = w->lists;
     size_t place = w->places[chunk];
     for (size_t f = begin; f < end; ++f)
-        for (uint32_t i = 0; i < w->lists->counts[f]; ++i) {
-            size_t entry = w->lists->starts[f] + i;
-            if (w->lists->neighbors[entry] < f) continue;
-            w->dual->edges[2 * place] = (uint32_t)f;
-            w->dual->edges[2 * place + 1] = w->lists->neighbors[entry];
-            w->dual->lengths[place++] = w->lists->lengths[entry];
+        for (size_t i = lists->starts[f], first = place; i < lists->starts[f] + lists->counts[f]; ++i) {
+            uint32_t neighbor = lists->neighbors[i], *edges = w->dual->edges;
+            float *lengths = w->dual->lengths;
+            if (neighbor < f) continue;
+            size_t to = place++;
+            for (; to > first && edges[2 * to - 1] > neighbor; --to)
+                edges[2 * to + 1] = edges[2 * to - 1], lengths[to] = lengths[to - 1];
+            edges[2 * (place - 1)] = (uint32_t)f;
+            edges[2 * to + 1] = neighbor, lengths[to] = lists->lengths[i];
         }
 }
 
@@ -57,7 +62,7 @@ static fct_result write_dual(const fct_env *env, fct_lists *lists, fct_dual *out
 fct_result fct_dual_build(const fct_env *env, const fct_mesh *mesh, fct_dual *out) {
     *out = (fct_dual){.face_count = mesh->face_count};
     fct_lists lists;
-    fct_result result = fct_lists_build(env, mesh, &lists);
+    fct_result result = fct_lists_build(env, mesh, 1, &lists);
     if (result != FCT_OK) return result;
     result = write_dual(env, &lists, out);
     if (result == FCT_OK) {

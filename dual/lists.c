@@ -1,10 +1,12 @@
 /* dual/lists.c: neighbours of every face, by a counting sort of sides and no hash table.
  *
  * In: triangles. Out: lists. Sides are put into a bucket of their lower vertex, whatever order threads get
- * there, and each bucket is sorted by (higher vertex, side), which brings the faces of a mesh edge together
- * in order of face id. Two faces with one side each on an edge note each other in place. What is left (three
- * faces or more, a face that folds onto itself) becomes connections of their own, sorted by face. Lists are
- * then written face by face. O(F), and O(v log v) for a vertex of valence v.
+ * there. In a bucket of few sides each is compared with all others at once: where it meets just one, the two
+ * faces note each other, each in the place of its side. A larger bucket, or one in which three faces meet or
+ * a face folds onto itself, is sorted by (higher vertex, side), which brings the faces of a mesh edge
+ * together in order of face id; where they are not two they become connections of their own, sorted by face.
+ * Lists are then finished face by face, in place unless the face has connections. O(F), and O(v log v) for a
+ * vertex of valence v.
  */
 #include "dual/lists.h"
 
@@ -12,10 +14,12 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/simd.h"
 #include "base/sort.h"
 #include "base/vec.h"
 
-enum { GRAIN = 1 << 13, FEW = 32, SEVERAL = 0x80000000u };
+enum { GRAIN = 1 << 13, SEVERAL = 0x80000000u };
+enum { FEW = 16 }; /* sides in a bucket that is matched without sorting */
 
 /* One direction of a connection on an edge that is not two plain sides. */
 typedef struct connection {
@@ -25,45 +29,72 @@ typedef struct connection {
 
 typedef struct builder {
     const fct_mesh *mesh;
-    bool alone;             /* one thread: counters need no lock */
-    _Atomic uint32_t *ends; /* per vertex: sides, then where its bucket ends */
-    uint64_t *sides;        /* higher vertex << 32 | side, in buckets of the lower vertex */
-    uint32_t *opposite;     /* per side: the face across; FCT_NONE: none; SEVERAL: see connections */
+    double scale;
+    bool alone;               /* one thread: counters need no lock */
+    _Atomic uint32_t *begins; /* per vertex, and one more: sides, then where its bucket begins */
+    uint64_t *sides; /* higher vertex << 32 | 4 face + number, in buckets of the lower vertex; FEW more */
     uint32_t *boundary, *nonmanifold, *places; /* per chunk of vertices; places: of connections */
     uint32_t connection_count;
     connection *connections, *sorted; /* sorted: by (from, to), in the order found */
-    fct_lists *lists;
+    fct_lists *lists; /* neighbors: per side its rank in the bucket, then the face across; FCT_NONE: none;
+                         SEVERAL: see connections */
 } builder;
 
-static inline uint32_t next_of(const builder *b, _Atomic uint32_t *counter) {
-    if (!b->alone) return atomic_fetch_add_explicit(counter, 1, memory_order_relaxed);
-    uint32_t value = atomic_load_explicit(counter, memory_order_relaxed);
-    atomic_store_explicit(counter, value + 1, memory_order_relaxed);
-    return value;
+/* Counts a side at its lower vertex; its rank there. */
+static inline uint32_t count_side(_Atomic uint32_t *counters, uint32_t u, uint32_t v, bool alone) {
+    _Atomic uint32_t *counter = &counters[u < v ? u : v];
+    if (u == v) return 0;
+    if (!alone) return atomic_fetch_add_explicit(counter, 1, memory_order_relaxed);
+    uint32_t rank = atomic_load_explicit(counter, memory_order_relaxed);
+    atomic_store_explicit(counter, rank + 1, memory_order_relaxed);
+    return rank;
+}
+
+static inline void count_range(const builder *b, size_t begin, size_t end, bool alone) {
+    _Atomic uint32_t *counters = b->begins;
+    const uint32_t *t = b->mesh->triangles + 3 * begin;
+    uint32_t *ranks = b->lists->neighbors + 3 * begin;
+    for (size_t f = begin; f < end; ++f, t += 3, ranks += 3) {
+        uint32_t u = t[0], v = t[1], w = t[2];
+        ranks[0] = count_side(counters, u, v, alone);
+        ranks[1] = count_side(counters, v, w, alone);
+        ranks[2] = count_side(counters, w, u, alone);
+    }
 }
 
 static void count_sides(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    builder *b = user;
-    for (size_t f = begin; f < end; ++f) {
-        const uint32_t *t = b->mesh->triangles + 3 * f;
-        for (int k = 0; k < 3; ++k) {
-            uint32_t u = t[k], v = t[k == 2 ? 0 : k + 1];
-            if (u != v) next_of(b, &b->ends[u < v ? u : v]);
-        }
-    }
+    const builder *b = user;
+    if (b->alone)
+        count_range(b, begin, end, true);
+    else
+        count_range(b, begin, end, false);
+}
+
+static inline size_t bucket_begin(const builder *b, size_t vertex) {
+    return atomic_load_explicit(&b->begins[vertex], memory_order_relaxed);
+}
+
+/* A side from a vertex to itself meets none. */
+static inline void place_side(const builder *b, uint64_t *sides, uint32_t u, uint32_t v, uint32_t code,
+                              uint32_t *rank) {
+    if (u == v)
+        *rank = FCT_NONE;
+    else
+        sides[bucket_begin(b, u < v ? u : v) + *rank] = (uint64_t)(u < v ? v : u) << 32 | code;
 }
 
 static void place_sides(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    builder *b = user;
-    for (size_t f = begin; f < end; ++f) {
-        const uint32_t *t = b->mesh->triangles + 3 * f;
-        for (size_t k = 0; k < 3; ++k) {
-            uint32_t u = t[k], v = t[k == 2 ? 0 : k + 1], low = u < v ? u : v;
-            b->opposite[3 * f + k] = FCT_NONE;
-            if (u != v) b->sides[next_of(b, &b->ends[low])] = (uint64_t)(u < v ? v : u) << 32 | (3 * f + k);
-        }
+    const builder *b = user;
+    uint64_t *sides = b->sides;
+    const uint32_t *t = b->mesh->triangles + 3 * begin;
+    uint32_t *ranks = b->lists->neighbors + 3 * begin;
+    for (uint32_t f = (uint32_t)begin; f < end; ++f, t += 3, ranks += 3) {
+        uint32_t u = t[0], v = t[1], w = t[2];
+        place_side(b, sides, u, v, 4 * f, ranks);
+        place_side(b, sides, v, w, 4 * f + 1, ranks + 1);
+        place_side(b, sides, w, u, 4 * f + 2, ranks + 2);
     }
 }
 
@@ -96,8 +127,13 @@ static void sort_bucket(uint64_t *keys, size_t count) {
     }
 }
 
-static inline uint32_t face_of(uint64_t key) {
-    return (uint32_t)key / 3;
+static inline uint32_t face_of(uint64_t side) {
+    return (uint32_t)side >> 2;
+}
+
+/* Where the face across a side is noted. */
+static inline uint32_t *across(const builder *b, uint64_t side) {
+    return &b->lists->neighbors[(uint32_t)side - face_of(side)];
 }
 
 /* One past the sides of one mesh edge, and of one face on it. */
@@ -112,45 +148,71 @@ static size_t run_end(const uint64_t *sides, size_t i, size_t end) {
     return last;
 }
 
-static size_t bucket_begin(const builder *b, size_t vertex) {
-    return vertex ? atomic_load_explicit(&b->ends[vertex - 1], memory_order_relaxed) : 0;
+typedef struct tally {
+    uint32_t boundary, nonmanifold, connections;
+} tally;
+
+/* A bucket of at most FEW sides, with `half` of half as many; false where faces do not meet in pairs. */
+static inline bool match_few(const builder *b, const uint64_t *bucket, uint32_t count, bool half, tally *t) {
+    i8 low = i8_load_upper(bucket), high = half ? low : i8_load_upper(bucket + 8);
+    uint32_t all = (1u << count) - 1, boundary = 0, several = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        i8 vertex = i8_set((uint32_t)(bucket[i] >> 32));
+        uint32_t same = i8_eq(low, vertex) | (half ? 0 : i8_eq(high, vertex) << 8);
+        same &= all ^ 1u << i;
+        uint32_t none = !same;
+        uint32_t face = face_of(bucket[__builtin_ctz(same | none << count)]);
+        several |= (same & (same - 1)) | (!none & (face == face_of(bucket[i])));
+        boundary += none;
+        *across(b, bucket[i]) = none ? FCT_NONE : face;
+    }
+    if (several) return false;
+    t->boundary += boundary;
+    return true;
+}
+
+static void match_many(const builder *b, uint64_t *bucket, size_t count, tally *t) {
+    sort_bucket(bucket, count);
+    for (size_t from = 0, to; from < count; from = to) {
+        to = group_end(bucket, from, count);
+        uint32_t first = face_of(bucket[from]), second = face_of(bucket[to - 1]), faces = 0;
+        if (to - from == 2 && first != second) {
+            *across(b, bucket[from]) = second;
+            *across(b, bucket[to - 1]) = first;
+            continue;
+        }
+        for (size_t i = from; i < to; i = run_end(bucket, i, to)) ++faces;
+        t->boundary += faces == 1;
+        t->nonmanifold += faces > 2;
+        t->connections += 2 * (faces - 1);
+        for (size_t i = from; i < to; ++i) *across(b, bucket[i]) = faces > 1 ? SEVERAL : FCT_NONE;
+    }
 }
 
 static void match_sides(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
-    builder *b = user;
-    uint32_t boundary = 0, nonmanifold = 0, connections = 0;
-    size_t from = bucket_begin(b, begin);
+    const builder *b = user;
+    tally t = {0};
     for (size_t v = begin; v < end; ++v) {
-        size_t last = bucket_begin(b, v + 1);
-        sort_bucket(b->sides + from, last - from);
-        while (from < last) {
-            size_t to = group_end(b->sides, from, last);
-            uint32_t first = face_of(b->sides[from]), second = face_of(b->sides[to - 1]), faces = 0;
-            if (to - from == 2 && first != second) {
-                b->opposite[(uint32_t)b->sides[from]] = second;
-                b->opposite[(uint32_t)b->sides[to - 1]] = first;
-            } else {
-                for (size_t i = from; i < to; i = run_end(b->sides, i, to)) ++faces;
-                boundary += faces == 1;
-                nonmanifold += faces > 2;
-                connections += 2 * (faces - 1);
-                for (size_t i = from; i < to && faces > 1; ++i) b->opposite[(uint32_t)b->sides[i]] = SEVERAL;
-            }
-            from = to;
-        }
+        uint64_t *bucket = b->sides + bucket_begin(b, v);
+        size_t count = bucket_begin(b, v + 1) - bucket_begin(b, v);
+        bool done = count <= FEW / 2 ? match_few(b, bucket, (uint32_t)count, true, &t)
+                    : count <= FEW   ? match_few(b, bucket, (uint32_t)count, false, &t)
+                                     : false;
+        if (!done) match_many(b, bucket, count, &t);
     }
-    b->boundary[chunk] = boundary, b->nonmanifold[chunk] = nonmanifold, b->places[chunk] = connections;
+    b->boundary[chunk] = t.boundary, b->nonmanifold[chunk] = t.nonmanifold, b->places[chunk] = t.connections;
 }
 
-static double side_length(const fct_mesh *mesh, uint32_t a, uint32_t b) {
-    v3 p = v3_load(mesh->positions + 3 * (size_t)a), q = v3_load(mesh->positions + 3 * (size_t)b);
-    return v3_norm(v3_sub(q, p));
+static double side_length(const builder *b, size_t from, uint64_t side) {
+    const float *positions = b->mesh->positions;
+    v3 p = v3_load(positions + 3 * from), q = v3_load(positions + 3 * (size_t)(side >> 32));
+    return v3_norm(v3_sub(q, p)) * b->scale;
 }
 
 /* A chain along one mesh edge: each face and the next share it; a face in the middle gives half to either. */
 static uint32_t connect(const builder *b, size_t vertex, size_t from, size_t end, uint32_t place) {
-    double length = side_length(b->mesh, (uint32_t)vertex, (uint32_t)(b->sides[from] >> 32));
+    double length = side_length(b, vertex, b->sides[from]);
     for (size_t i = from, middle = run_end(b->sides, i, end); middle < end;) {
         size_t to = run_end(b->sides, middle, end);
         double first_share = (double)(middle - i) / (i == from ? 1 : 2);
@@ -169,11 +231,10 @@ static void find_connections(void *user, size_t begin, size_t end, size_t chunk,
     builder *b = user;
     uint32_t place = b->places[chunk];
     if (place == b->places[chunk + 1]) return;
-    size_t from = bucket_begin(b, begin);
     for (size_t v = begin; v < end; ++v)
-        for (size_t last = bucket_begin(b, v + 1), to; from < last; from = to) {
+        for (size_t from = bucket_begin(b, v), last = bucket_begin(b, v + 1), to; from < last; from = to) {
             to = group_end(b->sides, from, last);
-            if (b->opposite[(uint32_t)b->sides[from]] == SEVERAL) place = connect(b, v, from, to, place);
+            if (*across(b, b->sides[from]) == SEVERAL) place = connect(b, v, from, to, place);
         }
 }
 
@@ -213,11 +274,12 @@ static fct_result sort_sides(const fct_env *env, builder *b) {
            chunks = fct_chunk_count(vertices, GRAIN);
     fct_parallel_for(env, faces, GRAIN, count_sides, b);
     uint32_t place = 0;
-    for (size_t v = 0; v < vertices; ++v) { /* begins now, ends when all sides are placed */
-        uint32_t count = atomic_load_explicit(&b->ends[v], memory_order_relaxed);
-        atomic_store_explicit(&b->ends[v], place, memory_order_relaxed);
+    for (size_t v = 0; v <= vertices; ++v) {
+        uint32_t count = atomic_load_explicit(&b->begins[v], memory_order_relaxed);
+        atomic_store_explicit(&b->begins[v], place, memory_order_relaxed);
         place += count;
     }
+    memset(b->sides + place, 0, FEW * sizeof *b->sides);
     fct_parallel_for(env, faces, GRAIN, place_sides, b);
     fct_result result = fct_progress(env, "dual graph", 0.4);
     if (result != FCT_OK) return result;
@@ -263,72 +325,124 @@ static uint32_t insert(neighbor *list, uint32_t count, uint32_t face, float leng
     return count + 1;
 }
 
+/* The list of a face that has a border, the same neighbour twice or connections, of which those from number
+ * `at` on are its own: behind all others if it has any. Returns one past its connections. */
+static uint32_t write_list(const builder *b, size_t f, uint32_t at, const float lengths[3]) {
+    fct_lists *lists = b->lists;
+    neighbor list[9];
+    uint32_t count = 0, first = at, start = 3 * (uint32_t)f;
+    for (uint32_t k = 0; k < 3; ++k)
+        if (lists->neighbors[start + k] < SEVERAL)
+            count = insert(list, count, lists->neighbors[start + k], lengths[k]);
+    for (; at < b->connection_count && b->sorted[at].from == f; ++at)
+        count = insert(list, count, b->sorted[at].to, b->sorted[at].length);
+    memset(lists->neighbors + start, 0, 3 * sizeof *lists->neighbors);
+    if (at > first) {
+        start = 3 * (lists->face_count + first);
+        memset(lists->neighbors + start, 0, 3 * (size_t)(at - first) * sizeof *lists->neighbors);
+    }
+    for (uint32_t k = 0; k < count; ++k)
+        lists->neighbors[start + k] = list[k].face, lists->lengths[start + k] = list[k].length;
+    lists->starts[f] = start, lists->counts[f] = count;
+    return at;
+}
+
+/* Lengths of the three sides of each of four faces. */
+static inline void measure_sides(const builder *b, const uint32_t *triangles[4], float lengths[3][4],
+                                 float perimeters[4]) {
+    d4 corners[3][3], scale = d4_set(b->scale), sum = d4_set(0);
+    for (int c = 0; c < 3; ++c) {
+        const float *p[4];
+        for (int i = 0; i < 4; ++i) p[i] = b->mesh->positions + 3 * (size_t)triangles[i][c];
+        d4_load_points(p, corners[c]);
+    }
+    for (int c = 0; c < 3; ++c) {
+        d4 squares = d4_set(0);
+        for (int k = 0; k < 3; ++k) {
+            d4 d = d4_sub(corners[c == 2 ? 0 : c + 1][k], corners[c][k]);
+            squares = d4_add(squares, d4_mul(d, d));
+        }
+        d4 length = d4_mul(d4_sqrt(squares), scale);
+        d4_store_floats(lengths[c], length);
+        sum = d4_add(sum, length);
+    }
+    d4_store_floats(perimeters, sum);
+}
+
 static void write_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    builder *b = user;
+    const builder *b = user;
     fct_lists *lists = b->lists;
     uint32_t at = first_connection(b, begin);
-    for (size_t f = begin; f < end; ++f) {
-        const uint32_t *t = b->mesh->triangles + 3 * f;
-        neighbor list[9];
-        uint32_t count = 0, start = (uint32_t)(3 * f) + at;
-        double perimeter = 0;
-        for (size_t k = 0; k < 3; ++k) {
-            double length = side_length(b->mesh, t[k], t[k == 2 ? 0 : k + 1]);
-            uint32_t across = b->opposite[3 * f + k];
-            perimeter += length;
-            if (across < SEVERAL) count = insert(list, count, across, (float)length);
+    for (size_t f = begin; f < end;) {
+        const uint32_t *triangles[4];
+        float sides[3][4], perimeters[4];
+        for (size_t i = 0; i < 4; ++i)
+            triangles[i] = b->mesh->triangles + 3 * (f + i < end ? f + i : end - 1);
+        measure_sides(b, triangles, sides, perimeters);
+        for (size_t i = 0; i < 4 && f < end; ++i, ++f) {
+            const uint32_t *n = lists->neighbors + 3 * f;
+            float *lengths = lists->lengths + 3 * f;
+            for (int k = 0; k < 3; ++k) lengths[k] = sides[k][i];
+            lists->perimeters[f] = perimeters[i];
+            lists->starts[f] = (uint32_t)(3 * f), lists->counts[f] = 3;
+            if ((n[0] | n[1] | n[2]) >= SEVERAL || n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
+                at = write_list(b, f, at, (const float[3]){sides[0][i], sides[1][i], sides[2][i]});
         }
-        for (; at < b->connection_count && b->sorted[at].from == f; ++at)
-            count = insert(list, count, b->sorted[at].to, b->sorted[at].length);
-        for (uint32_t k = 0; k < count; ++k)
-            lists->neighbors[start + k] = list[k].face, lists->lengths[start + k] = list[k].length;
-        for (uint32_t unused = start + count; unused < 3 * (uint32_t)(f + 1) + at; ++unused)
-            lists->neighbors[unused] = 0;
-        lists->starts[f] = start, lists->counts[f] = count;
-        lists->perimeters[f] = (float)perimeter;
     }
+}
+
+/* The same neighbors with room for connections behind them. */
+static fct_result make_room(const fct_env *env, const builder *b, size_t room) {
+    fct_lists *lists = b->lists;
+    uint32_t *neighbors = fct_allocate(env, room + FCT_LISTS_SLACK, sizeof *neighbors);
+    if (!neighbors) return fct_fail_memory(env, "the dual graph");
+    memcpy(neighbors, lists->neighbors, 3 * (size_t)lists->face_count * sizeof *neighbors);
+    fct_release(env, lists->neighbors);
+    lists->neighbors = neighbors;
+    return FCT_OK;
 }
 
 static fct_result fill_lists(const fct_env *env, builder *b) {
     fct_lists *lists = b->lists;
-    size_t faces = b->mesh->face_count, room = 3 * faces + b->connection_count;
+    size_t faces = b->mesh->face_count, room = 3 * (faces + b->connection_count);
     fct_release(env, b->sides);
     b->sides = NULL;
+    if (b->connection_count > 0) {
+        fct_result result = make_room(env, b, room);
+        if (result != FCT_OK) return result;
+    }
+    memset(lists->neighbors + room, 0, FCT_LISTS_SLACK * sizeof *lists->neighbors);
     lists->starts = fct_allocate(env, faces, sizeof *lists->starts);
     lists->counts = fct_allocate(env, faces, sizeof *lists->counts);
     lists->perimeters = fct_allocate(env, faces, sizeof *lists->perimeters);
     lists->entry_count = (uint32_t)room;
-    lists->neighbors = fct_allocate(env, room + FCT_LISTS_SLACK, sizeof *lists->neighbors);
     lists->lengths = fct_allocate(env, room, sizeof *lists->lengths);
-    if (room > UINT32_MAX || !lists->starts || !lists->counts || !lists->perimeters || !lists->neighbors ||
-        !lists->lengths)
+    if (room > UINT32_MAX || !lists->starts || !lists->counts || !lists->perimeters || !lists->lengths)
         return fct_fail_memory(env, "the dual graph");
-    memset(lists->neighbors + room, 0, FCT_LISTS_SLACK * sizeof *lists->neighbors);
     fct_parallel_for(env, faces, GRAIN, write_lists, b);
     return fct_progress(env, "dual graph", 1);
 }
 
-fct_result fct_lists_build(const fct_env *env, const fct_mesh *mesh, fct_lists *out) {
+fct_result fct_lists_build(const fct_env *env, const fct_mesh *mesh, double scale, fct_lists *out) {
     size_t faces = mesh->face_count, vertices = mesh->vertex_count, chunks = fct_chunk_count(vertices, GRAIN);
     *out = (fct_lists){.face_count = mesh->face_count};
-    builder b = {.mesh = mesh, .lists = out, .alone = fct_env_threads(env) == 1};
-    b.ends = fct_allocate_zero(env, vertices, sizeof *b.ends);
-    b.sides = fct_allocate(env, faces, 3 * sizeof *b.sides);
-    b.opposite = fct_allocate(env, faces, 3 * sizeof *b.opposite);
+    builder b = {.mesh = mesh, .scale = scale, .lists = out, .alone = fct_env_threads(env) == 1};
+    out->neighbors = fct_allocate(env, 3 * faces + FCT_LISTS_SLACK, sizeof *out->neighbors);
+    b.begins = fct_allocate_zero(env, vertices + 1, sizeof *b.begins);
+    b.sides = fct_allocate(env, 3 * faces + FEW, sizeof *b.sides);
     b.boundary = fct_allocate(env, chunks, sizeof *b.boundary);
     b.nonmanifold = fct_allocate(env, chunks, sizeof *b.nonmanifold);
     b.places = fct_allocate(env, chunks + 1, sizeof *b.places);
     fct_result result;
-    if (3 * faces > UINT32_MAX || !b.ends || !b.sides || !b.opposite || !b.boundary || !b.nonmanifold ||
+    if (4 * faces > UINT32_MAX || !out->neighbors || !b.begins || !b.sides || !b.boundary || !b.nonmanifold ||
         !b.places)
         result = fct_fail_memory(env, "the dual graph");
     else
         result = sort_sides(env, &b);
     if (result == FCT_OK) result = fill_lists(env, &b);
-    fct_release(env, (void *)b.ends);
+    fct_release(env, (void *)b.begins);
     fct_release(env, b.sides);
-    fct_release(env, b.opposite);
     fct_release(env, b.boundary);
     fct_release(env, b.nonmanifold);
     fct_release(env, b.places);

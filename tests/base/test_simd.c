@@ -88,11 +88,37 @@ static void doubles(void **state) {
     for (int i = 0; i < 4; ++i) assert_true(out[i] == sqrt(fabs(q[i])));
     d4_store_floats(narrow, d4_load_floats(a));
     for (int i = 0; i < 4; ++i) assert_true(narrow[i] == a[i]);
+    float both[8];
+    f8_store(both, f8_narrow(x, y));
+    for (int i = 0; i < 8; ++i) assert_true(both[i] == (float)(i < 4 ? p[i] : q[i - 4]));
+}
+
+static void points(void **state) {
+    (void)state;
+    const float *const from[4] = {a + 5, a, a + 3, a + 1};
+    d4 out[3];
+    double row[4];
+    d4_load_points(from, out);
+    for (int k = 0; k < 3; ++k) {
+        d4_store(row, out[k]);
+        for (int i = 0; i < 4; ++i) assert_true(row[i] == (double)from[i][k]);
+    }
+}
+
+static void upper_halves(void **state) {
+    (void)state;
+    uint64_t in[8];
+    uint32_t out[8];
+    for (uint32_t i = 0; i < 8; ++i) in[i] = (uint64_t)(0xFFFFFFF9u + i) << 32 | (i * 0x30000001u);
+    i8_store(out, i8_load_upper(in));
+    for (uint32_t i = 0; i < 8; ++i) assert_true(out[i] == in[i] >> 32);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(floats), cmocka_unit_test(transposing),
-                                       cmocka_unit_test(integers), cmocka_unit_test(choosing),
-                                       cmocka_unit_test(doubles)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(floats),       cmocka_unit_test(transposing), cmocka_unit_test(integers),
+        cmocka_unit_test(choosing),     cmocka_unit_test(doubles),     cmocka_unit_test(points),
+        cmocka_unit_test(upper_halves),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

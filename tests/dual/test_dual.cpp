@@ -185,6 +185,64 @@ void odd_faces(void **) {
     fct_dual_release(&env, &dual);
 }
 
+/* What dual.h promises, edge by edge. */
+void against_brute_force(Soup &soup) {
+    std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> faces; /* of an edge, ascending */
+    std::map<std::pair<uint32_t, uint32_t>, double> expected;
+    for (size_t i = 0; i < soup.triangles.size(); ++i) {
+        uint32_t u = soup.triangles[i], v = soup.triangles[i % 3 == 2 ? i - 2 : i + 1];
+        if (u != v) faces[std::minmax(u, v)].push_back((uint32_t)(i / 3));
+    }
+    uint32_t border = 0, nonmanifold = 0;
+    for (auto &edge : faces) {
+        const float *p = &soup.positions[3 * edge.first.first], *q = &soup.positions[3 * edge.first.second];
+        double length =
+            std::sqrt(std::pow((double)p[0] - (double)q[0], 2) + std::pow((double)p[1] - (double)q[1], 2) +
+                      std::pow((double)p[2] - (double)q[2], 2));
+        std::vector<uint32_t> sides = edge.second, chain = sides;
+        chain.erase(std::unique(chain.begin(), chain.end()), chain.end());
+        border += chain.size() == 1;
+        nonmanifold += chain.size() > 2;
+        for (size_t i = 0; i + 1 < chain.size(); ++i) {
+            double share[2];
+            for (size_t k = 0; k < 2; ++k)
+                share[k] = (double)std::count(sides.begin(), sides.end(), chain[i + k]) /
+                           (i + k > 0 && i + k + 1 < chain.size() ? 2 : 1);
+            expected[{chain[i], chain[i + 1]}] += length * std::min(share[0], share[1]);
+        }
+    }
+    fct_env env = fct_env_default();
+    fct_dual dual = build(soup);
+    assert_int_equal(dual.edge_count, expected.size());
+    assert_int_equal(dual.boundary_edges, border);
+    assert_int_equal(dual.nonmanifold_edges, nonmanifold);
+    uint32_t e = 0;
+    for (const auto &pair : expected) {
+        assert_int_equal(dual.edges[2 * e], pair.first.first);
+        assert_int_equal(dual.edges[2 * e + 1], pair.first.second);
+        assert_true(std::fabs((double)dual.lengths[e++] - pair.second) < 1e-5 * (1 + pair.second));
+    }
+    shares_are_bounded(dual);
+    fct_dual_release(&env, &dual);
+}
+
+/* Few vertices and many faces: edges of many faces, faces of one vertex twice, duplicates; many vertices and
+ * few faces: loose ones; and all between. */
+void random_soups(void **) {
+    uint32_t state = 1;
+    auto random = [&state](uint32_t count) {
+        state = state * 1664525u + 1013904223u;
+        return (uint32_t)((uint64_t)state * count >> 32);
+    };
+    for (uint32_t run = 0; run < 400; ++run) {
+        Soup soup;
+        uint32_t vertices = 2 + random(60), faces = 1 + random(200);
+        for (uint32_t v = 0; v < vertices; ++v) soup.vertex(random(100), random(100), random(100));
+        for (uint32_t f = 0; f < faces; ++f) soup.face(random(vertices), random(vertices), random(vertices));
+        against_brute_force(soup);
+    }
+}
+
 void *fail_nth(void *user, size_t size) {
     long *state = static_cast<long *>(user); /* counts down; alive */
     if (--state[0] == 0) return nullptr;
@@ -224,6 +282,7 @@ void survives_no_memory(void **) {
 
 int main() {
     const struct CMUnitTest tests[] = {cmocka_unit_test(against_openmesh), cmocka_unit_test(pages_of_a_book),
-                                       cmocka_unit_test(odd_faces), cmocka_unit_test(survives_no_memory)};
+                                       cmocka_unit_test(odd_faces), cmocka_unit_test(random_soups),
+                                       cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
