@@ -239,7 +239,7 @@ static fct_result join_parts(joiner *j, const fct_mesh *mesh, part *scratch, uin
             j->parts[i++] = (part){{INFINITY, INFINITY, INFINITY},
                                    {-INFINITY, -INFINITY, -INFINITY},
                                    f,
-                                   work->counts[f],
+                                   work->records[f].count,
                                    work->heights[f]};
     fct_result result = bound_parts(j, mesh);
     if (result != FCT_OK) return result;

@@ -116,7 +116,7 @@ static void price_eight(const fct_rounds *r, const edge_queue *queue, uint32_t a
     uint32_t *keys = r->now.keys, faces[FCT_LANES], new_keys[FCT_LANES], ties[FCT_LANES];
     float costs[FCT_LANES];
     for (uint32_t k = 0; k < FCT_LANES; ++k)
-        faces[k] = r->work->counts[pairs[k].a] + r->work->counts[pairs[k].b];
+        faces[k] = r->work->records[pairs[k].a].count + r->work->records[pairs[k].b].count;
     fct_metric_costs(&r->work->metric, r->work->records, r->work->directions, pairs, FCT_LANES, costs);
     i8_store(new_keys, keys_of(costs, faces));
     i8_store(ties, ties_of(r->round, i8_load(queue->clusters + at), i8_load(queue->others + at)));
