@@ -465,6 +465,7 @@ static fct_result enter_edges(fct_rounds *r) {
         }
     fct_release(work->env, work->edges);
     work->edges = NULL, work->edge_count = 0;
+    r->fresh = true;
     return FCT_OK;
 }
 
