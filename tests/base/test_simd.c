@@ -14,6 +14,8 @@ static void floats(void **state) {
     for (int i = 0; i < 8; ++i) assert_true(out[i] == (a[i] < b[i] ? 1 : 2));
     f8_store(out, f8_sqrt(f8_abs(x)));
     for (int i = 0; i < 8; ++i) assert_true(out[i] == sqrtf(fabsf(a[i])));
+    f8_store(out, f8_swap(x));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == a[(i + 4) % 8]);
     f8_store(out, f8_max(f8_set(NAN), x)); /* the second where one is not a number */
     for (int i = 0; i < 8; ++i) assert_true(out[i] == a[i]);
 }
@@ -48,6 +50,14 @@ static void integers(void **state) {
         i8_store(out, i8_insert(i8_load(u), at, i8_set(77)));
         for (uint32_t i = 0; i < 8; ++i) assert_int_equal(out[i], i == at ? 77 : u[i]);
     }
+}
+
+static void truncating(void **state) {
+    (void)state;
+    const float in[8] = {0, 0.99f, 1, 15.5f, -0.5f, -3.99f, 16777216, 2e9f};
+    uint32_t out[8];
+    i8_store(out, i8_trunc(f8_load(in)));
+    for (int i = 0; i < 8; ++i) assert_int_equal((int32_t)out[i], (int32_t)in[i]);
 }
 
 static void doubles(void **state) {
@@ -91,8 +101,9 @@ static void upper_halves(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(floats),   cmocka_unit_test(transposing),
-                                       cmocka_unit_test(integers), cmocka_unit_test(doubles),
-                                       cmocka_unit_test(points),   cmocka_unit_test(upper_halves)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(floats),      cmocka_unit_test(transposing),
+                                       cmocka_unit_test(integers),    cmocka_unit_test(truncating),
+                                       cmocka_unit_test(doubles),     cmocka_unit_test(points),
+                                       cmocka_unit_test(upper_halves)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
