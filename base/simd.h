@@ -165,11 +165,6 @@ static inline i8 i8_load_upper(const uint64_t *p) {
 static inline i8 i8_trunc(f8 a) {
     return _mm256_cvttps_epi32(a);
 }
-/* a with `value` in lane `at`, 0 to 7; elsewhere nothing changes, for any other `at` nothing at all. */
-static inline i8 i8_insert(i8 a, uint32_t at, i8 value) {
-    __m256i lane = _mm256_cmpeq_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_epi32((int)at));
-    return _mm256_blendv_epi8(a, value, lane);
-}
 static inline i8 i8_shift_right(i8 a, int bits) {
     return _mm256_srli_epi32(a, bits);
 }
@@ -184,12 +179,61 @@ static inline uint32_t i8_eq(i8 a, i8 b) {
 static inline uint32_t i8_lt(i8 a, i8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(b, a)));
 }
-/* The least of the eight as unsigned numbers. */
-static inline uint32_t i8_least(i8 a) {
-    __m128i b = _mm_min_epu32(_mm256_castsi256_si128(a), _mm256_extracti128_si256(a, 1));
-    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0x4E));
-    b = _mm_min_epu32(b, _mm_shuffle_epi32(b, 0xB1));
-    return (uint32_t)_mm_cvtsi128_si32(b);
+static inline i8 i8_add(i8 a, i8 b) {
+    return _mm256_add_epi32(a, b);
+}
+static inline i8 i8_and(i8 a, i8 b) {
+    return _mm256_and_si256(a, b);
+}
+static inline i8 i8_xor(i8 a, i8 b) {
+    return _mm256_xor_si256(a, b);
+}
+/* The lower 32 bits of each product. */
+static inline i8 i8_mul(i8 a, i8 b) {
+    return _mm256_mullo_epi32(a, b);
+}
+/* The bits of eight floats. */
+static inline i8 i8_bits(f8 a) {
+    return _mm256_castps_si256(a);
+}
+/* Each as the nearest float, all below 2^31. */
+static inline f8 f8_from(i8 a) {
+    return _mm256_cvtepi32_ps(a);
+}
+/* a & ~b */
+static inline i8 i8_without(i8 a, i8 b) {
+    return _mm256_andnot_si256(b, a);
+}
+/* Lanes of all ones where a_i == b_i, else of 0. */
+static inline i8 i8_same(i8 a, i8 b) {
+    return _mm256_cmpeq_epi32(a, b);
+}
+/* Lanes of all ones where a_i < b_i, both below 2^31. */
+static inline i8 i8_less(i8 a, i8 b) {
+    return _mm256_cmpgt_epi32(b, a);
+}
+/* x where the lane of the mask is all ones, else 0. */
+static inline f8 f8_only(f8 x, i8 mask) {
+    return _mm256_and_ps(x, _mm256_castsi256_ps(mask));
+}
+/* a where the lane of the mask is all ones, b where it is 0. */
+static inline i8 i8_if(i8 mask, i8 a, i8 b) {
+    return _mm256_blendv_epi8(b, a, mask);
+}
+static inline f8 f8_if(i8 mask, f8 a, f8 b) {
+    return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(mask));
+}
+/* Bit i: a_i <= b_i as unsigned numbers. */
+static inline uint32_t i8_no_more(i8 a, i8 b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_min_epu32(a, b), a)));
+}
+/* a[index_i]; the lowest three bits of the index count. */
+static inline i8 i8_lookup8(i8 a, i8 index) {
+    return _mm256_permutevar8x32_epi32(a, index);
+}
+/* table[index_i], each below 2^31 */
+static inline i8 i8_gather(const uint32_t *table, i8 index) {
+    return _mm256_i32gather_epi32((const int *)(const void *)table, index, 4);
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
@@ -360,10 +404,6 @@ static inline i8 i8_trunc(f8 a) {
     for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)a.v[i];
     return r;
 }
-static inline i8 i8_insert(i8 a, uint32_t at, i8 value) {
-    if (at < 8) a.v[at] = value.v[at];
-    return a;
-}
 static inline i8 i8_shift_right(i8 a, int bits) {
     for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] >> bits);
     return a;
@@ -378,10 +418,69 @@ static inline uint32_t i8_eq(i8 a, i8 b) {
 static inline uint32_t i8_lt(i8 a, i8 b) {
     FCT_M8(a.v[i] < b.v[i]);
 }
-static inline uint32_t i8_least(i8 a) {
-    uint32_t least = UINT32_MAX;
-    for (int i = 0; i < 8; ++i) least = (uint32_t)a.v[i] < least ? (uint32_t)a.v[i] : least;
-    return least;
+static inline i8 i8_add(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] + (uint32_t)b.v[i]);
+    return a;
+}
+static inline i8 i8_and(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] &= b.v[i];
+    return a;
+}
+static inline i8 i8_xor(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] ^= b.v[i];
+    return a;
+}
+static inline i8 i8_mul(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = (int32_t)((uint32_t)a.v[i] * (uint32_t)b.v[i]);
+    return a;
+}
+static inline i8 i8_bits(f8 a) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) {
+        union {
+            float f;
+            int32_t bits;
+        } u = {a.v[i]};
+        r.v[i] = u.bits;
+    }
+    return r;
+}
+static inline f8 f8_from(i8 a) {
+    FCT_F8((float)a.v[i]);
+}
+static inline i8 i8_without(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] &= ~b.v[i];
+    return a;
+}
+static inline i8 i8_same(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = a.v[i] == b.v[i] ? -1 : 0;
+    return a;
+}
+static inline i8 i8_less(i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = a.v[i] < b.v[i] ? -1 : 0;
+    return a;
+}
+static inline f8 f8_only(f8 x, i8 mask) {
+    FCT_F8(mask.v[i] ? x.v[i] : 0);
+}
+static inline i8 i8_if(i8 mask, i8 a, i8 b) {
+    for (int i = 0; i < 8; ++i) a.v[i] = mask.v[i] ? a.v[i] : b.v[i];
+    return a;
+}
+static inline f8 f8_if(i8 mask, f8 a, f8 b) {
+    FCT_F8(mask.v[i] ? a.v[i] : b.v[i]);
+}
+static inline uint32_t i8_no_more(i8 a, i8 b) {
+    FCT_M8((uint32_t)a.v[i] <= (uint32_t)b.v[i]);
+}
+static inline i8 i8_lookup8(i8 a, i8 index) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = a.v[index.v[i] & 7];
+    return r;
+}
+static inline i8 i8_gather(const uint32_t *table, i8 index) {
+    for (int i = 0; i < 8; ++i) index.v[i] = (int32_t)table[(uint32_t)index.v[i]];
+    return index;
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     i8 r;

@@ -75,7 +75,7 @@ static bool look_up(const grafter *g, uint32_t face, uint32_t root, uint32_t slo
     uint32_t top = path[length - 1];
     if (top == root) return false;
     const fct_work *work = g->work;
-    uint32_t limit = fct_height_limit(work->counts[slot] + work->counts[g->slots[top]], false);
+    uint32_t limit = fct_height_limit(work->records[slot].count + work->records[g->slots[top]].count, false);
     uint32_t own = g->heights[root];
     for (uint32_t depth = 0; depth < length && depth < best->depth; ++depth) {
         uint32_t node = path[length - 1 - depth], height = g->heights[node];
@@ -196,7 +196,7 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
     fct_result result = link_faces(g, mesh);
     if (result != FCT_OK) return result;
     for (uint32_t s = 0; s < work->face_count; ++s)
-        if (work->nodes[s] != FCT_NONE) keys[count] = work->counts[s], order[count++] = s;
+        if (work->nodes[s] != FCT_NONE) keys[count] = work->records[s].count, order[count++] = s;
     result = fct_sort_pairs(work->env, keys, order, count);
     /* again while it helps: hosts that have grown may be taller */
     for (uint32_t before = 0; result == FCT_OK && count != before;) {

@@ -27,7 +27,7 @@ typedef struct greedy {
 
 static uint64_t edge_key(const greedy *g, uint32_t e) {
     const fct_edge *edge = &g->edges[e];
-    uint32_t faces = g->work->counts[edge->a] + g->work->counts[edge->b];
+    uint32_t faces = g->work->records[edge->a].count + g->work->records[edge->b].count;
     uint64_t size = 31 - (uint32_t)__builtin_clz(faces), hash = (uint32_t)(e * 2654435769u) >> 5;
     uint64_t cost = fct_float_key(g->costs[e]);
     return g->work->balanced ? (uint64_t)faces << 32 | cost : cost << 32 | size << 27 | hash;

@@ -103,7 +103,7 @@ static void bound_parts(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) {
         part *p = &j->parts[i];
         for (int k = 0; k < 8; ++k) p->box[k] = k % 4 < 3 ? INFINITY : 0;
-        p->count = work->counts[p->slot], p->height = work->heights[p->slot];
+        p->count = work->records[p->slot].count, p->height = work->heights[p->slot];
         p->excess = (float)p->height - (p->count > 1 ? (float)log2(p->count) : 0);
         uint32_t stack[STACK], depth = 0;
         stack[depth++] = work->nodes[p->slot];

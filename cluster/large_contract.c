@@ -23,17 +23,15 @@ static fct_result open_work(const fct_env *env, const fct_metric *metric, const 
     *work = (fct_work){.env = env, .metric = *metric, .face_count = count};
     work->records = fct_allocate(env, count, sizeof *work->records);
     if (directions) work->directions = fct_allocate(env, count, sizeof *work->directions);
-    work->counts = fct_allocate(env, count, sizeof *work->counts);
     work->heights = fct_allocate(env, count, sizeof *work->heights);
     work->nodes = fct_allocate(env, count, sizeof *work->nodes);
     work->children = fct_allocate(env, count, sizeof *work->children);
     work->costs = fct_allocate(env, count, sizeof *work->costs);
-    if (!work->records || (directions && !work->directions) || !work->counts || !work->heights ||
-        !work->nodes || !work->children || !work->costs)
+    if (!work->records || (directions && !work->directions) || !work->heights || !work->nodes ||
+        !work->children || !work->costs)
         return fct_fail_memory(env, "the clusters of all parts");
     for (uint32_t i = 0; i < count; ++i) {
         work->records[i] = tops[i].record;
-        work->counts[i] = tops[i].count;
         work->heights[i] = tops[i].height;
         work->nodes[i] = i;
     }

@@ -36,7 +36,9 @@ fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
 /* Records turned on their side: one field of eight clusters in each vector. */
 typedef union lanes {
     struct {
-        f8 covariance[6], centroid[3], weight, vector[3], area, perimeter, fit;
+        f8 covariance[6], centroid[3];
+        i8 count;
+        f8 vector[3], area, perimeter, fit;
     };
     f8 rows[16];
 } lanes;
@@ -113,7 +115,7 @@ void fct_metric_faces(const fct_metric *metric, const float *positions, const ui
         out.vector[k] = f8_narrow(sums[0].vector[k], sums[1].vector[k]);
     }
     out.area = f8_narrow(sums[0].area, sums[1].area);
-    out.weight = metric->measure == FCT_FIT_POINTS ? f8_set(3) : out.area;
+    out.count = i8_set(1);
     out.perimeter = f8_load(borders);
     out.fit = f8_set(0);
     f8_transpose(out.rows);
@@ -153,11 +155,17 @@ static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
     return f8_load(shared);
 }
 
+/* The whole measure: the area, or the number of points. */
+static inline f8 weight_of(const fct_metric *metric, const lanes *l) {
+    return metric->measure == FCT_FIT_AREA ? l->area : f8_mul(f8_set(3), f8_from(l->count));
+}
+
 /* 1 over the union's area, and over its weight, which is the same where the measure is the area. */
 static inline void invert(const fct_metric *metric, const lanes *a, const lanes *b, f8 *area, f8 *weight) {
     f8 one = f8_set(1);
     *area = *weight = f8_div(one, at_least(f8_add(a->area, b->area), TINY));
-    if (metric->measure == FCT_FIT_POINTS) *weight = f8_div(one, f8_add(a->weight, b->weight));
+    if (metric->measure == FCT_FIT_POINTS)
+        *weight = f8_div(one, f8_add(weight_of(metric, a), weight_of(metric, b)));
 }
 
 /* (8.17) from perimeters and the shares of the union's area: worst / g = max(pa^2 / a, pb^2 / b) / p^2. */
@@ -172,10 +180,11 @@ static inline f8 shape_error(const lanes *a, const lanes *b, const lanes *u, f8 
 }
 
 /* Sums of the union about its own centroid; all but its fit. */
-static inline void join(const lanes *a, const lanes *b, f8 shared, f8 invert_weight, lanes *u) {
-    f8 d[3], weight = f8_add(a->weight, b->weight), none = f8_set(0);
-    f8 share = f8_if_lt(none, weight, f8_mul(b->weight, invert_weight), f8_set(0.5f));
-    f8 k = f8_mul(a->weight, share);
+static inline void join(const fct_metric *metric, const lanes *a, const lanes *b, f8 shared, f8 invert_weight,
+                        lanes *u) {
+    f8 d[3], wa = weight_of(metric, a), wb = weight_of(metric, b), none = f8_set(0);
+    f8 share = f8_if_lt(none, f8_add(wa, wb), f8_mul(wb, invert_weight), f8_set(0.5f));
+    f8 k = f8_mul(wa, share);
     for (int i = 0; i < 3; ++i) {
         d[i] = f8_sub(b->centroid[i], a->centroid[i]);
         u->centroid[i] = f8_mad(a->centroid[i], share, d[i]);
@@ -185,7 +194,7 @@ static inline void join(const lanes *a, const lanes *b, f8 shared, f8 invert_wei
     for (int i = 0; i < 6; ++i)
         u->covariance[i] =
             f8_mad(f8_add(a->covariance[i], b->covariance[i]), f8_mul(k, d[rows[i]]), d[columns[i]]);
-    u->weight = weight;
+    u->count = i8_add(a->count, b->count);
     u->area = f8_add(a->area, b->area);
     u->perimeter = f8_max(f8_sub(f8_add(a->perimeter, b->perimeter), f8_twice(shared)), none);
 }
@@ -253,7 +262,7 @@ static void mean_costs(const fct_metric *metric, const lanes *u, f8 shape, const
                        const fct_pair *pairs, uint32_t count, float *costs) {
     float fields[10][FCT_LANES];
     for (int i = 0; i < 6; ++i) f8_store(fields[i], u->covariance[i]);
-    f8_store(fields[6], u->weight);
+    f8_store(fields[6], weight_of(metric, u));
     f8_store(fields[7], shape);
     for (uint32_t lane = 0; lane < count; ++lane) {
         const fct_direction *da = &directions[pairs[lane].a], *db = &directions[pairs[lane].b];
@@ -292,7 +301,7 @@ void fct_metric_costs(const fct_metric *metric, const fct_record *records, const
     load_lanes(records, pairs, count, false, &a);
     load_lanes(records, pairs, count, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
-    join(&a, &b, load_shared(pairs, count), invert_weight, &u);
+    join(metric, &a, &b, load_shared(pairs, count), invert_weight, &u);
     f8 shape = shape_error(&a, &b, &u, invert_area);
     if (metric->cost == FCT_COST_MEAN) {
         mean_costs(metric, &u, shape, directions, pairs, count, costs);
@@ -315,7 +324,7 @@ void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direct
     load_lanes(records, pairs, count, false, &a);
     load_lanes(records, pairs, count, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
-    join(&a, &b, load_shared(pairs, count), invert_weight, &u);
+    join(metric, &a, &b, load_shared(pairs, count), invert_weight, &u);
     u.fit = total_fit(metric, &u, invert_area, invert_weight);
     f8_transpose(u.rows);
     f8_transpose(u.rows + 8);

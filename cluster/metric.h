@@ -13,7 +13,7 @@
 typedef struct fct_record {
     float covariance[6]; /* sum over the fit measure of (x - centroid)(x - centroid)^T */
     float centroid[3];   /* of the fit measure */
-    float weight;        /* the whole measure: the area, or the number of points */
+    uint32_t count;      /* of faces */
     float vector[3];     /* S = sum A_k n_k */
     float area;          /* sum A_k */
     float perimeter;

@@ -68,7 +68,7 @@ static void make_records(void *user, size_t begin, size_t end, size_t chunk, uin
                          end - f < FCT_LANES ? (uint32_t)(end - f) : FCT_LANES, work->records + f);
     for (size_t f = begin; f < end && work->directions; ++f)
         fct_metric_direction(&work->metric, positions, job->mesh->triangles + 3 * f, &work->directions[f]);
-    for (size_t f = begin; f < end; ++f) work->counts[f] = 1, work->nodes[f] = (uint32_t)f;
+    for (size_t f = begin; f < end; ++f) work->nodes[f] = (uint32_t)f;
     memset(work->heights + begin, 0, end - begin);
 }
 
@@ -77,13 +77,12 @@ static fct_result allocate_clusters(fct_work *work, bool directions) {
     size_t faces = work->face_count;
     work->records = fct_allocate(env, faces, sizeof *work->records);
     if (directions) work->directions = fct_allocate(env, faces, sizeof *work->directions);
-    work->counts = fct_allocate(env, faces, sizeof *work->counts);
     work->heights = fct_allocate(env, faces, sizeof *work->heights);
     work->nodes = fct_allocate(env, faces, sizeof *work->nodes);
     work->children = fct_allocate(env, faces, sizeof *work->children);
     work->costs = fct_allocate(env, faces, sizeof *work->costs);
-    bool complete = work->records && (!directions || work->directions) && work->counts && work->heights &&
-                    work->nodes && work->children && work->costs;
+    bool complete = work->records && (!directions || work->directions) && work->heights && work->nodes &&
+                    work->children && work->costs;
     return complete ? FCT_OK : fct_fail_memory(env, "clustering");
 }
 
@@ -114,12 +113,11 @@ fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_t
 void fct_work_release_clusters(fct_work *work) {
     fct_release(work->env, work->records);
     fct_release(work->env, work->directions);
-    fct_release(work->env, work->counts);
     fct_release(work->env, work->heights);
     fct_release(work->env, work->nodes);
     fct_release(work->env, work->edges);
     fct_lists_release(work->env, &work->lists);
-    work->records = NULL, work->directions = NULL, work->counts = NULL, work->heights = NULL;
+    work->records = NULL, work->directions = NULL, work->heights = NULL;
     work->nodes = NULL, work->edges = NULL, work->edge_count = 0;
 }
 
@@ -134,7 +132,7 @@ void fct_work_release(fct_work *work) {
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
     uint32_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
     return taller < FCT_FREE_HEIGHT ||
-           taller + 1 <= fct_height_limit(work->counts[a] + work->counts[b], !work->steep);
+           taller + 1 <= fct_height_limit(work->records[a].count + work->records[b].count, !work->steep);
 }
 
 void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
@@ -144,7 +142,6 @@ void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, cons
         work->children[merge][0] = work->nodes[a];
         work->children[merge][1] = work->nodes[b];
         work->costs[merge] = costs[i];
-        work->counts[a] += work->counts[b];
         uint8_t taller = work->heights[a] > work->heights[b] ? work->heights[a] : work->heights[b];
         work->heights[a] = (uint8_t)(taller + 1);
         work->nodes[a] = work->face_count + merge;

@@ -19,7 +19,6 @@ typedef struct fct_work {
     /* per slot */
     fct_record *records;
     fct_direction *directions; /* MEAN only */
-    uint32_t *counts;          /* faces */
     uint8_t *heights;          /* of the subtree */
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
     bool steep;                /* the reserve of height may be used */

@@ -41,15 +41,39 @@ static void integers(void **state) {
                    v[8] = {5, 1, 4, 6, 2, 9, 8, 1};
     uint32_t out[8];
     assert_int_equal(i8_eq(i8_load(u), i8_load(v)), 0x21);
-    assert_int_equal(i8_least(i8_load(u)), 3);
-    assert_int_equal(i8_least(i8_set(0xFFFFFFFE)), 0xFFFFFFFE);
+    assert_int_equal(i8_no_more(i8_load(u), i8_load(v)), 0x2D);
     assert_int_equal(i8_lt(i8_load(v), i8_set(5)), 0x96);
     i8_store(out, i8_or(i8_shift_right(i8_load(u), 5), i8_set(1)));
     for (int i = 0; i < 8; ++i) assert_int_equal(out[i], u[i] >> 5 | 1);
-    for (uint32_t at = 0; at < 20; ++at) {
-        i8_store(out, i8_insert(i8_load(u), at, i8_set(77)));
-        for (uint32_t i = 0; i < 8; ++i) assert_int_equal(out[i], i == at ? 77 : u[i]);
-    }
+}
+
+/* Masks, and lanes that change places. */
+static void choosing(void **state) {
+    (void)state;
+    const uint32_t u[8] = {5, 0xFFFFFFFF, 3, 6, 0, 9, 12, 5}, v[8] = {5, 1, 4, 6, 2, 9, 8, 1};
+    const uint32_t order[8] = {7, 0, 1, 10, 3, 4, 5, 6}, places[8] = {3, 3, 0, 9, 1, 4, 2, 8};
+    uint32_t table[10], out[8];
+    float chosen[8];
+    for (uint32_t i = 0; i < 10; ++i) table[i] = 0xF0000000u + i;
+    i8 x = i8_load(u), y = i8_load(v), same = i8_same(x, y);
+    i8_store(out, same);
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], u[i] == v[i] ? 0xFFFFFFFF : 0);
+    i8_store(out, i8_less(y, i8_set(5)));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], v[i] < 5 ? 0xFFFFFFFF : 0);
+    i8_store(out, i8_if(same, i8_add(x, y), i8_without(x, y)));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], u[i] == v[i] ? u[i] + v[i] : u[i] & ~v[i]);
+    i8_store(out, i8_and(i8_lookup8(x, i8_load(order)), i8_set(7)));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], u[order[i] & 7] & 7);
+    i8_store(out, i8_gather(table, i8_load(places)));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], table[places[i]]);
+    i8_store(out, i8_xor(i8_mul(x, i8_set(0x10000001)), y));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], (u[i] * 0x10000001u) ^ v[i]);
+    i8_store(out, i8_shift_right(i8_bits(f8_from(i8_add(y, i8_set(8)))), 23));
+    for (int i = 0; i < 8; ++i) assert_int_equal(out[i], v[i] < 8 ? 130 : 131);
+    f8_store(chosen, f8_only(f8_load(a), same));
+    for (int i = 0; i < 8; ++i) assert_true(chosen[i] == (u[i] == v[i] ? a[i] : 0));
+    f8_store(chosen, f8_if(same, f8_load(a), f8_load(b)));
+    for (int i = 0; i < 8; ++i) assert_true(chosen[i] == (u[i] == v[i] ? a[i] : b[i]));
 }
 
 static void truncating(void **state) {
@@ -101,9 +125,10 @@ static void upper_halves(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(floats),      cmocka_unit_test(transposing),
-                                       cmocka_unit_test(integers),    cmocka_unit_test(truncating),
-                                       cmocka_unit_test(doubles),     cmocka_unit_test(points),
-                                       cmocka_unit_test(upper_halves)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(floats),       cmocka_unit_test(transposing), cmocka_unit_test(integers),
+        cmocka_unit_test(choosing),     cmocka_unit_test(doubles),     cmocka_unit_test(points),
+        cmocka_unit_test(upper_halves), cmocka_unit_test(truncating),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
