@@ -20,7 +20,6 @@ typedef struct orderer {
     fct_work *work;
     const fct_mesh *mesh;
     fct_tree *tree;
-    bool alone;                   /* one thread: counters need no lock */
     uint64_t *sorted;             /* by rank: cost << 32 | merge */
     uint32_t *ranks;              /* of merges */
     uint32_t *counts, *firsts;    /* per merge: faces, and the place of the first */
@@ -158,13 +157,10 @@ static void copy_triangles(void *user, size_t begin, size_t end, size_t chunk, u
             uint32_t v = *from++, corner = (uint32_t)i;
             o->tree->triangles[i] = v;
             uint32_t first = atomic_load_explicit(&o->first_uses[v], memory_order_relaxed);
-            if (corner < first && o->alone)
-                atomic_store_explicit(&o->first_uses[v], corner, memory_order_relaxed);
-            else
-                while (corner < first &&
-                       !atomic_compare_exchange_weak_explicit(&o->first_uses[v], &first, corner,
-                                                              memory_order_relaxed, memory_order_relaxed))
-                    continue;
+            while (corner < first &&
+                   !atomic_compare_exchange_weak_explicit(&o->first_uses[v], &first, corner,
+                                                          memory_order_relaxed, memory_order_relaxed))
+                continue;
         }
         if (o->tree->materials) o->tree->materials[f] = o->mesh->materials[o->tree->face_ids[f]];
     }
@@ -210,10 +206,30 @@ static void copy_vertices(void *user, size_t begin, size_t end, size_t chunk, ui
     }
 }
 
-/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
-static void copy_mesh(const fct_env *env, orderer *o) {
+/* What the four passes above do, in one, where there is one thread; returns how many vertices are used. */
+static uint32_t copy_alone(const orderer *o) {
+    const fct_tree *tree = o->tree;
+    uint32_t used = 0;
+    memset(o->renamed, 0xFF, (size_t)o->mesh->vertex_count * sizeof *o->renamed);
+    for (size_t f = 0; f < o->mesh->face_count; ++f) {
+        const uint32_t *from = o->mesh->triangles + 3 * (size_t)tree->face_ids[f];
+        for (size_t k = 0; k < 3; ++k) {
+            uint32_t *renamed = &o->renamed[from[k]];
+            if (*renamed == FCT_NONE) {
+                tree->vertex_ids[used] = from[k];
+                *renamed = used++;
+            }
+            tree->triangles[3 * f + k] = *renamed;
+        }
+        if (tree->materials) tree->materials[f] = o->mesh->materials[tree->face_ids[f]];
+    }
+    return used;
+}
+
+static uint32_t copy_side_by_side(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
     memset((void *)o->first_uses, 0xFF, vertices * sizeof *o->first_uses);
+    memset(o->renamed, 0xFF, vertices * sizeof *o->renamed);
     fct_parallel_for(env, faces, GRAIN, copy_triangles, o);
     fct_parallel_for(env, faces, GRAIN, count_first_uses, o);
     uint32_t used = 0;
@@ -224,9 +240,15 @@ static void copy_mesh(const fct_env *env, orderer *o) {
     }
     fct_parallel_for(env, faces, GRAIN, rename_vertices, o);
     fct_parallel_for(env, faces, GRAIN, rename_corners, o);
+    return used;
+}
+
+/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
+static void copy_mesh(const fct_env *env, orderer *o) {
+    size_t vertices = o->mesh->vertex_count;
+    uint32_t used = fct_env_threads(env) == 1 ? copy_alone(o) : copy_side_by_side(env, o);
     for (uint32_t v = 0; used < vertices; ++v)
-        if (atomic_load_explicit(&o->first_uses[v], memory_order_relaxed) == FCT_NONE)
-            o->tree->vertex_ids[used++] = v;
+        if (o->renamed[v] == FCT_NONE) o->tree->vertex_ids[used++] = v;
     fct_parallel_for(env, vertices, GRAIN, copy_vertices, o);
 }
 
@@ -320,7 +342,7 @@ static fct_result order_vertices(const fct_env *env, orderer *o) {
 
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree) {
     const fct_env *env = work->env;
-    orderer o = {.work = work, .mesh = mesh, .tree = tree, .alone = fct_env_threads(env) == 1};
+    orderer o = {.work = work, .mesh = mesh, .tree = tree};
     fct_work_release_clusters(work);
     fct_result result = rank_merges(env, &o);
     if (result == FCT_OK) result = fct_progress(env, "order", 0.3);
