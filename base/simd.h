@@ -115,6 +115,10 @@ static inline f8 f8_sqrt(f8 a) {
 static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
     return _mm256_blendv_ps(y, x, _mm256_cmp_ps(a, b, _CMP_LT_OQ));
 }
+/* The lower four behind the upper four. */
+static inline f8 f8_swap(f8 a) {
+    return _mm256_permute2f128_ps(a, a, 1);
+}
 /* Rows to columns of an 8 x 8 matrix. */
 static inline void f8_transpose(f8 m[8]) {
     f8 a[8], b[8];
@@ -156,6 +160,10 @@ static inline i8 i8_load_upper(const uint64_t *p) {
     f8 a = _mm256_loadu_ps((const float *)(const void *)p);
     f8 b = _mm256_loadu_ps((const float *)(const void *)(p + 4));
     return _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(a, b, 0xDD)), 0xD8);
+}
+/* Rounded towards zero; each below 2^31 in size. */
+static inline i8 i8_trunc(f8 a) {
+    return _mm256_cvttps_epi32(a);
 }
 static inline i8 i8_shift_right(i8 a, int bits) {
     return _mm256_srli_epi32(a, bits);
@@ -354,6 +362,9 @@ static inline f8 f8_sqrt(f8 a) {
 static inline f8 f8_if_lt(f8 a, f8 b, f8 x, f8 y) {
     FCT_F8(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
 }
+static inline f8 f8_swap(f8 a) {
+    FCT_F8(a.v[(i + 4) & 7]);
+}
 static inline void f8_transpose(f8 m[8]) {
     for (int i = 0; i < 8; ++i)
         for (int k = 0; k < i; ++k) {
@@ -386,6 +397,11 @@ static inline void i8_store(uint32_t *p, i8 a) {
 static inline i8 i8_load_upper(const uint64_t *p) {
     i8 r;
     for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)(p[i] >> 32);
+    return r;
+}
+static inline i8 i8_trunc(f8 a) {
+    i8 r;
+    for (int i = 0; i < 8; ++i) r.v[i] = (int32_t)a.v[i];
     return r;
 }
 static inline i8 i8_shift_right(i8 a, int bits) {

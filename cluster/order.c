@@ -3,8 +3,9 @@
  * Each merge's cost becomes the running maximum over its subtree, and no less than that of any merge of an
  * earlier phase; a stable radix sort by it then keeps children before parents. Inner node M - 1 - i is the
  * merge of rank i. Ranges are handed down from the roots, which places the faces; vertices are numbered in
- * order of first use by the faces, so that a cluster's new vertices are one run. Links and costs stay in
- * arrays of their own: nodes are written once, when they are described.
+ * order of first use by the faces, so that a cluster's new vertices are one run. What goes up or down the
+ * tree goes by merge, for those found together lie near each other; by node they would be anywhere. Links and
+ * costs stay in arrays of their own: nodes are written once, when they are described.
  */
 #include <stdatomic.h>
 #include <string.h>
@@ -15,33 +16,37 @@
 
 enum { GRAIN = 1 << 13 };
 
-/* Raises costs so that they never fall from child to parent or from phase to phase. */
-static void make_monotone(fct_work *work) {
-    float floor = -INFINITY, highest = -INFINITY;
-    for (uint32_t m = 0, phase = 0; m < work->merge_count; ++m) {
-        for (; phase < 2 && m >= work->phase_ends[phase]; ++phase) floor = highest;
-        float cost = work->costs[m] > floor ? work->costs[m] : floor;
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = work->children[m][k];
-            if (child >= work->face_count && work->costs[child - work->face_count] > cost)
-                cost = work->costs[child - work->face_count];
-        }
-        work->costs[m] = cost;
-        if (cost > highest) highest = cost;
-    }
-}
-
 typedef struct orderer {
     fct_work *work;
     const fct_mesh *mesh;
     fct_tree *tree;
-    bool alone;       /* one thread: counters need no lock */
-    uint64_t *sorted; /* by rank: cost << 32 | merge */
-    uint32_t *ranks;  /* of merges */
-    uint32_t kept;
+    uint64_t *sorted;             /* by rank: cost << 32 | merge */
+    uint32_t *ranks;              /* of merges */
+    uint32_t *counts, *firsts;    /* per merge: faces, and the place of the first */
+    uint8_t *depths;              /* per merge */
+    uint32_t kept;                /* merges that become nodes */
     _Atomic uint32_t *first_uses; /* per vertex: its first corner in the tree's order */
     uint32_t *renamed, *places;   /* per vertex; per chunk */
 } orderer;
+
+/* Raises costs so that they never fall from child to parent or from phase to phase, and counts faces. */
+static void sum_merges(const orderer *o) {
+    const fct_work *work = o->work;
+    uint32_t faces = work->face_count;
+    float floor = -INFINITY, highest = -INFINITY;
+    for (uint32_t m = 0, phase = 0; m < work->merge_count; ++m) {
+        for (; phase < 2 && m >= work->phase_ends[phase]; ++phase) floor = highest;
+        float cost = work->costs[m] > floor ? work->costs[m] : floor;
+        uint32_t count = 0;
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = work->children[m][k];
+            count += child < faces ? 1 : o->counts[child - faces];
+            if (child >= faces && work->costs[child - faces] > cost) cost = work->costs[child - faces];
+        }
+        work->costs[m] = cost, o->counts[m] = count;
+        if (cost > highest) highest = cost;
+    }
+}
 
 static void list_costs(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
@@ -65,75 +70,80 @@ static uint32_t kept_merges(const orderer *o, const fct_tree_def *def) {
     return kept;
 }
 
-/* Children by node id; a leaf by its face for now. */
-static void number_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    orderer *o = user;
-    uint32_t faces = o->work->face_count, kept = o->kept;
-    for (size_t i = begin; i < end; ++i) {
-        uint32_t m = (uint32_t)o->sorted[kept - 1 - i];
-        fct_node_link *link = &o->tree->links[i];
-        link->cost = o->work->costs[m];
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = o->work->children[m][k];
-            link->child[k] = child < faces ? kept + child : kept - 1 - o->ranks[child - faces];
-        }
-    }
+static bool is_kept(const orderer *o, uint32_t merge) {
+    return o->kept == o->work->merge_count || o->ranks[merge] < o->kept;
 }
 
-static void count_faces(const orderer *o) {
-    fct_node_link *links = o->tree->links;
-    for (uint32_t i = o->kept; i-- > 0;) {
-        uint32_t count = 0;
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = links[i].child[k];
-            count += child < o->kept ? links[child].count : 1;
-        }
-        links[i].count = count;
-        links[i].first = FCT_NONE;
-    }
-}
-
-/* Hands ranges from parents to children; leaves get the ids of their places. Faces that no node holds become
- * roots. */
-static void place_faces(const orderer *o, uint8_t *depths, uint8_t *held) {
+/* Places roots in order of node id, then faces that no node holds. */
+static void place_roots(const orderer *o, uint8_t *roots) {
+    const fct_work *work = o->work;
     fct_tree *tree = o->tree;
-    fct_node_link *links = tree->links;
-    fct_tree_view *view = &tree->view;
-    uint32_t kept = o->kept, place = 0, roots = 0, deepest = 0;
-    uint64_t total = 0;
-    memset(held, 0, view->face_count);
-    for (uint32_t i = 0; i < kept; ++i) {
-        if (links[i].first == FCT_NONE) {
-            tree->roots[roots++] = i;
-            links[i].first = place;
-            depths[i] = 0;
-            place += links[i].count;
-        }
-        uint32_t first = links[i].first, depth = depths[i] + 1u;
+    uint32_t faces = work->face_count, kept = o->kept, place = 0, count = 0;
+    /* roots: of nodes and, behind them, of faces */
+    memset(roots, 0, (size_t)kept + faces);
+    roots[0] = kept == work->merge_count;
+    for (uint32_t rank = kept; rank < work->merge_count; ++rank)
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = links[i].child[k];
-            if (child < kept) {
-                links[child].first = first;
-                depths[child] = (uint8_t)depth;
-                first += links[child].count;
-            } else {
-                tree->face_ids[first] = child - kept;
-                held[child - kept] = 1;
-                links[i].child[k] = kept + first++;
+            uint32_t child = work->children[(uint32_t)o->sorted[rank]][k];
+            if (child < faces)
+                roots[kept + child] = 1;
+            else if (o->ranks[child - faces] < kept)
+                roots[kept - 1 - o->ranks[child - faces]] = 1;
+        }
+    for (uint32_t i = 0; i < kept; ++i) {
+        if (!roots[i]) continue;
+        uint32_t merge = (uint32_t)o->sorted[kept - 1 - i];
+        o->firsts[merge] = place, o->depths[merge] = 0;
+        place += o->counts[merge];
+        tree->roots[count++] = i;
+    }
+    for (uint32_t f = 0; f < faces && place < faces; ++f) {
+        if (!roots[kept + f]) continue;
+        tree->roots[count++] = kept + place;
+        tree->face_ids[place++] = f;
+    }
+    tree->view.root_count = count;
+}
+
+/* Hands places and depths from parents to children. */
+static void place_faces(const orderer *o) {
+    const fct_work *work = o->work;
+    uint32_t faces = work->face_count, deepest = 0;
+    uint64_t total = 0;
+    for (uint32_t m = work->merge_count; m-- > 0;) {
+        if (!is_kept(o, m)) continue;
+        uint32_t first = o->firsts[m], depth = o->depths[m] + 1u;
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = work->children[m][k];
+            if (child < faces) {
+                o->tree->face_ids[first++] = child;
                 total += depth;
                 if (depth > deepest) deepest = depth;
+            } else {
+                o->firsts[child - faces] = first, o->depths[child - faces] = (uint8_t)depth;
+                first += o->counts[child - faces];
             }
         }
     }
-    for (uint32_t f = 0; place < view->face_count && f < view->face_count; ++f) {
-        if (held[f]) continue;
-        tree->roots[roots++] = kept + place;
-        tree->face_ids[place++] = f;
+    o->tree->view.depth = deepest;
+    o->tree->view.mean_depth = (double)total / faces;
+}
+
+/* Merges become nodes; children go by node id, leaves by place. */
+static void link_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const orderer *o = user;
+    uint32_t faces = o->work->face_count, kept = o->kept;
+    for (uint32_t m = (uint32_t)begin; m < end; ++m) {
+        if (!is_kept(o, m)) continue;
+        fct_node_link *link = &o->tree->links[kept - 1 - o->ranks[m]];
+        *link = (fct_node_link){.first = o->firsts[m], .count = o->counts[m], .cost = o->work->costs[m]};
+        for (uint32_t k = 0, place = o->firsts[m]; k < 2; ++k) {
+            uint32_t child = o->work->children[m][k];
+            link->child[k] = child < faces ? kept + place : kept - 1 - o->ranks[child - faces];
+            place += child < faces ? 1 : o->counts[child - faces];
+        }
     }
-    view->root_count = roots;
-    view->depth = deepest;
-    view->mean_depth = (double)total / view->face_count;
 }
 
 /* --- Vertices in order of first use --- */
@@ -147,13 +157,10 @@ static void copy_triangles(void *user, size_t begin, size_t end, size_t chunk, u
             uint32_t v = *from++, corner = (uint32_t)i;
             o->tree->triangles[i] = v;
             uint32_t first = atomic_load_explicit(&o->first_uses[v], memory_order_relaxed);
-            if (corner < first && o->alone)
-                atomic_store_explicit(&o->first_uses[v], corner, memory_order_relaxed);
-            else
-                while (corner < first &&
-                       !atomic_compare_exchange_weak_explicit(&o->first_uses[v], &first, corner,
-                                                              memory_order_relaxed, memory_order_relaxed))
-                    continue;
+            while (corner < first &&
+                   !atomic_compare_exchange_weak_explicit(&o->first_uses[v], &first, corner,
+                                                          memory_order_relaxed, memory_order_relaxed))
+                continue;
         }
         if (o->tree->materials) o->tree->materials[f] = o->mesh->materials[o->tree->face_ids[f]];
     }
@@ -199,10 +206,30 @@ static void copy_vertices(void *user, size_t begin, size_t end, size_t chunk, ui
     }
 }
 
-/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
-static void copy_mesh(const fct_env *env, orderer *o) {
+/* What the four passes above do, in one, where there is one thread; returns how many vertices are used. */
+static uint32_t copy_alone(const orderer *o) {
+    const fct_tree *tree = o->tree;
+    uint32_t used = 0;
+    memset(o->renamed, 0xFF, (size_t)o->mesh->vertex_count * sizeof *o->renamed);
+    for (size_t f = 0; f < o->mesh->face_count; ++f) {
+        const uint32_t *from = o->mesh->triangles + 3 * (size_t)tree->face_ids[f];
+        for (size_t k = 0; k < 3; ++k) {
+            uint32_t *renamed = &o->renamed[from[k]];
+            if (*renamed == FCT_NONE) {
+                tree->vertex_ids[used] = from[k];
+                *renamed = used++;
+            }
+            tree->triangles[3 * f + k] = *renamed;
+        }
+        if (tree->materials) tree->materials[f] = o->mesh->materials[tree->face_ids[f]];
+    }
+    return used;
+}
+
+static uint32_t copy_side_by_side(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
     memset((void *)o->first_uses, 0xFF, vertices * sizeof *o->first_uses);
+    memset(o->renamed, 0xFF, vertices * sizeof *o->renamed);
     fct_parallel_for(env, faces, GRAIN, copy_triangles, o);
     fct_parallel_for(env, faces, GRAIN, count_first_uses, o);
     uint32_t used = 0;
@@ -213,9 +240,15 @@ static void copy_mesh(const fct_env *env, orderer *o) {
     }
     fct_parallel_for(env, faces, GRAIN, rename_vertices, o);
     fct_parallel_for(env, faces, GRAIN, rename_corners, o);
+    return used;
+}
+
+/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
+static void copy_mesh(const fct_env *env, orderer *o) {
+    size_t vertices = o->mesh->vertex_count;
+    uint32_t used = fct_env_threads(env) == 1 ? copy_alone(o) : copy_side_by_side(env, o);
     for (uint32_t v = 0; used < vertices; ++v)
-        if (atomic_load_explicit(&o->first_uses[v], memory_order_relaxed) == FCT_NONE)
-            o->tree->vertex_ids[used++] = v;
+        if (o->renamed[v] == FCT_NONE) o->tree->vertex_ids[used++] = v;
     fct_parallel_for(env, vertices, GRAIN, copy_vertices, o);
 }
 
@@ -254,64 +287,72 @@ static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint
     return FCT_OK;
 }
 
-/* Merges by rank, and from them the links by node id. */
-static fct_result link_nodes(const fct_env *env, orderer *o, const fct_tree_def *def) {
-    fct_work *work = o->work;
-    size_t merges = work->merge_count;
-    make_monotone(work);
-    fct_work_release_clusters(work);
+static fct_result rank_merges(const fct_env *env, orderer *o) {
+    size_t merges = o->work->merge_count;
+    o->counts = fct_allocate(env, merges, sizeof *o->counts);
     o->sorted = fct_allocate(env, merges, sizeof *o->sorted);
     o->ranks = fct_allocate(env, merges, sizeof *o->ranks);
-    if (!o->sorted || !o->ranks) return fct_fail_memory(env, "ordering the tree");
+    if (!o->counts || !o->sorted || !o->ranks) return fct_fail_memory(env, "ordering the tree");
+    sum_merges(o);
     fct_parallel_for(env, merges, GRAIN, list_costs, o);
     fct_result result = fct_sort_items(env, o->sorted, merges);
-    if (result != FCT_OK) return result;
-    fct_parallel_for(env, merges, GRAIN, list_ranks, o);
-    o->kept = kept_merges(o, def);
-    o->tree->links = fct_allocate(o->tree->env, o->kept, sizeof *o->tree->links);
-    if (o->tree->links)
-        fct_parallel_for(env, o->kept, GRAIN, number_nodes, o);
-    else
-        result = fct_fail_memory(env, "the tree");
-    fct_release(env, o->sorted);
-    fct_release(env, o->ranks);
-    o->sorted = NULL, o->ranks = NULL;
-    fct_work_release(work);
+    if (result == FCT_OK) fct_parallel_for(env, merges, GRAIN, list_ranks, o);
     return result;
 }
 
+/* Places, and links by node id. */
 static fct_result place(const fct_env *env, orderer *o) {
-    size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
-    fct_result result = allocate_arrays(o->tree->env, o->mesh, o->kept, o->tree);
-    if (result != FCT_OK) return result;
-    uint8_t *depths = fct_allocate(env, o->kept, 1), *held = fct_allocate(env, faces, 1);
-    if (depths && held) {
-        count_faces(o);
-        place_faces(o, depths, held);
-    } else {
-        result = fct_fail_memory(env, "ordering the tree");
+    size_t faces = o->mesh->face_count, merges = o->work->merge_count;
+    fct_tree *tree = o->tree;
+    uint8_t *roots = fct_allocate(env, o->kept + faces, sizeof *roots);
+    o->firsts = fct_allocate(env, merges, sizeof *o->firsts);
+    o->depths = fct_allocate(env, merges, sizeof *o->depths);
+    tree->links = fct_allocate(tree->env, o->kept, sizeof *tree->links);
+    bool complete = roots && o->firsts && o->depths && tree->links;
+    if (complete) {
+        place_roots(o, roots);
+        place_faces(o);
+        fct_parallel_for(env, merges, GRAIN, link_nodes, o);
     }
-    fct_release(env, depths);
-    fct_release(env, held);
-    if (result != FCT_OK) return result;
+    fct_release(env, roots);
+    return complete ? FCT_OK : fct_fail_memory(env, "ordering the tree");
+}
+
+static void release_merges(const fct_env *env, orderer *o) {
+    fct_release(env, o->sorted);
+    fct_release(env, o->ranks);
+    fct_release(env, o->counts);
+    fct_release(env, o->firsts);
+    fct_release(env, o->depths);
+    fct_work_release(o->work);
+}
+
+static fct_result order_vertices(const fct_env *env, orderer *o) {
+    size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
     o->first_uses = fct_allocate(env, vertices, sizeof *o->first_uses);
     o->renamed = fct_allocate(env, vertices, sizeof *o->renamed);
     o->places = fct_allocate(env, fct_chunk_count(faces, GRAIN), sizeof *o->places);
-    if (!o->first_uses || !o->renamed || !o->places) return fct_fail_memory(env, "ordering the tree");
-    copy_mesh(env, o);
-    return copy_names(o->tree->env, o->mesh, o->tree);
+    bool complete = o->first_uses && o->renamed && o->places;
+    if (complete) copy_mesh(env, o);
+    fct_release(env, (void *)o->first_uses);
+    fct_release(env, o->renamed);
+    fct_release(env, o->places);
+    return complete ? FCT_OK : fct_fail_memory(env, "ordering the tree");
 }
 
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree) {
     const fct_env *env = work->env;
-    orderer o = {.work = work, .mesh = mesh, .tree = tree, .alone = fct_env_threads(env) == 1};
-    fct_result result = link_nodes(env, &o, def);
+    orderer o = {.work = work, .mesh = mesh, .tree = tree};
+    fct_work_release_clusters(work);
+    fct_result result = rank_merges(env, &o);
     if (result == FCT_OK) result = fct_progress(env, "order", 0.3);
+    if (result == FCT_OK) {
+        o.kept = kept_merges(&o, def);
+        result = allocate_arrays(tree->env, mesh, o.kept, tree);
+    }
     if (result == FCT_OK) result = place(env, &o);
-    fct_release(env, o.sorted);
-    fct_release(env, o.ranks);
-    fct_release(env, (void *)o.first_uses);
-    fct_release(env, o.renamed);
-    fct_release(env, o.places);
+    release_merges(env, &o);
+    if (result == FCT_OK) result = order_vertices(env, &o);
+    if (result == FCT_OK) result = copy_names(tree->env, mesh, tree);
     return result == FCT_OK ? fct_progress(env, "order", 1) : result;
 }

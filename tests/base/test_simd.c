@@ -14,6 +14,8 @@ static void floats(void **state) {
     for (int i = 0; i < 8; ++i) assert_true(out[i] == (a[i] < b[i] ? 1 : 2));
     f8_store(out, f8_sqrt(f8_abs(x)));
     for (int i = 0; i < 8; ++i) assert_true(out[i] == sqrtf(fabsf(a[i])));
+    f8_store(out, f8_swap(x));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == a[(i + 4) % 8]);
     f8_store(out, f8_max(f8_set(NAN), x)); /* the second where one is not a number */
     for (int i = 0; i < 8; ++i) assert_true(out[i] == a[i]);
 }
@@ -74,6 +76,14 @@ static void choosing(void **state) {
     for (int i = 0; i < 8; ++i) assert_true(chosen[i] == (u[i] == v[i] ? a[i] : b[i]));
 }
 
+static void truncating(void **state) {
+    (void)state;
+    const float in[8] = {0, 0.99f, 1, 15.5f, -0.5f, -3.99f, 16777216, 2e9f};
+    uint32_t out[8];
+    i8_store(out, i8_trunc(f8_load(in)));
+    for (int i = 0; i < 8; ++i) assert_int_equal((int32_t)out[i], (int32_t)in[i]);
+}
+
 static void doubles(void **state) {
     (void)state;
     const double p[4] = {1, -2, 1e300, 0}, q[4] = {3, -4, 2, -0.5};
@@ -118,7 +128,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(floats),       cmocka_unit_test(transposing), cmocka_unit_test(integers),
         cmocka_unit_test(choosing),     cmocka_unit_test(doubles),     cmocka_unit_test(points),
-        cmocka_unit_test(upper_halves),
+        cmocka_unit_test(upper_halves), cmocka_unit_test(truncating),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
