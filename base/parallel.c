@@ -1,84 +1,234 @@
-/* base/parallel.c: OpenMP behind one function, so that thread sanitizers need to be told of one fork and one
- * join. */
+/* base/parallel.c: work shared between the calling thread and helpers, threads that the process keeps.
+ *
+ * The caller works through the chunks itself. Free helpers are offered the job and join in when the system
+ * lets them run; when no chunk is left the caller takes the offer back from those that have not begun, so
+ * that it waits for chunks that others work on and never for a thread that is not scheduled. A helper's state
+ * is one word: FREE or ASLEEP -> job (the caller offers) -> FREE (takes back), or job | AT_WORK (the helper
+ * begins)
+ * -> job | AT_WORK | AWAITED (the caller sleeps) -> FREE (the helper is done with the job's memory).
+ *
+ * Any number of callers share the helpers; each starts what it misses. A child of fork() begins without.
+ */
 #include "base/parallel.h"
 
+#include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 
-#if defined(__SANITIZE_THREAD__)
-#define FCT_TSAN 1
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-#define FCT_TSAN 1
-#endif
-#endif
-#ifdef FCT_TSAN
-/* The OpenMP runtime is not instrumented: its fork and join look like no synchronisation at all. */
-void __tsan_acquire(void *address);
-void __tsan_release(void *address);
-#define ACQUIRE(address) __tsan_acquire(address)
-#define RELEASE(address) __tsan_release(address)
-/* What a parallel region is passed goes through memory before the region can acquire anything. */
-#define UNTRACED __attribute__((no_sanitize("thread")))
-#else
-#define ACQUIRE(address) ((void)(address))
-#define RELEASE(address) ((void)(address))
-#define UNTRACED
-#endif
+/* 20 to 50 microseconds, in pauses of the processor: about what it takes to wake a thread. */
+enum { MOST_HELPERS = 255, SPINS = 1000 };
 
-typedef struct work {
-    size_t count, grain, chunk_end;
+/* States, beside the address of a job, which is a multiple of 64. */
+enum { FREE = 0, AT_WORK = 1, AWAITED = 2, ASLEEP = 4, LEAVING = 8 };
+
+typedef struct job {
+    size_t count, grain, chunk_count;
     fct_chunk_body *body;
     void *user;
-    atomic_size_t next;
-    char fork, join;
-} work;
+    _Alignas(64) atomic_size_t next; /* the first chunk that nobody has */
+    _Atomic uint32_t threads;        /* that have begun */
+} job;
 
-static void run(work *w, uint32_t thread) {
-    ACQUIRE(&w->fork);
-    for (;;) {
-        size_t chunk = atomic_fetch_add_explicit(&w->next, 1, memory_order_relaxed);
-        if (chunk >= w->chunk_end) break;
-        size_t begin = chunk * w->grain;
-        size_t end = begin + w->grain < w->count ? begin + w->grain : w->count;
-        w->body(w->user, begin, end, chunk, thread);
-    }
-    RELEASE(&w->join);
+typedef struct helper {
+    _Alignas(64) _Atomic uintptr_t state;
+    pthread_t thread;
+    pthread_mutex_t mutex; /* with `changed`: for those who sleep until the state changes */
+    pthread_cond_t changed;
+} helper;
+
+static helper helpers[MOST_HELPERS];
+static _Atomic uint32_t helper_count;
+static pthread_mutex_t starting = PTHREAD_MUTEX_INITIALIZER; /* who adds helpers */
+static bool closed = true;                                   /* no more are to be added */
+
+/* Works on the next chunk; false if there is none. */
+static bool do_chunk(job *j, uint32_t thread) {
+    size_t chunk = atomic_fetch_add_explicit(&j->next, 1, memory_order_relaxed);
+    if (chunk >= j->chunk_count) return false;
+    size_t begin = chunk * j->grain;
+    size_t end = j->count - begin > j->grain ? begin + j->grain : j->count;
+    j->body(j->user, begin, end, chunk, thread);
+    return true;
 }
 
-UNTRACED static void run_chunks(const fct_env *env, work *w, size_t first, size_t last) {
-    atomic_store_explicit(&w->next, first, memory_order_relaxed);
-    w->chunk_end = last;
-    uint32_t threads = fct_env_threads(env);
-    if (last - first < threads) threads = (uint32_t)(last - first);
-    if (threads <= 1) {
-        run(w, 0);
-        return;
+static void notify(helper *h) {
+    pthread_mutex_lock(&h->mutex);
+    pthread_mutex_unlock(&h->mutex);
+    pthread_cond_broadcast(&h->changed);
+}
+
+static void sleep_while(helper *h, uintptr_t state) {
+    pthread_mutex_lock(&h->mutex);
+    while (atomic_load_explicit(&h->state, memory_order_acquire) == state)
+        pthread_cond_wait(&h->changed, &h->mutex);
+    pthread_mutex_unlock(&h->mutex);
+}
+
+/* The first other state that is seen, or `state` if it lasts. */
+static uintptr_t spin_while(const helper *h, uintptr_t state) {
+    uintptr_t seen = state;
+    for (int i = 0; i < SPINS && seen == state; ++i) {
+#if defined(__x86_64__)
+        __builtin_ia32_pause();
+#endif
+        seen = atomic_load_explicit(&h->state, memory_order_acquire);
     }
-    _Atomic uint32_t number = 0;
-    RELEASE(&w->fork);
-#pragma omp parallel num_threads(threads) default(none) shared(w, number)
-    { run(w, atomic_fetch_add_explicit(&number, 1, memory_order_relaxed)); }
-    ACQUIRE(&w->join);
+    return seen;
+}
+
+static void *help(void *argument) {
+    helper *h = argument;
+    for (;;) {
+        uintptr_t state = spin_while(h, FREE);
+        if (state == LEAVING) return NULL;
+        if (state == FREE) {
+            if (atomic_compare_exchange_strong(&h->state, &state, ASLEEP)) sleep_while(h, ASLEEP);
+            continue;
+        }
+        if (!atomic_compare_exchange_strong(&h->state, &state, state | AT_WORK)) continue; /* taken back */
+        job *j = (job *)state;
+        uint32_t thread = atomic_fetch_add_explicit(&j->threads, 1, memory_order_relaxed);
+        while (do_chunk(j, thread)) {
+        }
+        if (atomic_exchange(&h->state, FREE) & AWAITED) notify(h);
+    }
+}
+
+/* Offers a job, or LEAVING, to a helper; false if it is not free. */
+static bool offer(helper *h, uintptr_t what) {
+    uintptr_t state = atomic_load_explicit(&h->state, memory_order_relaxed);
+    while (state == FREE || state == ASLEEP)
+        if (atomic_compare_exchange_weak(&h->state, &state, what)) {
+            if (state == ASLEEP) notify(h);
+            return true;
+        }
+    return false;
+}
+
+/* Signals are the business of the program's own threads, all but those that a thread's own instructions raise
+ * and a profiler's. */
+static bool start_thread(helper *h) {
+    sigset_t blocked, before;
+    sigfillset(&blocked);
+    const int open[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGPROF};
+    for (size_t i = 0; i < sizeof open / sizeof *open; ++i) sigdelset(&blocked, open[i]);
+    if (pthread_sigmask(SIG_SETMASK, &blocked, &before)) return false;
+    bool started = pthread_create(&h->thread, NULL, help, h) == 0;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return started;
+}
+
+/* Starts one more helper on a job. Where the system refuses, fewer work. */
+static bool add_helper(uintptr_t what, uint8_t *number) {
+    pthread_mutex_lock(&starting);
+    uint32_t i = atomic_load_explicit(&helper_count, memory_order_relaxed);
+    bool added = !closed && i < MOST_HELPERS;
+    if (added) {
+        helper *h = helpers + i;
+        atomic_store_explicit(&h->state, what, memory_order_relaxed);
+        pthread_mutex_init(&h->mutex, NULL);
+        pthread_cond_init(&h->changed, NULL);
+        added = start_thread(h);
+    }
+    if (added) {
+        *number = (uint8_t)i;
+        atomic_store_explicit(&helper_count, i + 1, memory_order_release);
+    }
+    pthread_mutex_unlock(&starting);
+    return added;
+}
+
+/* Offers the job to as many helpers as are of use, and returns to how many. */
+static uint32_t call_helpers(const fct_env *env, job *j, uint8_t *called) {
+    uint32_t wanted = fct_env_threads(env) - 1, count = 0;
+    if (j->chunk_count <= wanted) wanted = (uint32_t)j->chunk_count - 1;
+    uint32_t all = atomic_load_explicit(&helper_count, memory_order_acquire);
+    for (uint32_t i = 0; i < all && count < wanted; ++i)
+        if (offer(helpers + i, (uintptr_t)j)) called[count++] = (uint8_t)i;
+    while (count < wanted && add_helper((uintptr_t)j, called + count)) ++count;
+    return count;
+}
+
+/* Takes the job back, or waits until the helper is done with it. */
+static void dismiss(helper *h, const job *j) {
+    uintptr_t state = (uintptr_t)j, busy = state | AT_WORK;
+    if (atomic_compare_exchange_strong(&h->state, &state, FREE) || state != busy) return;
+    if (spin_while(h, busy) != busy) return;
+    if (atomic_compare_exchange_strong(&h->state, &busy, busy | AWAITED)) sleep_while(h, busy | AWAITED);
+}
+
+static void dismiss_all(const uint8_t *called, uint32_t count, const job *j) {
+    for (uint32_t i = 0; i < count; ++i) dismiss(helpers + called[i], j);
+}
+
+static void lock_pool(void) {
+    pthread_mutex_lock(&starting);
+}
+
+static void unlock_pool(void) {
+    pthread_mutex_unlock(&starting);
+}
+
+static void unlock_child(void) {
+    atomic_store_explicit(&helper_count, 0, memory_order_relaxed);
+    pthread_mutex_unlock(&starting);
+}
+
+__attribute__((constructor)) static void open_pool(void) {
+    closed = pthread_atfork(lock_pool, unlock_pool, unlock_child) != 0;
+}
+
+/* At the process's end, or when the library is unloaded. Who is at work for another thread may stay. */
+__attribute__((destructor)) static void close_pool(void) {
+    pthread_mutex_lock(&starting);
+    closed = true;
+    pthread_mutex_unlock(&starting);
+    uint32_t all = atomic_load_explicit(&helper_count, memory_order_acquire);
+    bool leaving[MOST_HELPERS];
+    for (uint32_t i = 0; i < all; ++i) leaving[i] = offer(helpers + i, LEAVING);
+    for (uint32_t i = 0; i < all; ++i)
+        if (leaving[i]) pthread_join(helpers[i].thread, NULL);
+}
+
+static job make_job(size_t count, size_t grain, fct_chunk_body *body, void *user) {
+    return (job){.count = count,
+                 .grain = grain,
+                 .chunk_count = fct_chunk_count(count, grain),
+                 .body = body,
+                 .user = user,
+                 .threads = 1};
 }
 
 void fct_parallel_for(const fct_env *env, size_t count, size_t grain, fct_chunk_body *body, void *user) {
     if (count == 0) return;
-    work w = {.count = count, .grain = grain, .body = body, .user = user};
-    run_chunks(env, &w, 0, fct_chunk_count(count, grain));
+    job j = make_job(count, grain, body, user);
+    uint8_t called[MOST_HELPERS];
+    uint32_t called_count = call_helpers(env, &j, called);
+    while (do_chunk(&j, 0)) {
+    }
+    dismiss_all(called, called_count, &j);
 }
 
+/* Every hundredth is told, whoever has come to it: several at once where the caller was long in a chunk. */
 fct_result fct_parallel_for_progress(const fct_env *env, const char *phase, size_t count, size_t grain,
                                      fct_chunk_body *body, void *user) {
-    work w = {.count = count, .grain = grain, .body = body, .user = user};
-    size_t chunks = fct_chunk_count(count, grain);
-    size_t slice = chunks / 100 + 1;
-    if (slice < 4 * (size_t)fct_env_threads(env)) slice = 4 * (size_t)fct_env_threads(env);
-    for (size_t first = 0; first < chunks; first += slice) {
-        fct_result result = fct_progress(env, phase, (double)first / (double)chunks);
-        if (result != FCT_OK) return result;
-        run_chunks(env, &w, first, first + slice < chunks ? first + slice : chunks);
+    if (count == 0) return fct_progress(env, phase, 1);
+    fct_result result = fct_progress(env, phase, 0);
+    if (result != FCT_OK) return result;
+    job j = make_job(count, grain, body, user);
+    uint8_t called[MOST_HELPERS];
+    uint32_t called_count = call_helpers(env, &j, called);
+    size_t slice = j.chunk_count / 100 + 1, told = slice;
+    for (bool more = true; more && result == FCT_OK;) {
+        more = do_chunk(&j, 0);
+        size_t taken = atomic_load_explicit(&j.next, memory_order_relaxed);
+        for (; result == FCT_OK && told < j.chunk_count && told <= taken; told += slice)
+            result = fct_progress(env, phase, (double)told / (double)j.chunk_count);
     }
-    return fct_progress(env, phase, 1);
+    if (result != FCT_OK) atomic_store_explicit(&j.next, j.chunk_count, memory_order_relaxed);
+    dismiss_all(called, called_count, &j);
+    return result == FCT_OK ? fct_progress(env, phase, 1) : result;
 }
 
 double fct_sum(const double *values, size_t count) {

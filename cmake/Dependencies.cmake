@@ -1,5 +1,6 @@
 # What each folder links, all from Debian 12.
-find_package(OpenMP REQUIRED COMPONENTS C)
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+find_package(Threads REQUIRED)
 find_package(embree 3.13 REQUIRED)
 find_package(OpenMesh REQUIRED)
 find_package(PkgConfig REQUIRED)

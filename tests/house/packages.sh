@@ -1,7 +1,7 @@
 # Debian 12 packages that ./run and ./test need, and how they are installed. To be sourced.
 packages_build="gcc g++ cmake ninja-build pkg-config libembree-dev libopenmesh-dev libjansson-dev
     libpng-dev libxxhash-dev libcmocka-dev"
-packages_test="clang clang-format-14 libclang-rt-14-dev libomp-14-dev"
+packages_test="clang clang-format-14 libclang-rt-14-dev"
 
 # install_packages LOG PACKAGE...: installs those that are missing.
 install_packages() {
