@@ -2,17 +2,13 @@
  *
  * The matrix is scaled to entries of at most 1 and its trace removed, so that near multiples of the identity
  * keep their digits. The eigenvalue that stands apart from the other two is the cubic's largest root, which
- * Newton's method finds in three steps, and its vector comes from the two most independent rows; the other
+ * Newton's method finds in two steps, and its vector comes from the two most independent rows; the other
  * two are the exact answer of the 2x2 problem in the plane across that vector, which is sound for equal
  * values as well. Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961, for the cubic. No function
  * of the C library but the square root, so that the result is the same everywhere. Diagonal matrices go their
  * own way.
  */
 #include "base/eigen.h"
-
-#include <stdbool.h>
-
-#include "base/simd.h"
 
 /* Four vectors. */
 typedef struct w3 {
@@ -67,9 +63,9 @@ static inline w3 null_vector(const d4 b[6], d4 value) {
 
 /* cos(acos(r) / 3) for r in [0, 1]: the root of 4 c^3 - 3 c = r in [cos(pi / 6), 1]. */
 static inline d4 largest_root(d4 r) {
-    d4 slope = d4_sub(d4_set(0.1705), d4_mul(d4_set(0.0365254037844386), r));
-    d4 c = mad(d4_set(0.8660254037844386), r, slope); /* within .003 */
-    for (int i = 0; i < 3; ++i) {
+    d4 c = mad(d4_set(-0.0408812), d4_set(0.00944362), r);
+    c = mad(d4_set(0.866062), r, mad(d4_set(0.165404), c, r)); /* within .00004 */
+    for (int i = 0; i < 2; ++i) {
         d4 cc4 = d4_mul(d4_set(4), d4_mul(c, c)), three = d4_set(3);
         d4 excess = d4_sub(d4_mul(d4_sub(cc4, three), c), r);
         c = d4_sub(c, d4_div(excess, d4_sub(d4_mul(three, cc4), three)));
@@ -77,19 +73,20 @@ static inline d4 largest_root(d4 r) {
     return c;
 }
 
-/* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]. */
+/* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]; of 0 where both are next to nothing.
+ */
 static inline void half_angle(d4 x, d4 y, d4 *c, d4 *s) {
     d4 none = d4_set(0), one = d4_set(1), half = d4_set(0.5), largest = d4_max(d4_abs(x), d4_abs(y));
-    d4 scale = d4_if_lt(none, largest, largest, one); /* for squares of tiny numbers have no digits */
-    x = d4_div(x, scale), y = d4_div(y, scale);
-    d4 h = d4_sqrt(mad(d4_mul(x, x), y, y)), invert = d4_div(one, d4_if_lt(none, h, h, one));
-    d4 cosine = d4_mul(x, invert), sine = d4_mul(y, invert);
+    d4 least = d4_set(0x1p-1000), known = d4_if_lt(least, largest, one, none);
+    d4 invert = d4_div(one, d4_max(largest, least)); /* for squares of tiny numbers have no digits */
+    x = d4_mul(x, invert), y = d4_mul(y, invert);
+    d4 h = d4_div(one, d4_sqrt(mad(d4_mul(x, x), y, y)));
+    d4 cosine = d4_mul(x, h), sine = d4_mul(y, h);
     d4 large = d4_sqrt(mad(half, half, d4_abs(cosine))); /* the larger of the two, at least sqrt(1/2) */
     d4 small = d4_div(d4_mul(half, d4_abs(sine)), large);
     d4 sign = d4_if_lt(y, none, d4_set(-1), one);
-    *c = d4_if_lt(x, none, small, large);
-    *s = d4_mul(sign, d4_if_lt(x, none, large, small));
-    *c = d4_if_lt(none, h, *c, one), *s = d4_if_lt(none, h, *s, none);
+    *c = d4_if_lt(none, known, d4_if_lt(x, none, small, large), one);
+    *s = d4_if_lt(none, known, d4_mul(sign, d4_if_lt(x, none, large, small)), none);
 }
 
 /* Two unit vectors that complete w to a right-handed frame (u, v, w) (Duff et al. 2017). */
@@ -100,55 +97,49 @@ static inline void frame(w3 w, w3 *u, w3 *v) {
     *v = (w3){c, mad(sign, d4_mul(w.y, w.y), a), d4_mul(minus, w.y)};
 }
 
-static inline void order(d4 values[3], w3 vectors[3], int i, int j) {
-    d4 a = values[i], b = values[j];
-    w3 p = vectors[i], q = vectors[j];
-    values[i] = d4_if_lt(b, a, b, a), values[j] = d4_if_lt(b, a, a, b);
-    vectors[i] = w3_if_lt(b, a, q, p), vectors[j] = w3_if_lt(b, a, p, q);
+/* Divides by the largest entry, which is returned. */
+static inline d4 normalize(d4 m[6]) {
+    d4 largest = largest_entry(m), tiny = d4_set(0x1p-1000), one = d4_set(1);
+    d4 boost = d4_if_lt(largest, tiny, d4_set(0x1p500), one); /* for 1 / tiny is not a number with digits */
+    d4 invert = d4_div(one, d4_mul(largest, boost));
+    for (int i = 0; i < 6; ++i) m[i] = d4_mul(d4_mul(m[i], boost), invert);
+    return largest;
 }
 
-static void sort_ascending(d4 values[3], w3 vectors[3]) {
-    order(values, vectors, 0, 1);
-    order(values, vectors, 1, 2);
-    order(values, vectors, 0, 1);
-    d4 turn = w3_dot(w3_cross(vectors[0], vectors[1]), vectors[2]);
-    vectors[2] = w3_scale(vectors[2], d4_if_lt(turn, d4_set(0), d4_set(-1), d4_set(1)));
-}
-
-/* No lane diagonal. */
-static void solve(const d4 m[6], d4 values[3], w3 vectors[3]) {
-    d4 scale = largest_entry(m), one = d4_set(1), a[6], b[6];
-    for (int i = 0; i < 6; ++i) a[i] = b[i] = d4_div(m[i], scale);
-    d4 third = d4_div(d4_add(d4_add(a[0], a[3]), a[5]), d4_set(3));
-    b[0] = d4_sub(b[0], third), b[3] = d4_sub(b[3], third), b[5] = d4_sub(b[5], third);
-    d4 spread = largest_entry(b); /* of the traceless part, which may be far below 1 */
-    for (int i = 0; i < 6; ++i) b[i] = d4_div(b[i], spread);
+/* No lane diagonal. a: the matrix, scaled to entries of at most 1. By ascending eigenvalue. */
+static inline void solve(const d4 a[6], w3 vectors[3]) {
+    d4 one = d4_set(1), b[6], third = d4_mul(d4_add(d4_add(a[0], a[3]), a[5]), d4_set(1.0 / 3));
+    for (int i = 0; i < 6; ++i) b[i] = i == 0 || i == 3 || i == 5 ? d4_sub(a[i], third) : a[i];
+    normalize(b); /* the traceless part may be far below 1 */
     d4 diagonal = mad(mad(d4_mul(b[0], b[0]), b[3], b[3]), b[5], b[5]);
     d4 others = mad(mad(d4_mul(b[1], b[1]), b[2], b[2]), b[4], b[4]);
-    d4 p = d4_sqrt(d4_div(mad(diagonal, d4_set(2), others), d4_set(6)));
-    d4 reciprocal = d4_div(one, p);
+    d4 p = d4_sqrt(d4_mul(mad(diagonal, d4_set(2), others), d4_set(1.0 / 6))), reciprocal = d4_div(one, p);
     for (int i = 0; i < 6; ++i) b[i] = d4_mul(b[i], reciprocal);
     d4 r = d4_mul(b[0], d4_sub(d4_mul(b[3], b[5]), d4_mul(b[4], b[4])));
     r = d4_sub(r, d4_mul(b[1], d4_sub(d4_mul(b[1], b[5]), d4_mul(b[4], b[2]))));
     r = d4_mul(d4_set(0.5), mad(r, b[2], d4_sub(d4_mul(b[1], b[4]), d4_mul(b[3], b[2]))));
-    d4 apart = d4_mul(d4_set(2), largest_root(d4_min(d4_abs(r), one)));
-    apart = d4_if_lt(r, d4_set(0), d4_mul(apart, d4_set(-1)), apart);
-    w3 w = null_vector(b, apart), u, v;
+    d4 none = d4_set(0), apart = d4_mul(d4_set(2), largest_root(d4_min(d4_abs(r), one)));
+    w3 w = null_vector(b, d4_if_lt(r, none, d4_mul(apart, d4_set(-1)), apart)), u, v;
     frame(w, &u, &v);
     d4 uu = form(a, u, u), uv = form(a, u, v), vv = form(a, v, v), c, s;
     half_angle(d4_sub(uu, vv), d4_add(uv, uv), &c, &s);
-    vectors[0] = w, vectors[1] = w3_mix(u, c, v, s), vectors[2] = w3_mix(v, c, u, d4_mul(s, d4_set(-1)));
-    for (int i = 0; i < 3; ++i) values[i] = d4_mul(scale, form(a, vectors[i], vectors[i]));
-    sort_ascending(values, vectors);
+    /* of the two, the one with the greater value, turned so that both orders are right-handed */
+    w3 greater = w3_scale(w3_mix(u, c, v, s), d4_set(-1)), lesser = w3_mix(v, c, u, d4_mul(s, d4_set(-1)));
+    vectors[0] = w3_if_lt(r, none, w, lesser);
+    vectors[1] = w3_if_lt(r, none, lesser, greater);
+    vectors[2] = w3_if_lt(r, none, greater, w);
 }
 
-static bool is_diagonal(const double m[6]) {
-    return m[1] == 0 && m[2] == 0 && m[4] == 0;
+/* Sorted, for rounding may turn the order of two that are equal but for it. */
+static inline void find_values(const d4 a[6], d4 scale, const w3 vectors[3], d4 values[3]) {
+    d4 f[3];
+    for (int i = 0; i < 3; ++i) f[i] = d4_mul(scale, form(a, vectors[i], vectors[i]));
+    d4 low = d4_min(f[0], f[1]), high = d4_max(f[0], f[1]), rest = d4_min(high, f[2]);
+    values[0] = d4_min(low, rest), values[1] = d4_max(low, rest), values[2] = d4_max(high, f[2]);
 }
 
 /* Coordinate axes, by value and then by number. */
-static void solve_diagonal(const double m[6], double values[3], v3 vectors[3]) {
-    const double entries[3] = {m[0], m[3], m[5]};
+static void solve_diagonal(const double entries[3], double values[3], v3 vectors[3]) {
     const v3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     int places[3] = {0, 1, 2};
     for (int pass = 0; pass < 3; ++pass)
@@ -161,42 +152,49 @@ static void solve_diagonal(const double m[6], double values[3], v3 vectors[3]) {
     if (v3_dot(v3_cross(vectors[0], vectors[1]), vectors[2]) < 0) vectors[2] = v3_scale(vectors[2], -1);
 }
 
-void fct_eigen3_four(const double *const m[4], double values[4][3], v3 vectors[4][3]) {
-    static const double stand_in[6] = {1, 0.5, 0, 2, 0, 3};
-    double rows[6][4], out_values[3][4], out_vectors[3][3][4];
-    d4 matrix[6], lane_values[3];
-    w3 lane_vectors[3];
-    for (int i = 0; i < 4; ++i) {
-        const double *from = is_diagonal(m[i]) ? stand_in : m[i];
-        for (int k = 0; k < 6; ++k) rows[k][i] = from[k];
-    }
-    for (int k = 0; k < 6; ++k) matrix[k] = d4_load(rows[k]);
-    solve(matrix, lane_values, lane_vectors);
-    for (int k = 0; k < 3; ++k) {
-        d4_store(out_values[k], lane_values[k]);
-        d4_store(out_vectors[k][0], lane_vectors[k].x);
-        d4_store(out_vectors[k][1], lane_vectors[k].y);
-        d4_store(out_vectors[k][2], lane_vectors[k].z);
-    }
-    for (int i = 0; i < 4; ++i) {
-        if (is_diagonal(m[i])) {
-            solve_diagonal(m[i], values[i], vectors[i]);
-            continue;
-        }
-        for (int k = 0; k < 3; ++k) {
-            values[i][k] = out_values[k][i];
-            vectors[i][k] = (v3){out_vectors[k][0][i], out_vectors[k][1][i], out_vectors[k][2][i]};
-        }
+static inline void put(d4 *a, int lane, double value) {
+    double all[4];
+    d4_store(all, *a);
+    all[lane] = value;
+    *a = d4_load(all);
+}
+
+static void solve_diagonal_lane(const d4 m[6], int lane, d4 values[3], d4 vectors[3][3]) {
+    double entries[3][4], own[3];
+    v3 axes[3];
+    for (int i = 0; i < 3; ++i) d4_store(entries[i], m[i == 0 ? 0 : i == 1 ? 3 : 5]);
+    solve_diagonal((const double[3]){entries[0][lane], entries[1][lane], entries[2][lane]}, own, axes);
+    for (int i = 0; i < 3; ++i) {
+        if (values) put(&values[i], lane, own[i]);
+        put(&vectors[i][0], lane, axes[i].x);
+        put(&vectors[i][1], lane, axes[i].y);
+        put(&vectors[i][2], lane, axes[i].z);
     }
 }
 
+void fct_eigen3_four(const d4 m[6], d4 values[3], d4 vectors[3][3]) {
+    static const double stand_in[6] = {1, 0.5, 0, 2, 0, 3};
+    d4 none = d4_set(0), most = d4_max(d4_max(d4_abs(m[1]), d4_abs(m[2])), d4_abs(m[4])), a[6];
+    uint32_t diagonal = 15 & ~d4_lt(none, most);
+    w3 found[3];
+    for (int i = 0; i < 6; ++i) a[i] = d4_if_lt(none, most, m[i], d4_set(stand_in[i]));
+    d4 scale = normalize(a);
+    solve(a, found);
+    if (values) find_values(a, scale, found, values);
+    for (int i = 0; i < 3; ++i)
+        vectors[i][0] = found[i].x, vectors[i][1] = found[i].y, vectors[i][2] = found[i].z;
+    for (int i = 0; diagonal >> i; ++i)
+        if (diagonal >> i & 1) solve_diagonal_lane(m, i, values, vectors);
+}
+
 void fct_eigen3(const double m[6], double values[3], v3 vectors[3]) {
-    double all_values[4][3];
-    v3 all_vectors[4][3];
-    if (is_diagonal(m)) {
-        solve_diagonal(m, values, vectors);
-        return;
+    d4 matrix[6], all_values[3], all_vectors[3][3];
+    for (int i = 0; i < 6; ++i) matrix[i] = d4_set(m[i]);
+    fct_eigen3_four((const d4 *)matrix, all_values, all_vectors);
+    for (int i = 0; i < 3; ++i) {
+        double value[4], v[3][4];
+        d4_store(value, all_values[i]);
+        for (int k = 0; k < 3; ++k) d4_store(v[k], all_vectors[i][k]);
+        values[i] = value[0], vectors[i] = (v3){v[0][0], v[1][0], v[2][0]};
     }
-    fct_eigen3_four((const double *const[4]){m, m, m, m}, all_values, all_vectors);
-    for (int k = 0; k < 3; ++k) values[k] = all_values[0][k], vectors[k] = all_vectors[0][k];
 }

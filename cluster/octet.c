@@ -1,0 +1,373 @@
+/* cluster/octet.c: eight clusters described side by side, a lane each.
+ *
+ * Three quarters of all clusters have two to four faces. One by one, each waits for its own roots and
+ * divisions and leaves most lanes of a vector idle; side by side nothing waits and no branch depends on a
+ * cluster. Frame of a box: PCA of the surface, turned in its plane to the least area of eight angles.
+ * Extents are taken in double along the very axes that fct_cluster_box expands from the stored quaternion, so
+ * that a box holds its points for exactly these, and is as tight as they allow.
+ */
+#include "cluster/octet.h"
+
+#include <assert.h>
+#include <float.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "base/eigen.h"
+#include "cluster/cone.h"
+
+enum {
+    SAMPLES = 64,
+    AREA = offsetof(fct_cluster, area) / sizeof(float),
+    VECTOR = offsetof(fct_cluster, area_vector) / sizeof(float),
+    MOMENT = offsetof(fct_cluster, moment) / sizeof(float),
+    CENTROID = offsetof(fct_cluster, centroid) / sizeof(float),
+    CONE = offsetof(fct_cluster, cone_angle) / sizeof(float),
+    PLANE = offsetof(fct_cluster, plane) / sizeof(float),
+    CENTER = offsetof(fct_cluster, box_center) / sizeof(float),
+    ROTATION = offsetof(fct_cluster, box_rotation) / sizeof(float),
+    HALF = offsetof(fct_cluster, box_half) / sizeof(float)
+};
+
+static inline d4 dot(const d4 a[3], const d4 b[3]) {
+    return d4_add(d4_add(d4_mul(a[0], b[0]), d4_mul(a[1], b[1])), d4_mul(a[2], b[2]));
+}
+static inline d4 mad(d4 a, d4 s, d4 b) {
+    return d4_add(a, d4_mul(s, b));
+}
+static inline d4 negative(d4 a) {
+    return d4_mul(a, d4_set(-1));
+}
+
+/* --- Sums, plane and frame --- */
+
+static inline void store_frame(fct_octet *o, int at, int axis, const d4 v[3]) {
+    for (int i = 0; i < 3; ++i) d4_store(&o->frame[axis][i][at], v[i]);
+}
+
+/* Lanes `at` to at + 3. */
+static void sum_four(fct_octet *o, int at, const fct_sums *const sums[4]) {
+    const d4 none = d4_set(0), one = d4_set(1), limit = d4_set((double)FLT_MAX);
+    d4 s[20], axes[3][3];
+    for (int i = 0; i < 20; i += 4) {
+        for (int k = 0; k < 4; ++k) s[i + k] = d4_load((const double *)sums[k] + i);
+        d4_transpose(s + i);
+    }
+    const d4 area = s[0], weight = s[1], *moment = s + 2, *covariance = s + 8, *vector = s + 14,
+             *center = s + 17;
+    d4 factor = d4_if_lt(limit, area, d4_div(limit, area), one);
+    d4_store_floats(&o->words[AREA][at], d4_mul(area, factor));
+    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[VECTOR + i][at], d4_mul(vector[i], factor));
+    for (int i = 0; i < 6; ++i) d4_store_floats(&o->words[MOMENT + i][at], d4_mul(moment[i], factor));
+    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[CENTROID + i][at], center[i]);
+    fct_eigen3_four(covariance, NULL, axes);
+    d4 *n = axes[0], *u = axes[2], side = d4_if_lt(dot(n, vector), none, d4_set(-1), one);
+    for (int i = 0; i < 3; ++i) n[i] = d4_mul(n[i], side);
+    d4 v[3] = {d4_sub(d4_mul(n[1], u[2]), d4_mul(n[2], u[1])), d4_sub(d4_mul(n[2], u[0]), d4_mul(n[0], u[2])),
+               d4_sub(d4_mul(n[0], u[1]), d4_mul(n[1], u[0]))};
+    store_frame(o, at, 0, u);
+    store_frame(o, at, 1, v);
+    store_frame(o, at, 2, n);
+    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[PLANE + i][at], n[i]);
+    d4 offset = negative(dot(n, center));
+    d4_store_floats(&o->words[PLANE + 3][at], d4_max(d4_min(offset, limit), negative(limit)));
+    d4 spread = d4_add(d4_add(covariance[0], covariance[3]), covariance[5]);
+    d4 radius = d4_sqrt(d4_div(spread, weight)); /* may be no number */
+    radius = d4_if_lt(none, radius, d4_if_lt(radius, limit, radius, one), one);
+    d4_store_floats(&o->shrink[at], d4_div(one, radius));
+}
+
+void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
+    sum_four(o, 0, sums);
+    sum_four(o, 4, sums + 4);
+}
+
+/* --- Cone --- */
+
+/* Unit area vectors to `axis`; returns a bit for each lane that has none. */
+static uint32_t find_axes(const fct_octet *o, float axis[3][8]) {
+    const d4 none = d4_set(0);
+    uint32_t lost = 0;
+    for (int at = 0; at < 8; at += 4) {
+        d4 s[3];
+        for (int i = 0; i < 3; ++i) s[i] = d4_load_floats(&o->words[VECTOR + i][at]);
+        d4 squared = dot(s, s), invert = d4_div(d4_set(1), d4_sqrt(squared));
+        lost |= (15 & ~d4_lt(none, squared)) << at;
+        for (int i = 0; i < 3; ++i) d4_store_floats(&axis[i][at], d4_mul(s[i], invert));
+    }
+    return lost;
+}
+
+void fct_octet_cone(fct_octet *o, const fct_octet_normals *n) {
+    float axis[3][8], chords[8];
+    uint32_t lost = find_axes(o, axis), longest = 0;
+    f8 x = f8_load(axis[0]), y = f8_load(axis[1]), z = f8_load(axis[2]), widest = f8_set(0);
+    for (int i = 0; i < 8; ++i) longest = n->counts[i] > longest ? n->counts[i] : longest;
+    for (uint32_t j = 0; j < longest; ++j) {
+        const float *rows[8];
+        f8 p[3];
+        for (int i = 0; i < 8; ++i)
+            rows[i] = n->normals + 4 * (size_t)(n->firsts[i] + (j < n->counts[i] ? j : 0));
+        f8_load_columns(rows, p);
+        p[0] = f8_sub(p[0], x), p[1] = f8_sub(p[1], y), p[2] = f8_sub(p[2], z);
+        f8 chord = f8_add(f8_add(f8_mul(p[0], p[0]), f8_mul(p[1], p[1])), f8_mul(p[2], p[2]));
+        widest = f8_max(chord, widest); /* NaN is passed over */
+    }
+    f8_store(chords, widest);
+    for (int i = 0; lost >> i; ++i)
+        if (lost >> i & 1) chords[i] = 4;
+    fct_cone_angles(chords, o->words[CONE]);
+}
+
+/* --- Turn and rotation --- */
+
+typedef struct plane_points {
+    float u[SAMPLES][8], v[SAMPLES][8];
+    uint32_t count;
+    f8 height;
+} plane_points;
+
+/* Points spread over each list that is too long. */
+static void pick_samples(const fct_octet_points *p, uint32_t picks[8][SAMPLES]) {
+    for (uint32_t i = 0; i < 8; ++i)
+        for (uint32_t j = 0; j < SAMPLES; ++j)
+            picks[i][j] = p->lists[i][p->counts[i] > SAMPLES ? j * p->counts[i] / SAMPLES : j];
+}
+
+/* Points in the frame, from the first of each cluster, over its radius. */
+static void project(const fct_octet *o, const fct_octet_points *p, plane_points *out) {
+    uint32_t picks[8][SAMPLES];
+    const uint32_t *lists[8];
+    const float *rows[8];
+    float frame[9][8];
+    f8 first[3], f[9], shrink = f8_load(o->shrink), low = f8_set(INFINITY), high = f8_set(-INFINITY);
+    for (int i = 0; i < 9; ++i) {
+        for (int at = 0; at < 8; at += 4)
+            d4_store_floats(&frame[i][at], d4_load(&o->frame[i / 3][i % 3][at]));
+        f[i] = f8_load(frame[i]);
+    }
+    memcpy(lists, p->lists, sizeof lists);
+    out->count = p->longest < SAMPLES ? p->longest : SAMPLES;
+    if (p->longest > SAMPLES) {
+        pick_samples(p, picks);
+        for (int i = 0; i < 8; ++i) lists[i] = picks[i];
+    }
+    for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][0];
+    f8_load_columns(rows, first);
+    for (uint32_t j = 0; j < out->count; ++j) {
+        f8 q[3];
+        for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][j];
+        f8_load_columns(rows, q);
+        for (int k = 0; k < 3; ++k) q[k] = f8_mul(f8_sub(q[k], first[k]), shrink);
+        f8 u = f8_add(f8_add(f8_mul(q[0], f[0]), f8_mul(q[1], f[1])), f8_mul(q[2], f[2]));
+        f8 v = f8_add(f8_add(f8_mul(q[0], f[3]), f8_mul(q[1], f[4])), f8_mul(q[2], f[5]));
+        f8 w = f8_add(f8_add(f8_mul(q[0], f[6]), f8_mul(q[1], f[7])), f8_mul(q[2], f[8]));
+        f8_store(out->u[j], u), f8_store(out->v[j], v);
+        low = f8_min(w, low), high = f8_max(w, high);
+    }
+    out->height = f8_sub(high, low);
+}
+
+typedef struct turn {
+    f8 area, cosine, sine;
+} turn;
+
+/* Takes the turn where the sides x and y make a smaller box. */
+static inline void offer(turn *best, f8 x, f8 y, f8 height, float cosine, float sine) {
+    f8 area = f8_add(f8_mul(x, y), f8_mul(height, f8_add(x, y)));
+    best->cosine = f8_if_lt(area, best->area, f8_set(cosine), best->cosine);
+    best->sine = f8_if_lt(area, best->area, f8_set(sine), best->sine);
+    best->area = f8_min(area, best->area);
+}
+
+typedef struct range {
+    f8 low, high;
+} range;
+
+static inline range empty_range(void) {
+    return (range){f8_set(INFINITY), f8_set(-INFINITY)};
+}
+static inline void widen(range *r, f8 x) {
+    r->low = f8_min(x, r->low), r->high = f8_max(x, r->high);
+}
+static inline f8 width(range r) {
+    return f8_sub(r.high, r.low);
+}
+
+/* Turned by an angle below 45 degrees, and by what it leaves of 90. */
+static inline void try_pair(const plane_points *p, float cosine, float sine, turn *best) {
+    f8 c = f8_set(cosine), s = f8_set(sine);
+    range x = empty_range(), y = x, other_x = x, other_y = x;
+    for (uint32_t j = 0; j < p->count; ++j) {
+        f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
+        f8 cu = f8_mul(c, u), sv = f8_mul(s, v), cv = f8_mul(c, v), su = f8_mul(s, u);
+        widen(&x, f8_add(cu, sv)), widen(&y, f8_sub(cv, su));
+        widen(&other_x, f8_add(su, cv)), widen(&other_y, f8_sub(sv, cu));
+    }
+    offer(best, width(x), width(y), p->height, cosine, sine);
+    offer(best, width(other_x), width(other_y), p->height, sine, cosine);
+}
+
+/* Not at all, and by 45 degrees. */
+static inline void try_ends(const plane_points *p, turn *best) {
+    range x = empty_range(), y = x, other_x = x, other_y = x;
+    for (uint32_t j = 0; j < p->count; ++j) {
+        f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
+        widen(&x, u), widen(&y, v);
+        widen(&other_x, f8_add(u, v)), widen(&other_y, f8_sub(v, u));
+    }
+    const float half = 0.70710678f;
+    offer(best, width(x), width(y), p->height, 1, 0);
+    offer(best, f8_mul(f8_set(half), width(other_x)), f8_mul(f8_set(half), width(other_y)), p->height, half,
+          half);
+}
+
+/* The rotation whose rows are the axes a, a right-handed frame, as a quaternion. */
+static void rotate_four(fct_octet *o, int at, const d4 a[3][3]) {
+    const d4 one = d4_set(1);
+    d4 x = a[0][0], y = a[1][1], z = a[2][2];
+    d4 xy = d4_add(a[0][1], a[1][0]), xz = d4_add(a[0][2], a[2][0]), yz = d4_add(a[1][2], a[2][1]);
+    d4 wx = d4_sub(a[1][2], a[2][1]), wy = d4_sub(a[2][0], a[0][2]), wz = d4_sub(a[0][1], a[1][0]);
+    d4 rows[4][4] = {{d4_sub(d4_sub(d4_add(one, x), y), z), xy, xz, wx},
+                     {xy, d4_sub(d4_add(d4_sub(one, x), y), z), yz, wy},
+                     {xz, yz, d4_add(d4_sub(d4_sub(one, x), y), z), wz},
+                     {wx, wy, wz, d4_add(d4_add(d4_add(one, x), y), z)}};
+    d4 most = rows[0][0], *q = rows[0], squared = d4_set(0);
+    for (int i = 1; i < 4; ++i) { /* the row with the largest entry on the diagonal */
+        d4 entry = rows[i][i];
+        for (int k = 0; k < 4; ++k) q[k] = d4_if_lt(most, entry, rows[i][k], q[k]);
+        most = d4_max(entry, most);
+    }
+    for (int k = 0; k < 4; ++k) squared = mad(squared, q[k], q[k]);
+    d4 invert = d4_div(one, d4_sqrt(squared));
+    for (int k = 0; k < 4; ++k) d4_store_floats(&o->words[ROTATION + k][at], d4_mul(q[k], invert));
+}
+
+void fct_octet_turn(fct_octet *o, const fct_octet_points *points) {
+    plane_points p;
+    turn best = {f8_set(INFINITY), f8_set(1), f8_set(0)};
+    float cosines[8], sines[8];
+    project(o, points, &p);
+    try_ends(&p, &best);
+    try_pair(&p, 0.98078528f, 0.19509032f, &best);
+    try_pair(&p, 0.92387953f, 0.38268343f, &best);
+    try_pair(&p, 0.83146961f, 0.55557023f, &best);
+    f8_store(cosines, best.cosine), f8_store(sines, best.sine);
+    for (int at = 0; at < 8; at += 4) {
+        d4 c = d4_load_floats(cosines + at), s = d4_load_floats(sines + at), axes[3][3];
+        for (int i = 0; i < 3; ++i) {
+            d4 u = d4_load(&o->frame[0][i][at]), v = d4_load(&o->frame[1][i][at]);
+            axes[0][i] = d4_add(d4_mul(c, u), d4_mul(s, v));
+            axes[1][i] = d4_sub(d4_mul(c, v), d4_mul(s, u));
+            axes[2][i] = d4_load(&o->frame[2][i][at]);
+        }
+        rotate_four(o, at, (const d4(*)[3])axes);
+    }
+}
+
+/* --- Box --- */
+
+/* fct_box_axes, to the bit. */
+static inline void expand_axes(const fct_octet *o, int at, d4 axes[3][3]) {
+    const d4 one = d4_set(1);
+    d4 x = d4_load_floats(&o->words[ROTATION][at]), y = d4_load_floats(&o->words[ROTATION + 1][at]);
+    d4 z = d4_load_floats(&o->words[ROTATION + 2][at]), w = d4_load_floats(&o->words[ROTATION + 3][at]);
+    d4 xx = d4_mul(x, x), yy = d4_mul(y, y), zz = d4_mul(z, z), ww = d4_mul(w, w);
+    d4 xy = d4_mul(x, y), xz = d4_mul(x, z), yz = d4_mul(y, z);
+    d4 wx = d4_mul(w, x), wy = d4_mul(w, y), wz = d4_mul(w, z);
+    d4 s = d4_div(d4_set(2), d4_add(d4_add(d4_add(xx, yy), zz), ww));
+    d4 full[9] = {d4_sub(one, d4_mul(s, d4_add(yy, zz))),
+                  d4_mul(s, d4_add(xy, wz)),
+                  d4_mul(s, d4_sub(xz, wy)),
+                  d4_mul(s, d4_sub(xy, wz)),
+                  d4_sub(one, d4_mul(s, d4_add(xx, zz))),
+                  d4_mul(s, d4_add(yz, wx)),
+                  d4_mul(s, d4_add(xz, wy)),
+                  d4_mul(s, d4_sub(yz, wx)),
+                  d4_sub(one, d4_mul(s, d4_add(xx, yy)))};
+    for (int i = 0; i < 9; ++i) {
+        float rounded[4];
+        d4_store_floats(rounded, full[i]);
+        axes[i / 3][i % 3] = d4_load_floats(rounded);
+    }
+}
+
+static inline void load_points(const fct_octet_points *p, int at, uint32_t j, d4 q[4]) {
+    for (int i = 0; i < 4; ++i) q[i] = d4_load_floats(p->points + p->lists[at + i][j]);
+    d4_transpose(q);
+}
+
+static void fit_four(fct_octet *o, int at, const fct_octet_points *p) {
+    d4 a[3][3], low[3], high[3], first[4], center[3], size = d4_set(0);
+    expand_axes(o, at, a);
+    for (int k = 0; k < 3; ++k) low[k] = d4_set(INFINITY), high[k] = d4_set(-INFINITY);
+    for (uint32_t j = 0; j < p->longest; ++j) {
+        d4 q[4];
+        load_points(p, at, j, q);
+        for (int k = 0; k < 3; ++k) {
+            d4 x = dot(q, a[k]);
+            low[k] = d4_min(x, low[k]), high[k] = d4_max(x, high[k]);
+        }
+    }
+    /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
+    load_points(p, at, 0, first);
+    for (int i = 0; i < 3; ++i) center[i] = first[i];
+    for (int k = 0; k < 3; ++k) {
+        d4 way = d4_sub(d4_mul(d4_set(0.5), d4_add(low[k], high[k])), dot(first, a[k]));
+        for (int i = 0; i < 3; ++i) center[i] = mad(center[i], way, a[k][i]);
+        size = d4_max(size, d4_max(d4_abs(low[k]), d4_abs(high[k])));
+    }
+    for (int i = 0; i < 3; ++i) {
+        d4_store_floats(&o->words[CENTER + i][at], center[i]);
+        center[i] = d4_load_floats(&o->words[CENTER + i][at]);
+    }
+    d4 slack = d4_mul(d4_set(16 * DBL_EPSILON), size); /* whatever order of operations checks it */
+    for (int k = 0; k < 3; ++k) {
+        d4 middle = dot(center, a[k]), half = d4_max(d4_sub(high[k], middle), d4_sub(middle, low[k]));
+        half = d4_add(half, slack);
+        /* rounded it is not less than it was */
+        half = d4_add(d4_mul(half, d4_set(1 + 0x1p-23)), d4_set(0x1p-149));
+        d4_store_floats(&o->words[HALF + k][at], half);
+    }
+}
+
+void fct_octet_fit(fct_octet *o, const fct_octet_points *points) {
+    const f8 limit = f8_set(FLT_MAX);
+    fit_four(o, 0, points);
+    fit_four(o, 4, points);
+    uint32_t within = 255;
+    for (int k = 0; k < 3; ++k) {
+        within &= f8_le(f8_load(o->words[HALF + k]), limit);
+        within &= f8_le(f8_abs(f8_load(o->words[CENTER + k])), limit);
+    }
+    if (within == 255) return;
+    /* A model wider than half the range of floats: a turned box may not have one. */
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < 4 && !(within >> i & 1); ++k) o->words[ROTATION + k][i] = k < 3 ? 0 : 1;
+    fit_four(o, 0, points);
+    fit_four(o, 4, points);
+    for (int k = 0; k < 3; ++k) f8_store(o->words[HALF + k], f8_min(f8_load(o->words[HALF + k]), limit));
+}
+
+/* --- All --- */
+
+void fct_octet_store(const fct_octet *o, uint32_t lane, fct_cluster *out) {
+    float words[FCT_OCTET_WORDS];
+    for (int i = 0; i < FCT_OCTET_WORDS; ++i) words[i] = o->words[i][lane];
+    memcpy(out, words, sizeof words);
+}
+
+void fct_octet_store_all(const fct_octet *o, fct_cluster *const out[8]) {
+    static_assert(offsetof(fct_cluster, cost) == FCT_OCTET_WORDS * sizeof(float),
+                  "all words before the cost");
+    float turned[8][FCT_OCTET_WORDS];
+    for (int from = 0; from < 24; from += 8) {
+        f8 m[8];
+        for (int i = 0; i < 8; ++i) m[i] = f8_load(o->words[from + i]);
+        f8_transpose(m);
+        for (int i = 0; i < 8; ++i) f8_store(turned[i] + from, m[i]);
+    }
+    for (int i = 0; i < 8; ++i)
+        for (int k = 24; k < FCT_OCTET_WORDS; ++k) turned[i][k] = o->words[k][i];
+    for (int i = 0; i < 8; ++i) memcpy(out[i], turned[i], sizeof turned[i]);
+}
