@@ -13,8 +13,8 @@
  * value in the order x, y, z. */
 void fct_eigen3(const double m[6], double values[3], v3 vectors[3]);
 
-/* The same for four matrices side by side, with the same results whatever stands in the other lanes:
+/* The same for eight matrices side by side, with the same results whatever stands in the other lanes:
  * vectors[i][k] is coordinate k of vector i. values may be NULL. */
-void fct_eigen3_four(const d4 m[6], d4 values[3], d4 vectors[3][3]);
+void fct_eigen3_eight(const d8 m[6], d8 values[3], d8 vectors[3][3]);
 
 #endif

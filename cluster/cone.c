@@ -38,25 +38,23 @@ float fct_cone_widen(float widest, fct_points n, size_t begin, size_t end, const
 
 /* asin(x) for x in [0, 1] within 4e-10, less than a float shows: a polynomial up to 1/2, half the angle
  * beyond. */
-static inline d4 arc_sine(d4 x) {
+static inline d8 arc_sine(d8 x) {
     static const double series[] = {
         2027025.0 / 175472640, 135135.0 / 9676800, 10395.0 / 599040, 945.0 / 42240,
         105.0 / 3456,          15.0 / 336,         3.0 / 40,         1.0 / 6};
-    const d4 half = d4_set(0.5), one = d4_set(1);
-    d4 z = d4_if_lt(half, x, d4_mul(half, d4_sub(one, x)), d4_mul(x, x));
-    d4 r = d4_if_lt(half, x, d4_sqrt(z), x);
-    d4 p = d4_add(d4_set(34459425.0 / 3530096640), d4_mul(z, d4_set(0.0111)));
-    for (int i = 0; i < 8; ++i) p = d4_add(d4_set(series[i]), d4_mul(z, p));
-    d4 small = d4_add(r, d4_mul(d4_mul(r, z), p));
-    return d4_if_lt(half, x, d4_sub(d4_set(1.5707963267948966), d4_add(small, small)), small);
+    const d8 half = d8_set(0.5), one = d8_set(1);
+    d8 z = d8_if_lt(half, x, d8_mul(half, d8_sub(one, x)), d8_mul(x, x));
+    d8 r = d8_if_lt(half, x, d8_sqrt(z), x);
+    d8 p = d8_add(d8_set(34459425.0 / 3530096640), d8_mul(z, d8_set(0.0111)));
+    for (int i = 0; i < 8; ++i) p = d8_add(d8_set(series[i]), d8_mul(z, p));
+    d8 small = d8_add(r, d8_mul(d8_mul(r, z), p));
+    return d8_if_lt(half, x, d8_sub(d8_set(1.5707963267948966), d8_add(small, small)), small);
 }
 
 void fct_cone_angles(const float widest[8], float angles[8]) {
-    for (int i = 0; i < 8; i += 4) {
-        d4 chord = d4_add(d4_sqrt(d4_load_floats(widest + i)), d4_set(5e-7));
-        d4 angle = arc_sine(d4_min(d4_mul(chord, d4_set(0.5)), d4_set(1)));
-        d4_store_floats(angles + i, d4_mul(angle, d4_set(2 * (1 + 2e-7))));
-    }
+    d8 chord = d8_add(d8_sqrt(d8_load_floats(widest)), d8_set(5e-7));
+    d8 angle = arc_sine(d8_min(d8_mul(chord, d8_set(0.5)), d8_set(1)));
+    d8_store_floats(angles, d8_mul(angle, d8_set(2 * (1 + 2e-7))));
     f8_store(angles, f8_min(f8_load(angles), f8_set(3.14159274f)));
 }
 

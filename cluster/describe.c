@@ -121,7 +121,8 @@ static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first
             uint32_t child = link->child[k];
             s->parts[i][k] = child < nodes ? &s->nodes[count] : &s->leaves[child - nodes - first];
             if (child >= nodes) continue;
-            __builtin_prefetch(&tree->links[child]);
+            __builtin_prefetch(&tree->links[child].child);
+            __builtin_prefetch(&tree->links[child].cost); /* may be in the next line */
             s->order[count++] = child;
         }
     }
@@ -205,11 +206,12 @@ static inline void ask_for_record(const fct_cluster *c) {
 static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin, uint32_t count,
                            block_scratch *s) {
     fct_octet o;
-    fct_octet_points p = {.points = s->points[0]};
-    fct_octet_normals n = {.normals = s->normals[0]};
+    fct_octet_points p;
+    fct_octet_normals n;
     const fct_sums *sums[8];
     fct_cluster *out[8];
     uint32_t nodes[8];
+    n.normals = s->normals[0], p.points = s->points[0], p.longest = 0;
     for (uint32_t i = 0; i < 8; ++i) {
         nodes[i] = s->by_size[begin + i < count ? begin + i : begin];
         const fct_node_link *link = &s->links[nodes[i]];

@@ -29,89 +29,95 @@ enum {
     HALF = offsetof(fct_cluster, box_half) / sizeof(float)
 };
 
-static inline d4 dot(const d4 a[3], const d4 b[3]) {
-    return d4_add(d4_add(d4_mul(a[0], b[0]), d4_mul(a[1], b[1])), d4_mul(a[2], b[2]));
+static inline d8 dot(const d8 a[3], const d8 b[3]) {
+    return d8_add(d8_add(d8_mul(a[0], b[0]), d8_mul(a[1], b[1])), d8_mul(a[2], b[2]));
 }
-static inline d4 mad(d4 a, d4 s, d4 b) {
-    return d4_add(a, d4_mul(s, b));
+static inline d8 mad(d8 a, d8 s, d8 b) {
+    return d8_add(a, d8_mul(s, b));
 }
-static inline d4 negative(d4 a) {
-    return d4_mul(a, d4_set(-1));
+static inline d8 negative(d8 a) {
+    return d8_mul(a, d8_set(-1));
 }
 
 /* --- Sums, plane and frame --- */
 
-static inline void store_frame(fct_octet *o, int at, int axis, const d4 v[3]) {
-    for (int i = 0; i < 3; ++i) d4_store(&o->frame[axis][i][at], v[i]);
-}
-
-/* Lanes `at` to at + 3. */
-static void sum_four(fct_octet *o, int at, const fct_sums *const sums[4]) {
-    const d4 none = d4_set(0), one = d4_set(1), limit = d4_set((double)FLT_MAX);
-    d4 s[20], axes[3][3];
+/* The sums' twenty numbers, turned on their side. */
+static inline void load_sums(const fct_sums *const sums[8], d8 s[20]) {
     for (int i = 0; i < 20; i += 4) {
-        for (int k = 0; k < 4; ++k) s[i + k] = d4_load((const double *)sums[k] + i);
-        d4_transpose(s + i);
+        d4 low[4], high[4];
+        for (int k = 0; k < 4; ++k) {
+            low[k] = d4_load((const double *)sums[k] + i);
+            high[k] = d4_load((const double *)sums[k + 4] + i);
+        }
+        d4_transpose(low), d4_transpose(high);
+        for (int k = 0; k < 4; ++k) s[i + k] = (d8){low[k], high[k]};
     }
-    const d4 area = s[0], weight = s[1], *moment = s + 2, *covariance = s + 8, *vector = s + 14,
-             *center = s + 17;
-    d4 factor = d4_if_lt(limit, area, d4_div(limit, area), one);
-    d4_store_floats(&o->words[AREA][at], d4_mul(area, factor));
-    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[VECTOR + i][at], d4_mul(vector[i], factor));
-    for (int i = 0; i < 6; ++i) d4_store_floats(&o->words[MOMENT + i][at], d4_mul(moment[i], factor));
-    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[CENTROID + i][at], center[i]);
-    fct_eigen3_four(covariance, NULL, axes);
-    d4 *n = axes[0], *u = axes[2], side = d4_if_lt(dot(n, vector), none, d4_set(-1), one);
-    for (int i = 0; i < 3; ++i) n[i] = d4_mul(n[i], side);
-    d4 v[3] = {d4_sub(d4_mul(n[1], u[2]), d4_mul(n[2], u[1])), d4_sub(d4_mul(n[2], u[0]), d4_mul(n[0], u[2])),
-               d4_sub(d4_mul(n[0], u[1]), d4_mul(n[1], u[0]))};
-    store_frame(o, at, 0, u);
-    store_frame(o, at, 1, v);
-    store_frame(o, at, 2, n);
-    for (int i = 0; i < 3; ++i) d4_store_floats(&o->words[PLANE + i][at], n[i]);
-    d4 offset = negative(dot(n, center));
-    d4_store_floats(&o->words[PLANE + 3][at], d4_max(d4_min(offset, limit), negative(limit)));
-    d4 spread = d4_add(d4_add(covariance[0], covariance[3]), covariance[5]);
-    d4 radius = d4_sqrt(d4_div(spread, weight)); /* may be no number */
-    radius = d4_if_lt(none, radius, d4_if_lt(radius, limit, radius, one), one);
-    d4_store_floats(&o->shrink[at], d4_div(one, radius));
 }
 
 void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
-    sum_four(o, 0, sums);
-    sum_four(o, 4, sums + 4);
+    const d8 none = d8_set(0), one = d8_set(1), limit = d8_set((double)FLT_MAX);
+    d8 s[20], axes[3][3];
+    load_sums(sums, s);
+    const d8 area = s[0], weight = s[1], *moment = s + 2, *covariance = s + 8, *vector = s + 14,
+             *center = s + 17;
+    d8 factor = d8_if_lt(limit, area, d8_div(limit, area), one);
+    d8_store_floats(o->words[AREA], d8_mul(area, factor));
+    for (int i = 0; i < 3; ++i) d8_store_floats(o->words[VECTOR + i], d8_mul(vector[i], factor));
+    for (int i = 0; i < 6; ++i) d8_store_floats(o->words[MOMENT + i], d8_mul(moment[i], factor));
+    for (int i = 0; i < 3; ++i) d8_store_floats(o->words[CENTROID + i], center[i]);
+    d8 spread = d8_add(d8_add(covariance[0], covariance[3]), covariance[5]);
+    d8 radius = d8_sqrt(d8_div(spread, weight)); /* may be no number */
+    radius = d8_if_lt(none, radius, d8_if_lt(radius, limit, radius, one), one);
+    d8_store_floats(o->shrink, d8_div(one, radius));
+    fct_eigen3_eight(covariance, NULL, axes);
+    d8 *n = axes[0], *u = axes[2], side = d8_if_lt(dot(n, vector), none, d8_set(-1), one);
+    for (int i = 0; i < 3; ++i) n[i] = d8_mul(n[i], side);
+    d8 v[3] = {d8_sub(d8_mul(n[1], u[2]), d8_mul(n[2], u[1])), d8_sub(d8_mul(n[2], u[0]), d8_mul(n[0], u[2])),
+               d8_sub(d8_mul(n[0], u[1]), d8_mul(n[1], u[0]))};
+    for (int i = 0; i < 3; ++i) {
+        d8_store(o->frame[0][i], u[i]), d8_store(o->frame[1][i], v[i]), d8_store(o->frame[2][i], n[i]);
+        d8_store_floats(o->words[PLANE + i], n[i]);
+    }
+    d8 offset = negative(dot(n, center));
+    d8_store_floats(o->words[PLANE + 3], d8_max(d8_min(offset, limit), negative(limit)));
 }
 
 /* --- Cone --- */
 
 /* Unit area vectors to `axis`; returns a bit for each lane that has none. */
-static uint32_t find_axes(const fct_octet *o, float axis[3][8]) {
-    const d4 none = d4_set(0);
-    uint32_t lost = 0;
-    for (int at = 0; at < 8; at += 4) {
-        d4 s[3];
-        for (int i = 0; i < 3; ++i) s[i] = d4_load_floats(&o->words[VECTOR + i][at]);
-        d4 squared = dot(s, s), invert = d4_div(d4_set(1), d4_sqrt(squared));
-        lost |= (15 & ~d4_lt(none, squared)) << at;
-        for (int i = 0; i < 3; ++i) d4_store_floats(&axis[i][at], d4_mul(s[i], invert));
-    }
-    return lost;
+static inline uint32_t find_axes(const fct_octet *o, float axis[3][8]) {
+    d8 s[3];
+    for (int i = 0; i < 3; ++i) s[i] = d8_load_floats(o->words[VECTOR + i]);
+    d8 squared = dot(s, s), invert = d8_div(d8_set(1), d8_sqrt(squared));
+    for (int i = 0; i < 3; ++i) d8_store_floats(axis[i], d8_mul(s[i], invert));
+    return 255 & ~d8_lt(d8_set(0), squared);
+}
+
+static inline f8 chords_to(const float *const rows[8], const f8 axis[3]) {
+    f8 p[3];
+    f8_load_columns(rows, p);
+    for (int k = 0; k < 3; ++k) p[k] = f8_sub(p[k], axis[k]), p[k] = f8_mul(p[k], p[k]);
+    return f8_add(f8_add(p[0], p[1]), p[2]);
 }
 
 void fct_octet_cone(fct_octet *o, const fct_octet_normals *n) {
     float axis[3][8], chords[8];
-    uint32_t lost = find_axes(o, axis), longest = 0;
-    f8 x = f8_load(axis[0]), y = f8_load(axis[1]), z = f8_load(axis[2]), widest = f8_set(0);
-    for (int i = 0; i < 8; ++i) longest = n->counts[i] > longest ? n->counts[i] : longest;
-    for (uint32_t j = 0; j < longest; ++j) {
-        const float *rows[8];
-        f8 p[3];
-        for (int i = 0; i < 8; ++i)
-            rows[i] = n->normals + 4 * (size_t)(n->firsts[i] + (j < n->counts[i] ? j : 0));
-        f8_load_columns(rows, p);
-        p[0] = f8_sub(p[0], x), p[1] = f8_sub(p[1], y), p[2] = f8_sub(p[2], z);
-        f8 chord = f8_add(f8_add(f8_mul(p[0], p[0]), f8_mul(p[1], p[1])), f8_mul(p[2], p[2]));
-        widest = f8_max(chord, widest); /* NaN is passed over */
+    const float *rows[8], *firsts[8];
+    uint32_t lost = find_axes(o, axis), shortest = UINT32_MAX, longest = 0;
+    const f8 a[3] = {f8_load(axis[0]), f8_load(axis[1]), f8_load(axis[2])};
+    f8 widest = f8_set(0);
+    for (int i = 0; i < 8; ++i) {
+        firsts[i] = rows[i] = n->normals + 4 * (size_t)n->firsts[i];
+        shortest = n->counts[i] < shortest ? n->counts[i] : shortest;
+        longest = n->counts[i] > longest ? n->counts[i] : longest;
+    }
+    for (uint32_t j = 0; j < shortest; ++j) {
+        widest = f8_max(chords_to(rows, a), widest); /* NaN is passed over */
+        for (int i = 0; i < 8; ++i) rows[i] += 4;
+    }
+    for (uint32_t j = shortest; j < longest; ++j) {
+        for (int i = 0; i < 8; ++i) rows[i] = firsts[i] + (j < n->counts[i] ? 4 * (size_t)j : 0);
+        widest = f8_max(chords_to(rows, a), widest);
     }
     f8_store(chords, widest);
     for (int i = 0; lost >> i; ++i)
@@ -121,6 +127,7 @@ void fct_octet_cone(fct_octet *o, const fct_octet_normals *n) {
 
 /* --- Turn and rotation --- */
 
+/* Points in the plane from the first of each cluster, which is left out. */
 typedef struct plane_points {
     float u[SAMPLES][8], v[SAMPLES][8];
     uint32_t count;
@@ -134,20 +141,20 @@ static void pick_samples(const fct_octet_points *p, uint32_t picks[8][SAMPLES]) 
             picks[i][j] = p->lists[i][p->counts[i] > SAMPLES ? j * p->counts[i] / SAMPLES : j];
 }
 
-/* Points in the frame, from the first of each cluster, over its radius. */
+/* Points in the frame, over the cluster's radius. */
 static void project(const fct_octet *o, const fct_octet_points *p, plane_points *out) {
     uint32_t picks[8][SAMPLES];
     const uint32_t *lists[8];
     const float *rows[8];
     float frame[9][8];
-    f8 first[3], f[9], shrink = f8_load(o->shrink), low = f8_set(INFINITY), high = f8_set(-INFINITY);
+    f8 first[3], f[9], shrink = f8_load(o->shrink), low = f8_set(0), high = low;
     for (int i = 0; i < 9; ++i) {
         for (int at = 0; at < 8; at += 4)
             d4_store_floats(&frame[i][at], d4_load(&o->frame[i / 3][i % 3][at]));
         f[i] = f8_load(frame[i]);
     }
     memcpy(lists, p->lists, sizeof lists);
-    out->count = p->longest < SAMPLES ? p->longest : SAMPLES;
+    out->count = (p->longest < SAMPLES ? p->longest : SAMPLES) - 1;
     if (p->longest > SAMPLES) {
         pick_samples(p, picks);
         for (int i = 0; i < 8; ++i) lists[i] = picks[i];
@@ -156,7 +163,7 @@ static void project(const fct_octet *o, const fct_octet_points *p, plane_points 
     f8_load_columns(rows, first);
     for (uint32_t j = 0; j < out->count; ++j) {
         f8 q[3];
-        for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][j];
+        for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][j + 1];
         f8_load_columns(rows, q);
         for (int k = 0; k < 3; ++k) q[k] = f8_mul(f8_sub(q[k], first[k]), shrink);
         f8 u = f8_add(f8_add(f8_mul(q[0], f[0]), f8_mul(q[1], f[1])), f8_mul(q[2], f[2]));
@@ -184,9 +191,6 @@ typedef struct range {
     f8 low, high;
 } range;
 
-static inline range empty_range(void) {
-    return (range){f8_set(INFINITY), f8_set(-INFINITY)};
-}
 static inline void widen(range *r, f8 x) {
     r->low = f8_min(x, r->low), r->high = f8_max(x, r->high);
 }
@@ -197,7 +201,7 @@ static inline f8 width(range r) {
 /* Turned by an angle below 45 degrees, and by what it leaves of 90. */
 static inline void try_pair(const plane_points *p, float cosine, float sine, turn *best) {
     f8 c = f8_set(cosine), s = f8_set(sine);
-    range x = empty_range(), y = x, other_x = x, other_y = x;
+    range x = {f8_set(0), f8_set(0)}, y = x, other_x = x, other_y = x;
     for (uint32_t j = 0; j < p->count; ++j) {
         f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
         f8 cu = f8_mul(c, u), sv = f8_mul(s, v), cv = f8_mul(c, v), su = f8_mul(s, u);
@@ -210,7 +214,7 @@ static inline void try_pair(const plane_points *p, float cosine, float sine, tur
 
 /* Not at all, and by 45 degrees. */
 static inline void try_ends(const plane_points *p, turn *best) {
-    range x = empty_range(), y = x, other_x = x, other_y = x;
+    range x = {f8_set(0), f8_set(0)}, y = x, other_x = x, other_y = x;
     for (uint32_t j = 0; j < p->count; ++j) {
         f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
         widen(&x, u), widen(&y, v);
@@ -223,119 +227,122 @@ static inline void try_ends(const plane_points *p, turn *best) {
 }
 
 /* The rotation whose rows are the axes a, a right-handed frame, as a quaternion. */
-static void rotate_four(fct_octet *o, int at, const d4 a[3][3]) {
-    const d4 one = d4_set(1);
-    d4 x = a[0][0], y = a[1][1], z = a[2][2];
-    d4 xy = d4_add(a[0][1], a[1][0]), xz = d4_add(a[0][2], a[2][0]), yz = d4_add(a[1][2], a[2][1]);
-    d4 wx = d4_sub(a[1][2], a[2][1]), wy = d4_sub(a[2][0], a[0][2]), wz = d4_sub(a[0][1], a[1][0]);
-    d4 rows[4][4] = {{d4_sub(d4_sub(d4_add(one, x), y), z), xy, xz, wx},
-                     {xy, d4_sub(d4_add(d4_sub(one, x), y), z), yz, wy},
-                     {xz, yz, d4_add(d4_sub(d4_sub(one, x), y), z), wz},
-                     {wx, wy, wz, d4_add(d4_add(d4_add(one, x), y), z)}};
-    d4 most = rows[0][0], *q = rows[0], squared = d4_set(0);
+static void rotate(fct_octet *o, const d8 a[3][3]) {
+    const d8 one = d8_set(1);
+    d8 x = a[0][0], y = a[1][1], z = a[2][2];
+    d8 xy = d8_add(a[0][1], a[1][0]), xz = d8_add(a[0][2], a[2][0]), yz = d8_add(a[1][2], a[2][1]);
+    d8 wx = d8_sub(a[1][2], a[2][1]), wy = d8_sub(a[2][0], a[0][2]), wz = d8_sub(a[0][1], a[1][0]);
+    d8 rows[4][4] = {{d8_sub(d8_sub(d8_add(one, x), y), z), xy, xz, wx},
+                     {xy, d8_sub(d8_add(d8_sub(one, x), y), z), yz, wy},
+                     {xz, yz, d8_add(d8_sub(d8_sub(one, x), y), z), wz},
+                     {wx, wy, wz, d8_add(d8_add(d8_add(one, x), y), z)}};
+    d8 most = rows[0][0], *q = rows[0], squared = d8_set(0);
     for (int i = 1; i < 4; ++i) { /* the row with the largest entry on the diagonal */
-        d4 entry = rows[i][i];
-        for (int k = 0; k < 4; ++k) q[k] = d4_if_lt(most, entry, rows[i][k], q[k]);
-        most = d4_max(entry, most);
+        d8 entry = rows[i][i];
+        for (int k = 0; k < 4; ++k) q[k] = d8_if_lt(most, entry, rows[i][k], q[k]);
+        most = d8_max(entry, most);
     }
     for (int k = 0; k < 4; ++k) squared = mad(squared, q[k], q[k]);
-    d4 invert = d4_div(one, d4_sqrt(squared));
-    for (int k = 0; k < 4; ++k) d4_store_floats(&o->words[ROTATION + k][at], d4_mul(q[k], invert));
+    d8 invert = d8_div(one, d8_sqrt(squared));
+    for (int k = 0; k < 4; ++k) d8_store_floats(o->words[ROTATION + k], d8_mul(q[k], invert));
 }
 
 void fct_octet_turn(fct_octet *o, const fct_octet_points *points) {
     plane_points p;
     turn best = {f8_set(INFINITY), f8_set(1), f8_set(0)};
     float cosines[8], sines[8];
+    d8 axes[3][3];
     project(o, points, &p);
     try_ends(&p, &best);
     try_pair(&p, 0.98078528f, 0.19509032f, &best);
     try_pair(&p, 0.92387953f, 0.38268343f, &best);
     try_pair(&p, 0.83146961f, 0.55557023f, &best);
     f8_store(cosines, best.cosine), f8_store(sines, best.sine);
-    for (int at = 0; at < 8; at += 4) {
-        d4 c = d4_load_floats(cosines + at), s = d4_load_floats(sines + at), axes[3][3];
-        for (int i = 0; i < 3; ++i) {
-            d4 u = d4_load(&o->frame[0][i][at]), v = d4_load(&o->frame[1][i][at]);
-            axes[0][i] = d4_add(d4_mul(c, u), d4_mul(s, v));
-            axes[1][i] = d4_sub(d4_mul(c, v), d4_mul(s, u));
-            axes[2][i] = d4_load(&o->frame[2][i][at]);
-        }
-        rotate_four(o, at, (const d4(*)[3])axes);
+    d8 c = d8_load_floats(cosines), s = d8_load_floats(sines);
+    for (int i = 0; i < 3; ++i) {
+        d8 u = d8_load(o->frame[0][i]), v = d8_load(o->frame[1][i]);
+        axes[0][i] = d8_add(d8_mul(c, u), d8_mul(s, v));
+        axes[1][i] = d8_sub(d8_mul(c, v), d8_mul(s, u));
+        axes[2][i] = d8_load(o->frame[2][i]);
     }
+    rotate(o, (const d8(*)[3])axes);
 }
 
 /* --- Box --- */
 
 /* fct_box_axes, to the bit. */
-static inline void expand_axes(const fct_octet *o, int at, d4 axes[3][3]) {
-    const d4 one = d4_set(1);
-    d4 x = d4_load_floats(&o->words[ROTATION][at]), y = d4_load_floats(&o->words[ROTATION + 1][at]);
-    d4 z = d4_load_floats(&o->words[ROTATION + 2][at]), w = d4_load_floats(&o->words[ROTATION + 3][at]);
-    d4 xx = d4_mul(x, x), yy = d4_mul(y, y), zz = d4_mul(z, z), ww = d4_mul(w, w);
-    d4 xy = d4_mul(x, y), xz = d4_mul(x, z), yz = d4_mul(y, z);
-    d4 wx = d4_mul(w, x), wy = d4_mul(w, y), wz = d4_mul(w, z);
-    d4 s = d4_div(d4_set(2), d4_add(d4_add(d4_add(xx, yy), zz), ww));
-    d4 full[9] = {d4_sub(one, d4_mul(s, d4_add(yy, zz))),
-                  d4_mul(s, d4_add(xy, wz)),
-                  d4_mul(s, d4_sub(xz, wy)),
-                  d4_mul(s, d4_sub(xy, wz)),
-                  d4_sub(one, d4_mul(s, d4_add(xx, zz))),
-                  d4_mul(s, d4_add(yz, wx)),
-                  d4_mul(s, d4_add(xz, wy)),
-                  d4_mul(s, d4_sub(yz, wx)),
-                  d4_sub(one, d4_mul(s, d4_add(xx, yy)))};
+static inline void expand_axes(const fct_octet *o, d8 axes[3][3]) {
+    const d8 one = d8_set(1);
+    d8 x = d8_load_floats(o->words[ROTATION]), y = d8_load_floats(o->words[ROTATION + 1]);
+    d8 z = d8_load_floats(o->words[ROTATION + 2]), w = d8_load_floats(o->words[ROTATION + 3]);
+    d8 xx = d8_mul(x, x), yy = d8_mul(y, y), zz = d8_mul(z, z), ww = d8_mul(w, w);
+    d8 xy = d8_mul(x, y), xz = d8_mul(x, z), yz = d8_mul(y, z);
+    d8 wx = d8_mul(w, x), wy = d8_mul(w, y), wz = d8_mul(w, z);
+    d8 s = d8_div(d8_set(2), d8_add(d8_add(d8_add(xx, yy), zz), ww));
+    d8 full[9] = {d8_sub(one, d8_mul(s, d8_add(yy, zz))),
+                  d8_mul(s, d8_add(xy, wz)),
+                  d8_mul(s, d8_sub(xz, wy)),
+                  d8_mul(s, d8_sub(xy, wz)),
+                  d8_sub(one, d8_mul(s, d8_add(xx, zz))),
+                  d8_mul(s, d8_add(yz, wx)),
+                  d8_mul(s, d8_add(xz, wy)),
+                  d8_mul(s, d8_sub(yz, wx)),
+                  d8_sub(one, d8_mul(s, d8_add(xx, yy)))};
     for (int i = 0; i < 9; ++i) {
-        float rounded[4];
-        d4_store_floats(rounded, full[i]);
-        axes[i / 3][i % 3] = d4_load_floats(rounded);
+        float rounded[8];
+        d8_store_floats(rounded, full[i]);
+        axes[i / 3][i % 3] = d8_load_floats(rounded);
     }
 }
 
-static inline void load_points(const fct_octet_points *p, int at, uint32_t j, d4 q[4]) {
-    for (int i = 0; i < 4; ++i) q[i] = d4_load_floats(p->points + p->lists[at + i][j]);
-    d4_transpose(q);
+static inline void load_points(const fct_octet_points *p, uint32_t j, d8 q[3]) {
+    d4 low[4], high[4];
+    for (int i = 0; i < 4; ++i) {
+        low[i] = d4_load_floats(p->points + p->lists[i][j]);
+        high[i] = d4_load_floats(p->points + p->lists[i + 4][j]);
+    }
+    d4_transpose(low), d4_transpose(high);
+    for (int k = 0; k < 3; ++k) q[k] = (d8){low[k], high[k]};
 }
 
-static void fit_four(fct_octet *o, int at, const fct_octet_points *p) {
-    d4 a[3][3], low[3], high[3], first[4], center[3], size = d4_set(0);
-    expand_axes(o, at, a);
-    for (int k = 0; k < 3; ++k) low[k] = d4_set(INFINITY), high[k] = d4_set(-INFINITY);
-    for (uint32_t j = 0; j < p->longest; ++j) {
-        d4 q[4];
-        load_points(p, at, j, q);
+static void fit(fct_octet *o, const fct_octet_points *p) {
+    d8 a[3][3], low[3], high[3], first[3], along[3], center[3], size = d8_set(0);
+    expand_axes(o, a);
+    load_points(p, 0, first);
+    for (int k = 0; k < 3; ++k) along[k] = low[k] = high[k] = dot(first, a[k]);
+    for (uint32_t j = 1; j < p->longest; ++j) {
+        d8 q[3];
+        load_points(p, j, q);
         for (int k = 0; k < 3; ++k) {
-            d4 x = dot(q, a[k]);
-            low[k] = d4_min(x, low[k]), high[k] = d4_max(x, high[k]);
+            d8 x = dot(q, a[k]);
+            low[k] = d8_min(x, low[k]), high[k] = d8_max(x, high[k]);
         }
     }
     /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
-    load_points(p, at, 0, first);
     for (int i = 0; i < 3; ++i) center[i] = first[i];
     for (int k = 0; k < 3; ++k) {
-        d4 way = d4_sub(d4_mul(d4_set(0.5), d4_add(low[k], high[k])), dot(first, a[k]));
+        d8 way = d8_sub(d8_mul(d8_set(0.5), d8_add(low[k], high[k])), along[k]);
         for (int i = 0; i < 3; ++i) center[i] = mad(center[i], way, a[k][i]);
-        size = d4_max(size, d4_max(d4_abs(low[k]), d4_abs(high[k])));
+        size = d8_max(size, d8_max(d8_abs(low[k]), d8_abs(high[k])));
     }
     for (int i = 0; i < 3; ++i) {
-        d4_store_floats(&o->words[CENTER + i][at], center[i]);
-        center[i] = d4_load_floats(&o->words[CENTER + i][at]);
+        d8_store_floats(o->words[CENTER + i], center[i]);
+        center[i] = d8_load_floats(o->words[CENTER + i]);
     }
-    d4 slack = d4_mul(d4_set(16 * DBL_EPSILON), size); /* whatever order of operations checks it */
+    d8 slack = d8_mul(d8_set(16 * DBL_EPSILON), size); /* whatever order of operations checks it */
     for (int k = 0; k < 3; ++k) {
-        d4 middle = dot(center, a[k]), half = d4_max(d4_sub(high[k], middle), d4_sub(middle, low[k]));
-        half = d4_add(half, slack);
+        d8 middle = dot(center, a[k]), half = d8_max(d8_sub(high[k], middle), d8_sub(middle, low[k]));
+        half = d8_add(half, slack);
         /* rounded it is not less than it was */
-        half = d4_add(d4_mul(half, d4_set(1 + 0x1p-23)), d4_set(0x1p-149));
-        d4_store_floats(&o->words[HALF + k][at], half);
+        half = d8_add(d8_mul(half, d8_set(1 + 0x1p-23)), d8_set(0x1p-149));
+        d8_store_floats(o->words[HALF + k], half);
     }
 }
 
 void fct_octet_fit(fct_octet *o, const fct_octet_points *points) {
     const f8 limit = f8_set(FLT_MAX);
-    fit_four(o, 0, points);
-    fit_four(o, 4, points);
     uint32_t within = 255;
+    fit(o, points);
     for (int k = 0; k < 3; ++k) {
         within &= f8_le(f8_load(o->words[HALF + k]), limit);
         within &= f8_le(f8_abs(f8_load(o->words[CENTER + k])), limit);
@@ -344,8 +351,7 @@ void fct_octet_fit(fct_octet *o, const fct_octet_points *points) {
     /* A model wider than half the range of floats: a turned box may not have one. */
     for (int i = 0; i < 8; ++i)
         for (int k = 0; k < 4 && !(within >> i & 1); ++k) o->words[ROTATION + k][i] = k < 3 ? 0 : 1;
-    fit_four(o, 0, points);
-    fit_four(o, 4, points);
+    fit(o, points);
     for (int k = 0; k < 3; ++k) f8_store(o->words[HALF + k], f8_min(f8_load(o->words[HALF + k]), limit));
 }
 

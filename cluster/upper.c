@@ -31,30 +31,60 @@ static void stream_positions(void *user, size_t begin, size_t end, size_t chunk,
         for (size_t k = 0; k < 3; ++k) job->positions[k][v] = job->tree->positions[3 * v + k];
 }
 
-/* Extents of the cluster's vertices along the axes. */
-static fct_extents measure(const upper_job *job, const fct_cluster *c, const float axes[3][3]) {
+/* Widens the extents to the vertices of faces [first, end), but for those that others from vertex `begin` on
+ * were the first to use. */
+static void add_faces(const upper_job *job, size_t first, size_t end, uint32_t begin, const float axes[3][3],
+                      fct_extents *out) {
     const fct_tree *tree = job->tree;
-    fct_points all = {job->positions[0], job->positions[1], job->positions[2]};
-    uint32_t begin = fct_vertices_before(tree, job->outline, c->first),
-             end = fct_vertices_before(tree, job->outline, (size_t)c->first + c->count);
+    const fct_points all = {job->positions[0], job->positions[1], job->positions[2]};
     float old[3][OLD];
-    size_t waiting = 0;
-    fct_extents extents = fct_extents_none();
-    fct_extents_add(&extents, all, begin, end, axes);
-    size_t last = 3 * ((size_t)c->first + c->count); /* more than 8 */
-    for (size_t i = 3 * (size_t)c->first; i < last; i += 8) {
-        if (i + 8 > last) i = last - 8;
-        uint32_t mask = i8_lt(i8_load(tree->triangles + i), i8_set(begin));
+    size_t waiting = 0, last = 3 * end, corners = 3 * (size_t)tree->view.face_count; /* more than 8 */
+    fct_extents_add(out, all, fct_vertices_before(tree, job->outline, first),
+                    fct_vertices_before(tree, job->outline, end), axes);
+    for (size_t i = 3 * first; i < last; i += 8) {
+        size_t at = i + 8 <= corners ? i : corners - 8;
+        uint32_t mask = i8_lt(i8_load(tree->triangles + at), i8_set(begin)) >> (i - at) << (i - at);
+        if (at + 8 > last) mask &= (1u << (last - at)) - 1;
         for (; mask; mask &= mask - 1) {
-            uint32_t v = tree->triangles[i + (uint32_t)__builtin_ctz(mask)];
+            uint32_t v = tree->triangles[at + (uint32_t)__builtin_ctz(mask)];
             for (int k = 0; k < 3; ++k) old[k][waiting] = job->positions[k][v];
             ++waiting;
         }
         if (waiting + 8 <= OLD && i + 8 < last) continue;
-        fct_extents_add(&extents, (fct_points){old[0], old[1], old[2]}, 0, waiting, axes);
+        fct_extents_add(out, (fct_points){old[0], old[1], old[2]}, 0, waiting, axes);
         waiting = 0;
     }
-    return extents;
+}
+
+/* Whether the cluster's box reaches beyond the extents. */
+static bool reaches(const fct_cluster *c, const float axes[3][3], const fct_extents *e) {
+    fct_box box;
+    v3 own[3];
+    fct_cluster_box(c, &box);
+    for (int i = 0; i < 3; ++i) own[i] = v3_scale(v3_load(box.axes[i]), (double)box.half[i]);
+    for (int k = 0; k < 3; ++k) {
+        v3 a = v3_load(axes[k]);
+        double middle = v3_dot(v3_load(box.center), a), reach = 0;
+        for (int i = 0; i < 3; ++i) reach += fabs(v3_dot(own[i], a));
+        reach += 1e-14 * (fabs(middle) + reach);
+        if (middle - reach < e->low[k] || middle + reach > e->high[k]) return true;
+    }
+    return false;
+}
+
+/* Widens the extents to the cluster's vertices: only blocks whose box reaches farther are looked into. */
+static void add_blocks(const upper_job *job, const fct_upper *u, const float axes[3][3], fct_extents *out) {
+    const fct_tree *tree = job->tree;
+    uint32_t nodes = tree->view.node_count;
+    uint32_t begin = fct_vertices_before(tree, job->outline, tree->clusters[u->id].first);
+    for (uint32_t i = u->first_block; i < u->first_block + u->block_count; ++i) {
+        uint32_t root = job->outline->blocks[i];
+        const fct_cluster *c = &tree->clusters[root];
+        if (root >= nodes)
+            add_faces(job, root - nodes, root - nodes + 1, begin, axes, out);
+        else if (reaches(c, axes, out))
+            add_faces(job, c->first, (size_t)c->first + c->count, begin, axes, out);
+    }
 }
 
 /* --- Frames --- */
@@ -100,8 +130,9 @@ static const float *rotation_of(const upper_job *job, uint32_t part) {
     return node < job->tree->view.node_count ? job->tree->clusters[node].box_rotation : world;
 }
 
-/* Which of the frames gives the least box of vertices spread over the cluster. */
-static int choose_frame(const upper_job *job, const fct_cluster *c, float axes[FRAMES][3][3]) {
+/* Which of the frames gives the least box of vertices spread over the cluster; `out` are their extents. */
+static int choose_frame(const upper_job *job, const fct_cluster *c, float axes[FRAMES][3][3],
+                        fct_extents *out) {
     float points[3][TRIALS];
     size_t first = 3 * (size_t)c->first, count = 3 * (size_t)c->count;
     for (size_t i = 0; i < TRIALS; ++i) {
@@ -115,7 +146,7 @@ static int choose_frame(const upper_job *job, const fct_cluster *c, float axes[F
         fct_extents_add(&extents, (fct_points){points[0], points[1], points[2]}, 0, TRIALS,
                         (const float(*)[3])axes[f]);
         double area = fct_box_area(&extents);
-        if (area < least) least = area, best = f;
+        if (area < least) least = area, best = f, *out = extents;
     }
     return best;
 }
@@ -126,13 +157,16 @@ static void fit_box(const upper_job *job, const fct_upper *u, fct_cluster *c) {
                                       rotation_of(job, u->parts[1])};
     float axes[FRAMES][3][3];
     for (int f = 0; f < FRAMES; ++f) fct_box_axes(rotations[f], axes[f]);
-    int best = choose_frame(job, c, axes);
+    fct_extents extents;
+    int best = choose_frame(job, c, axes, &extents);
     v3 point = v3_load(job->tree->positions + 3 * (size_t)job->tree->triangles[3 * (size_t)c->first]);
-    for (bool within = false; !within; best = 1) { /* the world's fits whatever the others do not */
-        fct_extents extents = measure(job, c, (const float(*)[3])axes[best]);
-        memcpy(c->box_rotation, rotations[best], sizeof c->box_rotation);
-        within = fct_box_set(&extents, (const float(*)[3])axes[best], point, c) || best == 1;
-    }
+    add_blocks(job, u, (const float(*)[3])axes[best], &extents);
+    memcpy(c->box_rotation, rotations[best], sizeof c->box_rotation);
+    if (fct_box_set(&extents, (const float(*)[3])axes[best], point, c)) return;
+    extents = fct_extents_none();
+    add_blocks(job, u, (const float(*)[3])axes[1], &extents);
+    memcpy(c->box_rotation, world, sizeof world);
+    fct_box_set(&extents, (const float(*)[3])axes[1], point, c);
 }
 
 /* --- Cones --- */

@@ -104,9 +104,28 @@ static void doubles(void **state) {
     for (int i = 0; i < 4; ++i) assert_true(narrow[i] == a[i]);
 }
 
+static void double_fours(void **state) {
+    (void)state;
+    const double p[8] = {1, -2, 1e300, 0, 9, -7, 0.25, 5}, q[8] = {3, -4, 2, -0.5, 8, 7, 0.125, 5};
+    double out[8];
+    float narrow[8];
+    d8 x = d8_load(p), y = d8_load(q);
+    d8_store(out, d8_div(d8_sub(x, y), d8_add(d8_mul(y, y), d8_set(1))));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == (p[i] - q[i]) / (q[i] * q[i] + 1));
+    assert_int_equal(d8_lt(x, y), 0x21);
+    assert_int_equal(d8_lt(y, x), 0x5E);
+    d8_store(out, d8_if_lt(x, y, d8_min(x, y), d8_max(x, y)));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == p[i]);
+    d8_store(out, d8_sqrt(d8_abs(y)));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == sqrt(fabs(q[i])));
+    d8_store_floats(narrow, d8_load_floats(a));
+    for (int i = 0; i < 8; ++i) assert_true(narrow[i] == a[i]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(floats),         cmocka_unit_test(transposing),
                                        cmocka_unit_test(small_matrices), cmocka_unit_test(some_lanes),
-                                       cmocka_unit_test(integers),       cmocka_unit_test(doubles)};
+                                       cmocka_unit_test(integers),       cmocka_unit_test(doubles),
+                                       cmocka_unit_test(double_fours)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
