@@ -25,13 +25,14 @@ typedef struct block_scratch {
     const fct_sums *parts[FCT_BLOCK][2];
     fct_sums leaves[FCT_BLOCK + 4], nodes[FCT_BLOCK];
     float points[CORNERS][4], normals[FCT_BLOCK + 4][4];
-    uint32_t at[CORNERS + 8];     /* by corner: where its point begins */
-    uint32_t before[CORNERS + 8]; /* by corner: 1 + the last corner before it at the same vertex, or 0 */
-    uint32_t last[CORNERS];       /* by vertex: 1 + its last corner so far */
-    uint32_t old[CORNERS];        /* vertices that other blocks used before */
-    uint16_t slots[SLOTS];        /* their numbers by a hash, or EMPTY */
-    uint16_t by_size[FCT_BLOCK];  /* nodes, smallest first */
-    uint32_t lists[8][CORNERS + 8];
+    uint32_t at[CORNERS + 8];       /* by corner: where its point begins */
+    uint32_t before[CORNERS + 8];   /* by corner: 1 + the last corner before it at the same vertex, or 0 */
+    uint32_t last[CORNERS];         /* by vertex: 1 + its last corner so far */
+    uint32_t old[CORNERS];          /* vertices that other blocks used before */
+    uint16_t slots[SLOTS];          /* their numbers by a hash, or EMPTY */
+    uint16_t by_size[FCT_BLOCK];    /* nodes, smallest first */
+    uint32_t lists[8][CORNERS + 8]; /* of the points of eight nodes, and the points */
+    fct_octet_row rows[CORNERS];
 } block_scratch;
 
 typedef struct describer {
@@ -40,37 +41,32 @@ typedef struct describer {
     block_scratch *scratch; /* one a thread */
 } describer;
 
-void fct_points_describe(const float *points, const uint32_t *list, uint32_t point_count,
-                         const float *normals, uint32_t first_normal, uint32_t normal_count,
-                         const fct_sums *sums, fct_cluster *out) {
+void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
+                         uint32_t normal_count, const fct_sums *sums, fct_cluster *out) {
     fct_octet o;
-    fct_octet_points p = {.points = points, .longest = point_count};
     fct_octet_normals n = {.normals = normals};
     const fct_sums *all[8];
-    for (int i = 0; i < 8; ++i) {
-        all[i] = sums;
-        p.lists[i] = list, p.counts[i] = point_count;
-        n.firsts[i] = first_normal, n.counts[i] = normal_count;
-    }
+    for (int i = 0; i < 8; ++i) all[i] = sums, n.counts[i] = normal_count;
     fct_octet_sum(&o, all);
     fct_octet_cone(&o, &n);
-    fct_octet_turn(&o, &p);
-    fct_octet_fit(&o, &p);
+    fct_octet_turn(&o, points, point_count);
+    fct_octet_fit(&o, points, point_count);
     fct_octet_store(&o, 0, out);
 }
 
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
-    static const uint32_t list[3] = {0, 4, 8};
     const uint32_t *triangle = view->triangles + 3 * (size_t)place;
     const float *corners[3][4];
     float points[3][4] = {{0}}, normals[4][4];
+    fct_octet_row rows[3];
     fct_sums sums[4];
     for (int k = 0; k < 3; ++k) {
         memcpy(points[k], view->positions + 3 * (size_t)triangle[k], 3 * sizeof(float));
+        fct_octet_row_fill(&rows[k], points[k]);
         for (int i = 0; i < 4; ++i) corners[k][i] = points[k];
     }
     fct_sums_four((const float *const(*)[4])corners, sums, normals);
-    fct_points_describe(points[0], list, 3, normals[0], 0, 1, sums, out);
+    fct_points_describe(rows, 3, normals[0], 1, sums, out);
     out->first = place, out->count = 1;
 }
 
@@ -198,6 +194,29 @@ static uint32_t list_points(const block_scratch *s, uint32_t first, uint32_t end
     return count;
 }
 
+/* Lengthens a list by repeating it. */
+static inline void repeat_list(uint32_t *list, uint32_t count, uint32_t wanted) {
+    if (count < 8)
+        for (uint32_t j = count; j < wanted; ++j) list[j] = list[j - count];
+    else
+        for (uint32_t j = count; j < wanted; j += 8) i8_store(list + j, i8_load(list + j - count));
+}
+
+/* Points of eight lists; returns how many rows. */
+static uint32_t load_rows(block_scratch *s, const uint32_t counts[8]) {
+    uint32_t longest = 0;
+    for (uint32_t i = 0; i < 8; ++i) longest = counts[i] > longest ? counts[i] : longest;
+    for (uint32_t i = 0; i < 8; ++i) repeat_list(s->lists[i], counts[i], longest);
+    for (uint32_t j = 0; j < longest; ++j) {
+        const float *points[8];
+        f8 p[3];
+        for (uint32_t i = 0; i < 8; ++i) points[i] = s->points[0] + s->lists[i][j];
+        f8_load_columns(points, p);
+        f8_store(s->rows[j].x, p[0]), f8_store(s->rows[j].y, p[1]), f8_store(s->rows[j].z, p[2]);
+    }
+    return longest;
+}
+
 static inline void ask_for_record(const fct_cluster *c) {
     for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
 }
@@ -206,12 +225,11 @@ static inline void ask_for_record(const fct_cluster *c) {
 static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin, uint32_t count,
                            block_scratch *s) {
     fct_octet o;
-    fct_octet_points p;
     fct_octet_normals n;
     const fct_sums *sums[8];
     fct_cluster *out[8];
-    uint32_t nodes[8];
-    n.normals = s->normals[0], p.points = s->points[0], p.longest = 0;
+    uint32_t nodes[8], counts[8];
+    n.normals = s->normals[0];
     for (uint32_t i = 0; i < 8; ++i) {
         nodes[i] = s->by_size[begin + i < count ? begin + i : begin];
         const fct_node_link *link = &s->links[nodes[i]];
@@ -219,17 +237,13 @@ static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin,
         out[i] = &tree->clusters[s->order[nodes[i]]];
         ask_for_record(out[i]);
         n.firsts[i] = link->first - first, n.counts[i] = link->count;
-        p.lists[i] = s->lists[i];
-        p.counts[i] = list_points(s, n.firsts[i], n.firsts[i] + n.counts[i], s->lists[i]);
-        p.longest = p.counts[i] > p.longest ? p.counts[i] : p.longest;
+        counts[i] = list_points(s, n.firsts[i], n.firsts[i] + n.counts[i], s->lists[i]);
     }
-    for (uint32_t i = 0; i < 8; ++i)
-        for (uint32_t j = p.counts[i]; j < p.longest; j += 8)
-            i8_store(s->lists[i] + j, i8_set(s->lists[i][0]));
+    uint32_t rows = load_rows(s, counts);
     fct_octet_sum(&o, sums);
     fct_octet_cone(&o, &n);
-    fct_octet_turn(&o, &p);
-    fct_octet_fit(&o, &p);
+    fct_octet_turn(&o, s->rows, rows);
+    fct_octet_fit(&o, s->rows, rows);
     fct_octet_store_all(&o, out);
     for (uint32_t i = 0; i < 8; ++i) fct_node_link_store(&s->links[nodes[i]], out[i]);
 }

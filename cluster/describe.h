@@ -39,10 +39,10 @@ typedef struct fct_outline {
 /* How many vertices are used by faces before a place; they are the first of the tree's order. */
 uint32_t fct_vertices_before(const fct_tree *tree, const fct_outline *outline, size_t place);
 
-/* One cluster alone: all but cost and links. */
-void fct_points_describe(const float *points, const uint32_t *list, uint32_t point_count,
-                         const float *normals, uint32_t first_normal, uint32_t normal_count,
-                         const fct_sums *sums, fct_cluster *out);
+/* One cluster alone, which is in all lanes of the rows: all but cost and links. The normals are rows of four
+ * floats. */
+void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
+                         uint32_t normal_count, const fct_sums *sums, fct_cluster *out);
 
 /* Describes the upper clusters of a tree whose blocks are done. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe_upper(fct_tree *tree, fct_outline *outline);

@@ -16,10 +16,9 @@
 /* More than MOST opened clusters: the rest counts by its boxes. */
 enum { SAMPLES = 64, STACK = 512, MOST = 1 << 18, HARD = 1 << 11, FRAMES = 4 };
 
-/* Rows of four floats. */
 typedef struct block_faces {
-    float corners[3 * FCT_BLOCK][4], normals[FCT_BLOCK][4];
-    uint32_t list[3 * FCT_BLOCK]; /* of all corners */
+    fct_octet_row corners[3 * FCT_BLOCK];
+    float normals[FCT_BLOCK][4];
 } block_faces;
 
 typedef struct describer {
@@ -85,10 +84,7 @@ static bool load_block(describer *d, uint32_t first, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         float corners[9], normal[3];
         if (!face_at(d, first + i, corners)) return false;
-        for (uint32_t k = 0; k < 3; ++k) {
-            memcpy(d->faces->corners[3 * i + k], corners + 3 * k, 3 * sizeof *corners);
-            d->faces->list[3 * i + k] = 4 * (3 * i + k);
-        }
+        for (uint32_t k = 0; k < 3; ++k) fct_octet_row_fill(&d->faces->corners[3 * i + k], corners + 3 * k);
         fct_unit_normal(corners, triangle, normal);
         memcpy(d->faces->normals[i], normal, sizeof normal);
     }
@@ -104,8 +100,8 @@ static bool describe_block(describer *d, uint32_t root) {
     while (top > 0) {
         uint32_t node = stack[--top];
         fct_cluster *c = &l->upper[node];
-        fct_points_describe(f->corners[0], f->list + 3 * (c->first - first), 3 * c->count, f->normals[0],
-                            c->first - first, c->count, &d->upper[node], c);
+        fct_points_describe(f->corners + 3 * (c->first - first), 3 * c->count, f->normals[c->first - first],
+                            c->count, &d->upper[node], c);
         for (int k = 0; k < 2; ++k)
             if (c->child[k] < l->upper_count) stack[top++] = c->child[k];
     }
@@ -271,18 +267,16 @@ static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
 static bool describe_large(describer *d, uint32_t node) {
     static const uint32_t triangle[3] = {0, 1, 2};
     fct_cluster *c = &d->large->upper[node];
-    float samples[SAMPLES][9], corners[SAMPLES][4], normals[SAMPLES][4];
-    uint32_t list[SAMPLES];
+    fct_octet_row corners[SAMPLES];
+    float samples[SAMPLES][9], normals[SAMPLES][4];
     for (uint32_t i = 0; i < SAMPLES; ++i) {
         uint32_t at = c->first + (uint32_t)((uint64_t)i * c->count / SAMPLES);
         if (!face_at(d, at, samples[i])) return false;
-        memcpy(corners[i], samples[i] + 3 * (i % 3), 3 * sizeof(float));
-        corners[i][3] = 0;
+        fct_octet_row_fill(&corners[i], samples[i] + 3 * (i % 3));
         fct_unit_normal(samples[i], triangle, normals[i]);
         normals[i][3] = 0;
-        list[i] = 4 * i;
     }
-    fct_points_describe(corners[0], list, SAMPLES, normals[0], 0, SAMPLES, &d->upper[node], c);
+    fct_points_describe(corners, SAMPLES, normals[0], SAMPLES, &d->upper[node], c);
     return fit_box(d, node, (const float(*)[9])samples) && find_cone(d, node, (const float(*)[9])samples);
 }
 

@@ -134,42 +134,23 @@ typedef struct plane_points {
     f8 height;
 } plane_points;
 
-/* Points spread over each list that is too long. */
-static void pick_samples(const fct_octet_points *p, uint32_t picks[8][SAMPLES]) {
-    for (uint32_t i = 0; i < 8; ++i)
-        for (uint32_t j = 0; j < SAMPLES; ++j)
-            picks[i][j] = p->lists[i][p->counts[i] > SAMPLES ? j * p->counts[i] / SAMPLES : j];
-}
-
-/* Points in the frame, over the cluster's radius. */
-static void project(const fct_octet *o, const fct_octet_points *p, plane_points *out) {
-    uint32_t picks[8][SAMPLES];
-    const uint32_t *lists[8];
-    const float *rows[8];
+/* Points in the frame, over the cluster's radius; some of them where there are many. */
+static void project(const fct_octet *o, const fct_octet_row *points, uint32_t count, plane_points *out) {
     float frame[9][8];
-    f8 first[3], f[9], shrink = f8_load(o->shrink), low = f8_set(0), high = low;
+    f8 f[9], shrink = f8_load(o->shrink), low = f8_set(0), high = low;
+    f8 x0 = f8_load(points->x), y0 = f8_load(points->y), z0 = f8_load(points->z);
     for (int i = 0; i < 9; ++i) {
-        for (int at = 0; at < 8; at += 4)
-            d4_store_floats(&frame[i][at], d4_load(&o->frame[i / 3][i % 3][at]));
+        d8_store_floats(frame[i], d8_load(o->frame[i / 3][i % 3]));
         f[i] = f8_load(frame[i]);
     }
-    memcpy(lists, p->lists, sizeof lists);
-    out->count = (p->longest < SAMPLES ? p->longest : SAMPLES) - 1;
-    if (p->longest > SAMPLES) {
-        pick_samples(p, picks);
-        for (int i = 0; i < 8; ++i) lists[i] = picks[i];
-    }
-    for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][0];
-    f8_load_columns(rows, first);
+    out->count = (count < SAMPLES ? count : SAMPLES) - 1;
     for (uint32_t j = 0; j < out->count; ++j) {
-        f8 q[3];
-        for (int i = 0; i < 8; ++i) rows[i] = p->points + lists[i][j + 1];
-        f8_load_columns(rows, q);
-        for (int k = 0; k < 3; ++k) q[k] = f8_mul(f8_sub(q[k], first[k]), shrink);
-        f8 u = f8_add(f8_add(f8_mul(q[0], f[0]), f8_mul(q[1], f[1])), f8_mul(q[2], f[2]));
-        f8 v = f8_add(f8_add(f8_mul(q[0], f[3]), f8_mul(q[1], f[4])), f8_mul(q[2], f[5]));
-        f8 w = f8_add(f8_add(f8_mul(q[0], f[6]), f8_mul(q[1], f[7])), f8_mul(q[2], f[8]));
-        f8_store(out->u[j], u), f8_store(out->v[j], v);
+        const fct_octet_row *p = &points[count > SAMPLES ? (j + 1) * count / SAMPLES : j + 1];
+        f8 x = f8_mul(f8_sub(f8_load(p->x), x0), shrink), y = f8_mul(f8_sub(f8_load(p->y), y0), shrink);
+        f8 z = f8_mul(f8_sub(f8_load(p->z), z0), shrink);
+        f8 w = f8_add(f8_add(f8_mul(x, f[6]), f8_mul(y, f[7])), f8_mul(z, f[8]));
+        f8_store(out->u[j], f8_add(f8_add(f8_mul(x, f[0]), f8_mul(y, f[1])), f8_mul(z, f[2])));
+        f8_store(out->v[j], f8_add(f8_add(f8_mul(x, f[3]), f8_mul(y, f[4])), f8_mul(z, f[5])));
         low = f8_min(w, low), high = f8_max(w, high);
     }
     out->height = f8_sub(high, low);
@@ -247,12 +228,12 @@ static void rotate(fct_octet *o, const d8 a[3][3]) {
     for (int k = 0; k < 4; ++k) d8_store_floats(o->words[ROTATION + k], d8_mul(q[k], invert));
 }
 
-void fct_octet_turn(fct_octet *o, const fct_octet_points *points) {
+void fct_octet_turn(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     plane_points p;
     turn best = {f8_set(INFINITY), f8_set(1), f8_set(0)};
     float cosines[8], sines[8];
     d8 axes[3][3];
-    project(o, points, &p);
+    project(o, points, count, &p);
     try_ends(&p, &best);
     try_pair(&p, 0.98078528f, 0.19509032f, &best);
     try_pair(&p, 0.92387953f, 0.38268343f, &best);
@@ -295,26 +276,20 @@ static inline void expand_axes(const fct_octet *o, d8 axes[3][3]) {
     }
 }
 
-static inline void load_points(const fct_octet_points *p, uint32_t j, d8 q[3]) {
-    d4 low[4], high[4];
-    for (int i = 0; i < 4; ++i) {
-        low[i] = d4_load_floats(p->points + p->lists[i][j]);
-        high[i] = d4_load_floats(p->points + p->lists[i + 4][j]);
-    }
-    d4_transpose(low), d4_transpose(high);
-    for (int k = 0; k < 3; ++k) q[k] = (d8){low[k], high[k]};
+static inline void load_row(const fct_octet_row *row, d8 p[3]) {
+    p[0] = d8_load_floats(row->x), p[1] = d8_load_floats(row->y), p[2] = d8_load_floats(row->z);
 }
 
-static void fit(fct_octet *o, const fct_octet_points *p) {
+static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     d8 a[3][3], low[3], high[3], first[3], along[3], center[3], size = d8_set(0);
     expand_axes(o, a);
-    load_points(p, 0, first);
+    load_row(points, first);
     for (int k = 0; k < 3; ++k) along[k] = low[k] = high[k] = dot(first, a[k]);
-    for (uint32_t j = 1; j < p->longest; ++j) {
-        d8 q[3];
-        load_points(p, j, q);
+    for (uint32_t j = 1; j < count; ++j) {
+        d8 p[3];
+        load_row(points + j, p);
         for (int k = 0; k < 3; ++k) {
-            d8 x = dot(q, a[k]);
+            d8 x = dot(p, a[k]);
             low[k] = d8_min(x, low[k]), high[k] = d8_max(x, high[k]);
         }
     }
@@ -339,10 +314,10 @@ static void fit(fct_octet *o, const fct_octet_points *p) {
     }
 }
 
-void fct_octet_fit(fct_octet *o, const fct_octet_points *points) {
+void fct_octet_fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     const f8 limit = f8_set(FLT_MAX);
     uint32_t within = 255;
-    fit(o, points);
+    fit(o, points, count);
     for (int k = 0; k < 3; ++k) {
         within &= f8_le(f8_load(o->words[HALF + k]), limit);
         within &= f8_le(f8_abs(f8_load(o->words[CENTER + k])), limit);
@@ -351,7 +326,7 @@ void fct_octet_fit(fct_octet *o, const fct_octet_points *points) {
     /* A model wider than half the range of floats: a turned box may not have one. */
     for (int i = 0; i < 8; ++i)
         for (int k = 0; k < 4 && !(within >> i & 1); ++k) o->words[ROTATION + k][i] = k < 3 ? 0 : 1;
-    fit(o, points);
+    fit(o, points, count);
     for (int k = 0; k < 3; ++k) f8_store(o->words[HALF + k], f8_min(f8_load(o->words[HALF + k]), limit));
 }
 

@@ -95,25 +95,19 @@ static void choose_frames(void *user, size_t begin, size_t end, size_t chunk, ui
     const upper_job *job = user;
     const fct_tree *tree = job->tree;
     fct_octet o;
-    float points[8][SAMPLES][4];
-    uint32_t lists[8][SAMPLES];
+    fct_octet_row points[SAMPLES];
     const fct_sums *sums[8];
-    fct_octet_points p = {.points = points[0][0], .longest = SAMPLES};
     for (size_t l = 0; l < 8; ++l) {
         const fct_upper *u = &job->outline->upper[begin + l < end ? begin + l : begin];
         size_t first = 3 * (size_t)tree->links[u->id].first, count = 3 * (size_t)tree->links[u->id].count;
-        for (uint32_t s = 0; s < SAMPLES; ++s) {
-            const float *position =
-                tree->positions + 3 * (size_t)tree->triangles[first + s * count / SAMPLES];
-            memcpy(points[l][s], position, 3 * sizeof *position);
-            points[l][s][3] = 0;
-            lists[l][s] = 4 * ((uint32_t)l * SAMPLES + s);
+        for (size_t s = 0; s < SAMPLES; ++s) {
+            const float *p = tree->positions + 3 * (size_t)tree->triangles[first + s * count / SAMPLES];
+            points[s].x[l] = p[0], points[s].y[l] = p[1], points[s].z[l] = p[2];
         }
         sums[l] = &u->sums;
-        p.lists[l] = lists[l], p.counts[l] = SAMPLES;
     }
     fct_octet_sum(&o, sums);
-    fct_octet_turn(&o, &p);
+    fct_octet_turn(&o, points, SAMPLES);
     for (size_t i = begin; i < end; ++i) {
         fct_upper *u = &job->outline->upper[i];
         fct_cluster *c = &tree->clusters[u->id];
