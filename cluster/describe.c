@@ -217,8 +217,12 @@ static uint32_t load_rows(block_scratch *s, const uint32_t counts[8]) {
     return longest;
 }
 
-static inline void ask_for_record(const fct_cluster *c) {
-    for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
+/* Asks for the memory of the records of two nodes: more at once would have the core wait. */
+static inline void ask_for_two(const fct_tree *tree, const block_scratch *s, uint32_t i, uint32_t count) {
+    for (uint32_t end = i + 2 < count ? i + 2 : count; i < end; ++i) {
+        const fct_cluster *c = &tree->clusters[s->order[s->by_size[i]]];
+        for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
+    }
 }
 
 /* Nodes [begin, begin + 8) by size, or what is left of them; `first`: the block's first face. */
@@ -235,14 +239,17 @@ static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin,
         const fct_node_link *link = &s->links[nodes[i]];
         sums[i] = &s->nodes[nodes[i]];
         out[i] = &tree->clusters[s->order[nodes[i]]];
-        ask_for_record(out[i]);
         n.firsts[i] = link->first - first, n.counts[i] = link->count;
         counts[i] = list_points(s, n.firsts[i], n.firsts[i] + n.counts[i], s->lists[i]);
     }
+    ask_for_two(tree, s, begin + 8, count);
     uint32_t rows = load_rows(s, counts);
+    ask_for_two(tree, s, begin + 10, count);
     fct_octet_sum(&o, sums);
     fct_octet_cone(&o, &n);
+    ask_for_two(tree, s, begin + 12, count);
     fct_octet_turn(&o, s->rows, rows);
+    ask_for_two(tree, s, begin + 14, count);
     fct_octet_fit(&o, s->rows, rows);
     fct_octet_store_all(&o, out);
     for (uint32_t i = 0; i < 8; ++i) fct_node_link_store(&s->links[nodes[i]], out[i]);

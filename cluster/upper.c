@@ -56,17 +56,20 @@ static void add_faces(const upper_job *job, size_t first, size_t end, uint32_t b
     }
 }
 
-/* Whether the cluster's box reaches beyond the extents. */
+/* Whether the cluster's box may reach beyond the extents; its axes are orthonormal to float rounding only. */
 static bool reaches(const fct_cluster *c, const float axes[3][3], const fct_extents *e) {
     fct_box box;
     v3 own[3];
+    double size = 0;
     fct_cluster_box(c, &box);
-    for (int i = 0; i < 3; ++i) own[i] = v3_scale(v3_load(box.axes[i]), (double)box.half[i]);
+    for (int i = 0; i < 3; ++i) {
+        own[i] = v3_scale(v3_load(box.axes[i]), (double)box.half[i]);
+        size += (double)box.half[i];
+    }
     for (int k = 0; k < 3; ++k) {
         v3 a = v3_load(axes[k]);
-        double middle = v3_dot(v3_load(box.center), a), reach = 0;
+        double middle = v3_dot(v3_load(box.center), a), reach = 1e-6 * size + 1e-14 * fabs(middle);
         for (int i = 0; i < 3; ++i) reach += fabs(v3_dot(own[i], a));
-        reach += 1e-14 * (fabs(middle) + reach);
         if (middle - reach < e->low[k] || middle + reach > e->high[k]) return true;
     }
     return false;
