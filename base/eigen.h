@@ -2,6 +2,7 @@
 #ifndef FCT_BASE_EIGEN_H
 #define FCT_BASE_EIGEN_H
 
+#include "base/simd.h"
 #include "base/vec.h"
 
 /* m = xx xy xz yy yz zz. Ascending eigenvalues and unit eigenvectors, a right-handed frame, for any finite m,
@@ -12,7 +13,8 @@
  * value in the order x, y, z. */
 void fct_eigen3(const double m[6], double values[3], v3 vectors[3]);
 
-/* The same for four matrices at once, with the same results; m[i] points to matrix i. */
-void fct_eigen3_four(const double *const m[4], double values[4][3], v3 vectors[4][3]);
+/* The same for eight matrices side by side, with the same results whatever stands in the other lanes:
+ * vectors[i][k] is coordinate k of vector i. values may be NULL. */
+void fct_eigen3_eight(const d8 m[6], d8 values[3], d8 vectors[3][3]);
 
 #endif

@@ -53,6 +53,10 @@ static inline d4 d4_load(const double *p) {
 static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
     return _mm256_blendv_pd(y, x, _mm256_cmp_pd(a, b, _CMP_LT_OQ));
 }
+/* Bit i: a_i < b_i. */
+static inline uint32_t d4_lt(d4 a, d4 b) {
+    return (uint32_t)_mm256_movemask_pd(_mm256_cmp_pd(a, b, _CMP_LT_OQ));
+}
 static inline d4 d4_min(d4 a, d4 b) {
     return _mm256_min_pd(a, b);
 }
@@ -135,6 +139,25 @@ static inline void f8_transpose(f8 m[8]) {
         m[i] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x20);
         m[i + 4] = _mm256_permute2f128_ps(b[i], b[i + 4], 0x31);
     }
+}
+/* Rows to columns of a 4 x 4 matrix. */
+static inline void d4_transpose(d4 m[4]) {
+    d4 a = _mm256_unpacklo_pd(m[0], m[1]), b = _mm256_unpackhi_pd(m[0], m[1]);
+    d4 c = _mm256_unpacklo_pd(m[2], m[3]), d = _mm256_unpackhi_pd(m[2], m[3]);
+    m[0] = _mm256_permute2f128_pd(a, c, 0x20), m[1] = _mm256_permute2f128_pd(b, d, 0x20);
+    m[2] = _mm256_permute2f128_pd(a, c, 0x31), m[3] = _mm256_permute2f128_pd(b, d, 0x31);
+}
+/* Eight rows of four floats to three columns; the fourth is passed over. */
+static inline void f8_load_columns(const float *const rows[8], f8 columns[3]) {
+    f8 r[4];
+    for (int i = 0; i < 4; ++i)
+        r[i] =
+            _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(rows[i])), _mm_loadu_ps(rows[i + 4]), 1);
+    f8 low01 = _mm256_unpacklo_ps(r[0], r[1]), low23 = _mm256_unpacklo_ps(r[2], r[3]);
+    f8 high01 = _mm256_unpackhi_ps(r[0], r[1]), high23 = _mm256_unpackhi_ps(r[2], r[3]);
+    columns[0] = _mm256_shuffle_ps(low01, low23, 0x44);
+    columns[1] = _mm256_shuffle_ps(low01, low23, 0xEE);
+    columns[2] = _mm256_shuffle_ps(high01, high23, 0x44);
 }
 /* Bit i: a_i <= b_i. */
 static inline uint32_t f8_le(f8 a, f8 b) {
@@ -235,6 +258,40 @@ static inline i8 i8_lookup8(i8 a, i8 index) {
 static inline i8 i8_gather(const uint32_t *table, i8 index) {
     return _mm256_i32gather_epi32((const int *)(const void *)table, index, 4);
 }
+/* By mask, the numbers of its bits, four bits each. */
+static const uint32_t fct_lanes_of[256] = {
+    0x0,      0x0,       0x1,      0x10,      0x2,       0x20,      0x21,     0x210,     0x3,      0x30,
+    0x31,     0x310,     0x32,     0x320,     0x321,     0x3210,    0x4,      0x40,      0x41,     0x410,
+    0x42,     0x420,     0x421,    0x4210,    0x43,      0x430,     0x431,    0x4310,    0x432,    0x4320,
+    0x4321,   0x43210,   0x5,      0x50,      0x51,      0x510,     0x52,     0x520,     0x521,    0x5210,
+    0x53,     0x530,     0x531,    0x5310,    0x532,     0x5320,    0x5321,   0x53210,   0x54,     0x540,
+    0x541,    0x5410,    0x542,    0x5420,    0x5421,    0x54210,   0x543,    0x5430,    0x5431,   0x54310,
+    0x5432,   0x54320,   0x54321,  0x543210,  0x6,       0x60,      0x61,     0x610,     0x62,     0x620,
+    0x621,    0x6210,    0x63,     0x630,     0x631,     0x6310,    0x632,    0x6320,    0x6321,   0x63210,
+    0x64,     0x640,     0x641,    0x6410,    0x642,     0x6420,    0x6421,   0x64210,   0x643,    0x6430,
+    0x6431,   0x64310,   0x6432,   0x64320,   0x64321,   0x643210,  0x65,     0x650,     0x651,    0x6510,
+    0x652,    0x6520,    0x6521,   0x65210,   0x653,     0x6530,    0x6531,   0x65310,   0x6532,   0x65320,
+    0x65321,  0x653210,  0x654,    0x6540,    0x6541,    0x65410,   0x6542,   0x65420,   0x65421,  0x654210,
+    0x6543,   0x65430,   0x65431,  0x654310,  0x65432,   0x654320,  0x654321, 0x6543210, 0x7,      0x70,
+    0x71,     0x710,     0x72,     0x720,     0x721,     0x7210,    0x73,     0x730,     0x731,    0x7310,
+    0x732,    0x7320,    0x7321,   0x73210,   0x74,      0x740,     0x741,    0x7410,    0x742,    0x7420,
+    0x7421,   0x74210,   0x743,    0x7430,    0x7431,    0x74310,   0x7432,   0x74320,   0x74321,  0x743210,
+    0x75,     0x750,     0x751,    0x7510,    0x752,     0x7520,    0x7521,   0x75210,   0x753,    0x7530,
+    0x7531,   0x75310,   0x7532,   0x75320,   0x75321,   0x753210,  0x754,    0x7540,    0x7541,   0x75410,
+    0x7542,   0x75420,   0x75421,  0x754210,  0x7543,    0x75430,   0x75431,  0x754310,  0x75432,  0x754320,
+    0x754321, 0x7543210, 0x76,     0x760,     0x761,     0x7610,    0x762,    0x7620,    0x7621,   0x76210,
+    0x763,    0x7630,    0x7631,   0x76310,   0x7632,    0x76320,   0x76321,  0x763210,  0x764,    0x7640,
+    0x7641,   0x76410,   0x7642,   0x76420,   0x76421,   0x764210,  0x7643,   0x76430,   0x76431,  0x764310,
+    0x76432,  0x764320,  0x764321, 0x7643210, 0x765,     0x7650,    0x7651,   0x76510,   0x7652,   0x76520,
+    0x76521,  0x765210,  0x7653,   0x76530,   0x76531,   0x765310,  0x76532,  0x765320,  0x765321, 0x7653210,
+    0x7654,   0x76540,   0x76541,  0x765410,  0x76542,   0x765420,  0x765421, 0x7654210, 0x76543,  0x765430,
+    0x765431, 0x7654310, 0x765432, 0x7654320, 0x7654321, 0x76543210};
+/* Stores the lanes whose bit is set, one after the other; all eight places may be written. */
+static inline void i8_store_some(uint32_t *p, i8 a, uint32_t mask) {
+    i8 lanes = _mm256_srlv_epi32(_mm256_set1_epi32((int)fct_lanes_of[mask]),
+                                 _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+    _mm256_storeu_si256((__m256i *)(void *)p, _mm256_permutevar8x32_epi32(a, lanes));
+}
 static inline i8 i8_load_bytes(const uint8_t *p) {
     return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
 }
@@ -310,6 +367,11 @@ static inline d4 d4_load(const double *p) {
 static inline d4 d4_if_lt(d4 a, d4 b, d4 x, d4 y) {
     FCT_D4(a.v[i] < b.v[i] ? x.v[i] : y.v[i]);
 }
+static inline uint32_t d4_lt(d4 a, d4 b) {
+    uint32_t mask = 0;
+    for (int i = 0; i < 4; ++i) mask |= (uint32_t)(a.v[i] < b.v[i]) << i;
+    return mask;
+}
 static inline d4 d4_min(d4 a, d4 b) {
     FCT_D4(a.v[i] < b.v[i] ? a.v[i] : b.v[i]);
 }
@@ -371,6 +433,17 @@ static inline void f8_transpose(f8 m[8]) {
             float t = m[i].v[k];
             m[i].v[k] = m[k].v[i], m[k].v[i] = t;
         }
+}
+static inline void d4_transpose(d4 m[4]) {
+    for (int i = 0; i < 4; ++i)
+        for (int k = 0; k < i; ++k) {
+            double t = m[i].v[k];
+            m[i].v[k] = m[k].v[i], m[k].v[i] = t;
+        }
+}
+static inline void f8_load_columns(const float *const rows[8], f8 columns[3]) {
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < 3; ++k) columns[k].v[i] = rows[i][k];
 }
 static inline uint32_t f8_le(f8 a, f8 b) {
     FCT_M8(a.v[i] <= b.v[i]);
@@ -482,6 +555,10 @@ static inline i8 i8_gather(const uint32_t *table, i8 index) {
     for (int i = 0; i < 8; ++i) index.v[i] = (int32_t)table[(uint32_t)index.v[i]];
     return index;
 }
+static inline void i8_store_some(uint32_t *p, i8 a, uint32_t mask) {
+    for (int i = 0; i < 8; ++i)
+        if (mask >> i & 1) *p++ = (uint32_t)a.v[i];
+}
 static inline i8 i8_load_bytes(const uint8_t *p) {
     i8 r;
     for (int i = 0; i < 8; ++i) r.v[i] = p[i];
@@ -498,5 +575,57 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
 #undef FCT_F8
 #undef FCT_M8
 #endif
+
+/* Eight doubles as two fours, whose waits overlap. */
+typedef struct d8 {
+    d4 low, high;
+} d8;
+
+static inline d8 d8_set(double a) {
+    return (d8){d4_set(a), d4_set(a)};
+}
+static inline d8 d8_load(const double *p) {
+    return (d8){d4_load(p), d4_load(p + 4)};
+}
+static inline d8 d8_load_floats(const float *p) {
+    return (d8){d4_load_floats(p), d4_load_floats(p + 4)};
+}
+static inline void d8_store(double *p, d8 a) {
+    d4_store(p, a.low), d4_store(p + 4, a.high);
+}
+static inline void d8_store_floats(float *p, d8 a) {
+    d4_store_floats(p, a.low), d4_store_floats(p + 4, a.high);
+}
+static inline d8 d8_add(d8 a, d8 b) {
+    return (d8){d4_add(a.low, b.low), d4_add(a.high, b.high)};
+}
+static inline d8 d8_sub(d8 a, d8 b) {
+    return (d8){d4_sub(a.low, b.low), d4_sub(a.high, b.high)};
+}
+static inline d8 d8_mul(d8 a, d8 b) {
+    return (d8){d4_mul(a.low, b.low), d4_mul(a.high, b.high)};
+}
+static inline d8 d8_div(d8 a, d8 b) {
+    return (d8){d4_div(a.low, b.low), d4_div(a.high, b.high)};
+}
+static inline d8 d8_sqrt(d8 a) {
+    return (d8){d4_sqrt(a.low), d4_sqrt(a.high)};
+}
+static inline d8 d8_abs(d8 a) {
+    return (d8){d4_abs(a.low), d4_abs(a.high)};
+}
+static inline d8 d8_min(d8 a, d8 b) {
+    return (d8){d4_min(a.low, b.low), d4_min(a.high, b.high)};
+}
+static inline d8 d8_max(d8 a, d8 b) {
+    return (d8){d4_max(a.low, b.low), d4_max(a.high, b.high)};
+}
+static inline d8 d8_if_lt(d8 a, d8 b, d8 x, d8 y) {
+    return (d8){d4_if_lt(a.low, b.low, x.low, y.low), d4_if_lt(a.high, b.high, x.high, y.high)};
+}
+/* Bit i: a_i < b_i. */
+static inline uint32_t d8_lt(d8 a, d8 b) {
+    return d4_lt(a.low, b.low) | d4_lt(a.high, b.high) << 4;
+}
 
 #endif

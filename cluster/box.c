@@ -10,8 +10,6 @@
 
 #include "base/simd.h"
 
-enum { SAMPLES = 64 };
-
 /* fmax and fmin are calls here, for they must look out for NaN. */
 static inline double greater(double a, double b) {
     return a > b ? a : b;
@@ -31,21 +29,6 @@ void fct_box_axes(const float q[4], float axes[3][3]) {
 void fct_cluster_box(const fct_cluster *cluster, fct_box *out) {
     for (int k = 0; k < 3; ++k) out->center[k] = cluster->box_center[k], out->half[k] = cluster->box_half[k];
     fct_box_axes(cluster->box_rotation, out->axes);
-}
-
-void fct_box_rotation(const v3 a[3], float rotation[4]) {
-    double t[4] = {1 + a[0].x - a[1].y - a[2].z, 1 - a[0].x + a[1].y - a[2].z, 1 - a[0].x - a[1].y + a[2].z,
-                   1 + a[0].x + a[1].y + a[2].z};
-    double xy = a[0].y + a[1].x, xz = a[0].z + a[2].x, yz = a[1].z + a[2].y;
-    double wx = a[1].z - a[2].y, wy = a[2].x - a[0].z, wz = a[0].y - a[1].x;
-    int most = 0;
-    for (int i = 1; i < 4; ++i)
-        if (t[i] > t[most]) most = i;
-    double rows[4][4] = {{t[0], xy, xz, wx}, {xy, t[1], yz, wy}, {xz, yz, t[2], wz}, {wx, wy, wz, t[3]}};
-    double length = 0;
-    for (int i = 0; i < 4; ++i) length += rows[most][i] * rows[most][i];
-    length = 1 / sqrt(length);
-    for (int i = 0; i < 4; ++i) rotation[i] = (float)(rows[most][i] * length);
 }
 
 typedef struct lanes {
@@ -120,71 +103,6 @@ bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_clu
         cluster->box_half[k] = cluster->box_half[k] < FLT_MAX ? cluster->box_half[k] : FLT_MAX;
     }
     return within;
-}
-
-static inline void sample4(const float *x, const float *y, const float *z, const d4 origin[4], d4 f[3][3],
-                           float (*out)[SAMPLES + 4], size_t to) {
-    d4 p[3] = {d4_mul(d4_sub(d4_load_floats(x), origin[0]), origin[3]),
-               d4_mul(d4_sub(d4_load_floats(y), origin[1]), origin[3]),
-               d4_mul(d4_sub(d4_load_floats(z), origin[2]), origin[3])};
-    for (int k = 0; k < 3; ++k) {
-        d4 d = d4_add(d4_mul(p[0], f[k][0]), d4_mul(p[1], f[k][1]));
-        d4_store_floats(out[k] + to, d4_add(d, d4_mul(p[2], f[k][2])));
-    }
-}
-
-/* Points along the frame's axes, from the first of them, over the size; returns how many. What is left of
- * fours is made up for by points that are there already. */
-static size_t sample(fct_points p, size_t begin, size_t end, double size, const v3 frame[3],
-                     float (*out)[SAMPLES + 4]) {
-    d4 f[3][3], origin[4] = {d4_set((double)p.x[begin]), d4_set((double)p.y[begin]),
-                             d4_set((double)p.z[begin]), d4_set(1 / size)};
-    for (int k = 0; k < 3; ++k)
-        f[k][0] = d4_set(frame[k].x), f[k][1] = d4_set(frame[k].y), f[k][2] = d4_set(frame[k].z);
-    size_t count = end - begin, to = 0;
-    if (count >= 4 && count <= SAMPLES) {
-        for (; to + 4 <= count; to += 4)
-            sample4(p.x + begin + to, p.y + begin + to, p.z + begin + to, origin, f, out, to);
-        if (to < count) sample4(p.x + end - 4, p.y + end - 4, p.z + end - 4, origin, f, out, to), to += 4;
-        return to;
-    }
-    size_t taken = count < SAMPLES ? 4 : SAMPLES;
-    for (; to < taken; to += 4) {
-        float x[4], y[4], z[4];
-        for (size_t i = 0; i < 4; ++i) {
-            size_t at = begin + (count < SAMPLES ? (i < count ? i : 0) : (to + i) * count / SAMPLES);
-            x[i] = p.x[at], y[i] = p.y[at], z[i] = p.z[at];
-        }
-        sample4(x, y, z, origin, f, out, to);
-    }
-    return to;
-}
-
-void fct_box_turn(fct_points points, size_t begin, size_t end, double size, v3 frame[3]) {
-    static const float cosines[8] = {1,           0.98078528f, 0.92387953f, 0.83146961f,
-                                     0.70710678f, 0.55557023f, 0.38268343f, 0.19509032f};
-    static const float sines[8] = {0,           0.19509032f, 0.38268343f, 0.55557023f,
-                                   0.70710678f, 0.83146961f, 0.92387953f, 0.98078528f};
-    float w[3][SAMPLES + 4], areas[8], low_w = INFINITY, high_w = -INFINITY;
-    size_t count = sample(points, begin, end, size, frame, w);
-    f8 c = f8_load(cosines), s = f8_load(sines), low = f8_set(INFINITY), high = f8_set(-INFINITY);
-    f8 low_a = low, high_a = high, low_b = low, high_b = high;
-    for (size_t i = 0; i < count; ++i) {
-        f8 u = f8_set(w[0][i]), v = f8_set(w[1][i]);
-        f8 a = f8_add(f8_mul(c, u), f8_mul(s, v)), b = f8_sub(f8_mul(c, v), f8_mul(s, u));
-        low_a = f8_min(a, low_a), high_a = f8_max(a, high_a);
-        low_b = f8_min(b, low_b), high_b = f8_max(b, high_b);
-        low_w = w[2][i] < low_w ? w[2][i] : low_w, high_w = w[2][i] > high_w ? w[2][i] : high_w;
-    }
-    f8 x = f8_sub(high_a, low_a), y = f8_sub(high_b, low_b), height = f8_set(high_w - low_w);
-    f8_store(areas, f8_add(f8_mul(x, y), f8_mul(height, f8_add(x, y))));
-    int best = 0;
-    for (int i = 1; i < 8; ++i)
-        if (areas[i] < areas[best]) best = i;
-    if (best == 0) return;
-    v3 t = frame[0], b = frame[1];
-    frame[0] = v3_mad(v3_scale(t, (double)cosines[best]), (double)sines[best], b);
-    frame[1] = v3_mad(v3_scale(b, (double)cosines[best]), -(double)sines[best], t);
 }
 
 double fct_box_area(const fct_extents *e) {

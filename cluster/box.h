@@ -20,8 +20,6 @@ static inline fct_extents fct_extents_none(void) {
 
 /* The axes that fct_cluster_box gives for a rotation. */
 void fct_box_axes(const float rotation[4], float axes[3][3]);
-/* The rotation whose rows are the box's axes, as a float quaternion; frame is right-handed. */
-void fct_box_rotation(const v3 frame[3], float rotation[4]);
 
 /* Widens the extents to points [begin, end). */
 void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size_t end,
@@ -30,10 +28,6 @@ void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size
 /* Centre and half extents of a cluster's box from the extents of its points along the axes of its rotation;
  * `point` is any of them. False where they leave the range of a float: then they end there. */
 bool fct_box_set(const fct_extents *extents, const float axes[3][3], v3 point, fct_cluster *cluster);
-
-/* Turns the frame (u, v, normal) about its normal so that the box of at most 64 of points [begin, end) has
- * the least area. `size` is about the points' distance from each other, above 0. */
-void fct_box_turn(fct_points points, size_t begin, size_t end, double size, v3 frame[3]);
 
 /* A quarter of the surface area, for comparison. */
 double fct_box_area(const fct_extents *extents);

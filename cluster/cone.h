@@ -12,5 +12,6 @@ float fct_cone_widen(float widest, fct_points normals, size_t begin, size_t end,
 
 /* The angle of a squared chord, enlarged by what floats may have lost, at most pi. */
 float fct_cone_angle(float widest);
+void fct_cone_angles(const float widest[8], float angles[8]);
 
 #endif

@@ -1,35 +1,38 @@
 /* cluster/describe.c: area, moments, cone, plane and box of every cluster.
  *
- * Sums over the surface are combined from the leaves up in double, about each cluster's own centroid.
- * Subtrees of at most FCT_BLOCK faces are one task each, whose corners and normals stay in the cache; extents
- * and cones run over a cluster's faces, which are consecutive there: O(F log FCT_BLOCK). What is above is
- * upper.c's. Frame of a box: PCA of the surface, turned in its plane to the least area of eight angles.
+ * Subtrees of at most FCT_BLOCK faces are one task each, whose points, normals and sums stay in the cache.
+ * Sums come from the leaves upwards; all else is done for eight clusters of about the same size at a time
+ * (octet.c), over the distinct points of each: O(F log FCT_BLOCK). What is above is upper.c's.
  *
- * Degenerate answers. A face without area weighs 1e-20 of its longest side squared in centroid and frame, so
- * that clusters of such faces still have both. Cancelled normals: cone pi, the plane's sign is the
- * eigenvector's. Areas beyond a float's range end at its largest value with S and M scaled alike, below it at
- * 0 (cone pi then); boxes, planes and centroids depend on neither.
+ * Degenerate answers. Cancelled normals: cone pi, the plane's sign is the eigenvector's. Areas beyond a
+ * float's range end at its largest value with S and M scaled alike, below it at 0 (cone pi then); boxes,
+ * planes and centroids depend on neither.
  */
 #include "cluster/describe.h"
 
-#include <float.h>
 #include <string.h>
 
-#include "base/eigen.h"
 #include "base/parallel.h"
-#include "cluster/cone.h"
+#include "base/simd.h"
 
-enum { AHEAD = 12 };
+enum { CORNERS = 3 * FCT_BLOCK, SLOTS = 4096, EXACT = 64 };
 
-/* Room for one block; corners and normals by place. */
+/* Room for one block. Vertices have numbers of the block's own: those that it is the first to use are one run
+ * of the tree's order, the others follow. Points are rows of four floats. */
 typedef struct block_scratch {
     uint32_t order[FCT_BLOCK]; /* ids of inner nodes */
+    fct_node_link links[FCT_BLOCK];
     const fct_sums *parts[FCT_BLOCK][2];
-    float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
-    fct_sums leaves[FCT_BLOCK], nodes[FCT_BLOCK];
-    v3 frames[FCT_BLOCK][3];
-    double sizes[FCT_BLOCK];
-    fct_cluster records[FCT_BLOCK];
+    fct_sums leaves[FCT_BLOCK + 4], nodes[FCT_BLOCK];
+    float points[CORNERS][4], normals[FCT_BLOCK + 4][4];
+    uint32_t at[CORNERS + 8];       /* by corner: where its point begins */
+    uint32_t before[CORNERS + 8];   /* by corner: 1 + the last corner before it at the same vertex, or 0 */
+    uint32_t last[CORNERS];         /* by vertex: 1 + its last corner so far */
+    uint32_t old[CORNERS];          /* vertices that other blocks used before */
+    uint16_t slots[SLOTS];          /* their numbers by a hash, or EMPTY */
+    uint16_t by_size[FCT_BLOCK];    /* nodes, smallest first */
+    uint32_t lists[8][CORNERS + 8]; /* of the points of eight nodes, and the points */
+    fct_octet_row rows[CORNERS];
 } block_scratch;
 
 typedef struct describer {
@@ -38,106 +41,69 @@ typedef struct describer {
     block_scratch *scratch; /* one a thread */
 } describer;
 
-void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *s) {
-    v3 p[3];
-    for (int k = 0; k < 3; ++k) p[k] = v3_load(positions + 3 * (size_t)triangle[k]);
-    v3 u = v3_sub(p[1], p[0]), v = v3_sub(p[2], p[0]);
-    *s = (fct_sums){.vector = v3_scale(v3_cross(u, v), 0.5)};
-    s->area = s->weight = v3_norm(s->vector);
-    s->center = v3_mad(p[0], 1.0 / 3, v3_add(u, v));
-    if (s->area > 0)
-        sym3_add_outer(s->moment, 1 / s->area, s->vector);
-    else
-        s->weight = 1e-20 * fmax(v3_norm2(u), fmax(v3_norm2(v), v3_norm2(v3_sub(v, u))));
-    for (int k = 0; k < 3; ++k) sym3_add_outer(s->covariance, s->weight / 12, v3_sub(p[k], s->center));
-}
-
-void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out) {
-    double weight = a->weight + b->weight, share = weight > 0 ? b->weight / weight : 0.5;
-    v3 d = v3_sub(b->center, a->center);
-    out->area = a->area + b->area;
-    out->weight = weight;
-    out->vector = v3_add(a->vector, b->vector);
-    out->center = v3_mad(a->center, share, d);
-    for (int i = 0; i < 6; ++i) {
-        out->moment[i] = a->moment[i] + b->moment[i];
-        out->covariance[i] = a->covariance[i] + b->covariance[i];
-    }
-    sym3_add_outer(out->covariance, a->weight * share, d);
-}
-
-double fct_sums_store(const fct_sums *s, v3 frame[3], fct_cluster *out) {
-    double factor = s->area > (double)FLT_MAX ? (double)FLT_MAX / s->area : 1;
-    out->area = (float)(s->area * factor);
-    v3_store(out->area_vector, v3_scale(s->vector, factor));
-    for (int i = 0; i < 6; ++i) out->moment[i] = (float)(s->moment[i] * factor);
-    v3_store(out->centroid, s->center);
-    v3 normal = v3_dot(frame[0], s->vector) < 0 ? v3_scale(frame[0], -1) : frame[0];
-    v3_store(out->plane, normal);
-    double offset = -v3_dot(normal, s->center);
-    out->plane[3] = (float)(fabs(offset) < (double)FLT_MAX ? offset : copysign((double)FLT_MAX, offset));
-    frame[0] = frame[2], frame[1] = v3_cross(normal, frame[2]), frame[2] = normal;
-    double radius = sqrt((s->covariance[0] + s->covariance[3] + s->covariance[5]) / s->weight);
-    return radius > 0 && radius < (double)FLT_MAX ? radius : 1;
-}
-
-/* The world's axes, for a model that is wider than half the range of floats: a turned box may not have one.
- */
-static void fit_world(fct_points corners, size_t begin, size_t end, v3 point, fct_cluster *out) {
-    static const float world[4] = {0, 0, 0, 1};
-    float axes[3][3];
-    fct_extents extents = fct_extents_none();
-    fct_box_axes(world, axes);
-    fct_extents_add(&extents, corners, begin, end, (const float(*)[3])axes);
-    memcpy(out->box_rotation, world, sizeof world);
-    fct_box_set(&extents, (const float(*)[3])axes, point, out);
-}
-
-/* Cone and rotation, from the corners and normals of faces [first, end) of a stream. */
-static void orient(fct_points corners, fct_points normals, size_t first, size_t end, double size, v3 frame[3],
-                   fct_cluster *out) {
-    v3 cone = v3_unit(v3_load(out->area_vector));
-    float axis[3];
-    v3_store(axis, cone);
-    out->cone_angle = fct_cone_angle(v3_norm2(cone) > 0 ? fct_cone_widen(0, normals, first, end, axis) : 4);
-    fct_box_turn(corners, 3 * first, 3 * end, size, frame);
-    fct_box_rotation((const v3 *)frame, out->box_rotation);
-}
-
-/* The box, of its rotation if that can be. */
-static void fit(fct_points corners, size_t first, size_t end, fct_cluster *out) {
-    float axes[3][3];
-    fct_extents extents = fct_extents_none();
-    fct_box_axes(out->box_rotation, axes);
-    fct_extents_add(&extents, corners, 3 * first, 3 * end, (const float(*)[3])axes);
-    v3 point = {(double)corners.x[3 * first], (double)corners.y[3 * first], (double)corners.z[3 * first]};
-    if (!fct_box_set(&extents, (const float(*)[3])axes, point, out))
-        fit_world(corners, 3 * first, 3 * end, point, out);
-}
-
-void fct_faces_describe(fct_points corners, fct_points normals, const fct_sums *sums, size_t first,
-                        size_t end, fct_cluster *out) {
-    double values[3];
-    v3 frame[3];
-    fct_eigen3(sums->covariance, values, frame);
-    double size = fct_sums_store(sums, frame, out);
-    orient(corners, normals, first, end, size, frame, out);
-    fit(corners, first, end, out);
+void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
+                         uint32_t normal_count, const fct_sums *sums, fct_cluster *out) {
+    fct_octet o;
+    fct_octet_normals n = {.normals = normals};
+    const fct_sums *all[8];
+    for (int i = 0; i < 8; ++i) all[i] = sums, n.counts[i] = normal_count;
+    fct_octet_sum(&o, all);
+    fct_octet_cone(&o, &n);
+    fct_octet_turn(&o, points, point_count);
+    fct_octet_fit(&o, points, point_count);
+    fct_octet_store(&o, 0, out);
 }
 
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
     const uint32_t *triangle = view->triangles + 3 * (size_t)place;
-    float x[3], y[3], z[3], normal[3];
+    const float *corners[3][4];
+    float points[3][4] = {{0}}, normals[4][4];
+    fct_octet_row rows[3];
+    fct_sums sums[4];
     for (int k = 0; k < 3; ++k) {
-        const float *p = view->positions + 3 * (size_t)triangle[k];
-        x[k] = p[0], y[k] = p[1], z[k] = p[2];
+        memcpy(points[k], view->positions + 3 * (size_t)triangle[k], 3 * sizeof(float));
+        fct_octet_row_fill(&rows[k], points[k]);
+        for (int i = 0; i < 4; ++i) corners[k][i] = points[k];
     }
-    fct_unit_normal(view->positions, triangle, normal);
-    fct_sums s;
-    fct_sums_face(view->positions, triangle, &s);
-    fct_faces_describe((fct_points){x, y, z}, (fct_points){normal, normal + 1, normal + 2}, &s, 0, 1, out);
+    fct_sums_four((const float *const(*)[4])corners, sums, normals);
+    fct_points_describe(rows, 3, normals[0], 1, sums, out);
     out->first = place, out->count = 1;
 }
+
+/* --- Vertices by first use --- */
+
+static uint32_t highest_vertex(const fct_tree *tree, size_t begin, size_t end, uint32_t count) {
+    for (size_t i = 3 * begin; i < 3 * end; ++i) {
+        uint32_t next = tree->triangles[i] + 1;
+        count = next > count ? next : count;
+    }
+    return count;
+}
+
+uint32_t fct_vertices_before(const fct_tree *tree, const fct_outline *outline, size_t place) {
+    return highest_vertex(tree, place - place % FCT_SPAN, place, outline->introduced[place / FCT_SPAN]);
+}
+
+static void find_highest(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    describer *d = user;
+    size_t faces = d->tree->view.face_count;
+    for (size_t i = begin; i < end; ++i) {
+        size_t last = (i + 1) * FCT_SPAN < faces ? (i + 1) * FCT_SPAN : faces;
+        d->outline.introduced[i + 1] = highest_vertex(d->tree, i * FCT_SPAN, last, 0);
+    }
+}
+
+static void count_vertices(const fct_env *env, describer *d) {
+    size_t spans = fct_chunk_count(d->tree->view.face_count, FCT_SPAN);
+    uint32_t *introduced = d->outline.introduced;
+    introduced[0] = 0;
+    fct_parallel_for(env, spans, 1 << 8, find_highest, d);
+    for (size_t i = 0; i < spans; ++i)
+        if (introduced[i + 1] < introduced[i]) introduced[i + 1] = introduced[i];
+}
+
+/* --- Blocks --- */
 
 /* Inner nodes of the subtree level by level, and where their parts are: the memory of a level's nodes is
  * asked for while the level above is walked. */
@@ -146,77 +112,165 @@ static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first
     if (root < nodes) s->order[count++] = root;
     for (uint32_t i = 0; i < count; ++i) {
         const fct_node_link *link = &tree->links[s->order[i]];
-        fct_node_link_store(link, &s->records[i]);
+        s->links[i] = *link;
         for (int k = 0; k < 2; ++k) {
             uint32_t child = link->child[k];
             s->parts[i][k] = child < nodes ? &s->nodes[count] : &s->leaves[child - nodes - first];
             if (child >= nodes) continue;
-            __builtin_prefetch(&tree->links[child]);
+            __builtin_prefetch(&tree->links[child].child);
+            __builtin_prefetch(&tree->links[child].cost); /* may be in the next line */
             s->order[count++] = child;
         }
     }
     return count;
 }
 
-/* Corners, normals and sums of the block's faces. */
-static void load_faces(const fct_tree_view *view, size_t first, size_t count, block_scratch *s) {
-    for (size_t i = 0; i < count; ++i) {
-        const uint32_t *triangle = view->triangles + 3 * (first + i);
-        for (size_t k = 0; k < 3; ++k) {
-            const float *p = view->positions + 3 * (size_t)triangle[k];
-            for (int j = 0; j < 3; ++j) s->corners[j][3 * i + k] = p[j];
-        }
-        fct_sums *sums = &s->leaves[i];
-        fct_sums_face(view->positions, triangle, sums);
-        double invert = sums->area > 0 ? 1 / sums->area : (double)NAN;
-        s->normals[0][i] = (float)(sums->vector.x * invert);
-        s->normals[1][i] = (float)(sums->vector.y * invert);
-        s->normals[2][i] = (float)(sums->vector.z * invert);
+/* The number of a vertex that other blocks used before, counted from `count` on. */
+static uint32_t number_old(uint32_t vertex, uint32_t *count, block_scratch *s) {
+    uint32_t slot = vertex % SLOTS;
+    for (; s->slots[slot] != UINT16_MAX; slot = (slot + 1) % SLOTS)
+        if (s->old[s->slots[slot]] == vertex) return s->slots[slot];
+    s->old[*count] = vertex;
+    s->slots[slot] = (uint16_t)*count;
+    return (*count)++;
+}
+
+static void load_point(const fct_tree_view *view, uint32_t vertex, float point[4]) {
+    const float *p = view->positions + 3 * (size_t)vertex;
+    point[0] = p[0], point[1] = p[1], point[2] = p[2], point[3] = 0;
+}
+
+/* The block's vertices, and which corners are the first at theirs. */
+static void load_points(const describer *d, size_t first, size_t faces, block_scratch *s) {
+    const fct_tree_view *view = &d->tree->view;
+    const uint32_t *corners = view->triangles + 3 * first;
+    uint32_t introduced = fct_vertices_before(d->tree, &d->outline, first);
+    uint32_t fresh = fct_vertices_before(d->tree, &d->outline, first + faces) - introduced, count = fresh;
+    memset(s->slots, 0xFF, sizeof s->slots);
+    memset(s->last, 0, 3 * faces * sizeof *s->last);
+    for (uint32_t v = 0; v < fresh; ++v) load_point(view, introduced + v, s->points[v]);
+    for (uint32_t c = 0; c < 3 * faces; ++c) {
+        uint32_t vertex = corners[c] - introduced; /* wraps around for an old one */
+        if (vertex >= fresh) vertex = number_old(corners[c], &count, s);
+        s->at[c] = 4 * vertex;
+        s->before[c] = s->last[vertex];
+        s->last[vertex] = c + 1;
+    }
+    for (uint32_t v = fresh; v < count; ++v) load_point(view, s->old[v], s->points[v]);
+}
+
+/* Sums and normals of the block's faces. */
+static void load_faces(size_t faces, block_scratch *s) {
+    for (size_t i = 0; i < faces; i += 4) {
+        const float *corners[3][4];
+        for (size_t l = 0; l < 4; ++l)
+            for (size_t k = 0; k < 3; ++k)
+                corners[k][l] = s->points[0] + s->at[3 * (i + l < faces ? i + l : i) + k];
+        fct_sums_four((const float *const(*)[4])corners, s->leaves + i, s->normals + i);
     }
 }
 
-/* Frames of four nodes, or of what is left. */
-static void frame_nodes(uint32_t begin, uint32_t count, block_scratch *s) {
-    const double *matrices[4];
-    double values[4][3];
-    v3 frames[4][3];
-    for (uint32_t i = 0; i < 4; ++i) matrices[i] = s->nodes[begin + i < count ? begin + i : begin].covariance;
-    fct_eigen3_four(matrices, values, frames);
-    for (uint32_t i = begin; i < count && i < begin + 4; ++i) {
-        memcpy(s->frames[i], frames[i - begin], sizeof s->frames[i]);
-        s->sizes[i] = fct_sums_store(&s->nodes[i], s->frames[i], &s->records[i]);
+/* Nodes by their faces, exactly as far as many have as many. */
+static void sort_nodes(uint32_t count, block_scratch *s) {
+    uint32_t starts[EXACT + 2] = {0};
+    for (uint32_t i = 0; i < count; ++i)
+        ++starts[(s->links[i].count < EXACT ? s->links[i].count : EXACT) + 1];
+    for (uint32_t i = 1; i < EXACT + 2; ++i) starts[i] += starts[i - 1];
+    for (uint32_t i = count; i-- > 0;)
+        s->by_size[starts[s->links[i].count < EXACT ? s->links[i].count : EXACT]++] = (uint16_t)i;
+}
+
+/* Where the distinct points of faces [first, end) of the block are: those of corners that are the first at
+ * their vertex; returns how many. */
+static uint32_t list_points(const block_scratch *s, uint32_t first, uint32_t end, uint32_t *list) {
+    uint32_t count = 0, last = 3 * end;
+    i8 limit = i8_set(3 * first + 1);
+    for (uint32_t c = 3 * first; c < last; c += 8) {
+        uint32_t mask = i8_lt(i8_load(s->before + c), limit);
+        if (c + 8 > last) mask &= (1u << (last - c)) - 1;
+        i8_store_some(list + count, i8_load(s->at + c), mask);
+        count += (uint32_t)__builtin_popcount(mask);
+    }
+    return count;
+}
+
+/* Lengthens a list by repeating it. */
+static inline void repeat_list(uint32_t *list, uint32_t count, uint32_t wanted) {
+    if (count < 8)
+        for (uint32_t j = count; j < wanted; ++j) list[j] = list[j - count];
+    else
+        for (uint32_t j = count; j < wanted; j += 8) i8_store(list + j, i8_load(list + j - count));
+}
+
+/* Points of eight lists; returns how many rows. */
+static uint32_t load_rows(block_scratch *s, const uint32_t counts[8]) {
+    uint32_t longest = 0;
+    for (uint32_t i = 0; i < 8; ++i) longest = counts[i] > longest ? counts[i] : longest;
+    for (uint32_t i = 0; i < 8; ++i) repeat_list(s->lists[i], counts[i], longest);
+    for (uint32_t j = 0; j < longest; ++j) {
+        const float *points[8];
+        f8 p[3];
+        for (uint32_t i = 0; i < 8; ++i) points[i] = s->points[0] + s->lists[i][j];
+        f8_load_columns(points, p);
+        f8_store(s->rows[j].x, p[0]), f8_store(s->rows[j].y, p[1]), f8_store(s->rows[j].z, p[2]);
+    }
+    return longest;
+}
+
+/* Asks for the memory of the records of two nodes: more at once would have the core wait. */
+static inline void ask_for_two(const fct_tree *tree, const block_scratch *s, uint32_t i, uint32_t count) {
+    for (uint32_t end = i + 2 < count ? i + 2 : count; i < end; ++i) {
+        const fct_cluster *c = &tree->clusters[s->order[s->by_size[i]]];
+        for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
     }
 }
 
-static inline void ask_for_record(const fct_cluster *c) {
-    for (size_t at = 0; at < sizeof *c; at += 64) __builtin_prefetch((const char *)c + at, 1);
+/* Nodes [begin, begin + 8) by size, or what is left of them; `first`: the block's first face. */
+static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin, uint32_t count,
+                           block_scratch *s) {
+    fct_octet o;
+    fct_octet_normals n;
+    const fct_sums *sums[8];
+    fct_cluster *out[8];
+    uint32_t nodes[8], counts[8];
+    n.normals = s->normals[0];
+    for (uint32_t i = 0; i < 8; ++i) {
+        nodes[i] = s->by_size[begin + i < count ? begin + i : begin];
+        const fct_node_link *link = &s->links[nodes[i]];
+        sums[i] = &s->nodes[nodes[i]];
+        out[i] = &tree->clusters[s->order[nodes[i]]];
+        n.firsts[i] = link->first - first, n.counts[i] = link->count;
+        counts[i] = list_points(s, n.firsts[i], n.firsts[i] + n.counts[i], s->lists[i]);
+    }
+    ask_for_two(tree, s, begin + 8, count);
+    uint32_t rows = load_rows(s, counts);
+    ask_for_two(tree, s, begin + 10, count);
+    fct_octet_sum(&o, sums);
+    fct_octet_cone(&o, &n);
+    ask_for_two(tree, s, begin + 12, count);
+    fct_octet_turn(&o, s->rows, rows);
+    ask_for_two(tree, s, begin + 14, count);
+    fct_octet_fit(&o, s->rows, rows);
+    fct_octet_store_all(&o, out);
+    for (uint32_t i = 0; i < 8; ++i) fct_node_link_store(&s->links[nodes[i]], out[i]);
 }
 
-/* In passes over its nodes, so that what one node waits for overlaps with another's work. */
 static void describe_block(const describer *d, size_t block, block_scratch *s) {
     const fct_tree *tree = d->tree;
     uint32_t nodes = tree->view.node_count, root = d->outline.blocks[block];
     uint32_t first = root < nodes ? tree->links[root].first : root - nodes;
     uint32_t faces = root < nodes ? tree->links[root].count : 1;
     uint32_t count = list_subtree(tree, root, first, s);
-    load_faces(&tree->view, first, faces, s);
-    fct_points corners = {s->corners[0], s->corners[1], s->corners[2]};
-    fct_points normals = {s->normals[0], s->normals[1], s->normals[2]};
+    load_points(d, first, faces, s);
+    load_faces(faces, s);
     for (uint32_t i = count; i-- > 0;) fct_sums_join(s->parts[i][0], s->parts[i][1], &s->nodes[i]);
-    for (uint32_t i = 0; i < count; i += 4) frame_nodes(i, count, s);
-    for (uint32_t i = 0; i < count; ++i) {
-        fct_cluster *c = &s->records[i];
-        orient(corners, normals, c->first - first, c->first - first + c->count, s->sizes[i], s->frames[i], c);
-    }
-    for (uint32_t i = 0; i < count; ++i) {
-        fct_cluster *c = &s->records[i];
-        fit(corners, c->first - first, c->first - first + c->count, c);
-    }
-    for (uint32_t i = 0; i < count; ++i) {
-        if (i + AHEAD < count) ask_for_record(&tree->clusters[s->order[i + AHEAD]]);
-        tree->clusters[s->order[i]] = s->records[i];
-    }
-    d->outline.sums[block] = count ? s->nodes[0] : s->leaves[0];
+    sort_nodes(count, s);
+    for (uint32_t i = 0; i < count; i += 8) describe_eight(tree, first, i, count, s);
+    const fct_sums *all = count ? &s->nodes[0] : &s->leaves[0];
+    d->outline.sums[block] = *all;
+    fct_cap *cap = &d->outline.caps[block];
+    v3_store(cap->axis, v3_unit(all->vector));
+    cap->angle = count ? tree->clusters[root].cone_angle : 0;
 }
 
 static void describe_blocks(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -224,6 +278,8 @@ static void describe_blocks(void *user, size_t begin, size_t end, size_t chunk, 
     describer *d = user;
     for (size_t block = begin; block < end; ++block) describe_block(d, block, &d->scratch[thread]);
 }
+
+/* --- Outline --- */
 
 /* Notes where a part of its parent went. */
 typedef struct visit {
@@ -279,14 +335,19 @@ static fct_result prepare(const fct_env *env, describer *d) {
     o->upper = fct_allocate(env, o->upper_count, sizeof *o->upper);
     o->blocks = fct_allocate(env, o->block_count, sizeof *o->blocks);
     o->sums = fct_allocate(env, o->block_count, sizeof *o->sums);
+    o->caps = fct_allocate(env, o->block_count, sizeof *o->caps);
+    o->introduced =
+        fct_allocate(env, fct_chunk_count(d->tree->view.face_count, FCT_SPAN) + 1, sizeof *o->introduced);
     d->scratch = fct_allocate(env, fct_env_threads(env), sizeof *d->scratch);
     if (!d->tree->clusters)
         d->tree->clusters = fct_allocate(env, d->tree->view.node_count, sizeof *d->tree->clusters);
     d->tree->view.clusters = d->tree->clusters;
-    if (!o->upper || !o->blocks || !o->sums || !d->scratch || !d->tree->clusters)
+    if (!o->upper || !o->blocks || !o->sums || !o->caps || !o->introduced || !d->scratch ||
+        !d->tree->clusters)
         return fct_fail_memory(env, "boxes");
     walk(d->tree, o);
     count_blocks(o);
+    count_vertices(env, d);
     return FCT_OK;
 }
 
@@ -302,6 +363,8 @@ fct_result fct_tree_describe(fct_tree *tree) {
     fct_release(env, d.outline.upper);
     fct_release(env, d.outline.blocks);
     fct_release(env, d.outline.sums);
+    fct_release(env, d.outline.caps);
+    fct_release(env, d.outline.introduced);
     fct_release(env, d.scratch);
     return result;
 }

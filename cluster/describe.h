@@ -2,16 +2,11 @@
 #ifndef FCT_CLUSTER_DESCRIBE_H
 #define FCT_CLUSTER_DESCRIBE_H
 
-#include "cluster/box.h"
+#include "cluster/octet.h"
 #include "cluster/tree.h"
 
-enum { FCT_BLOCK = 512 }; /* faces of a cluster that is described at one go with all that is in it */
-
-/* Sums over a cluster's surface; centre and covariance about it by `weight`. */
-typedef struct fct_sums {
-    double area, weight, moment[6], covariance[6];
-    v3 vector, center;
-} fct_sums;
+/* Faces of a cluster that is described at one go with all that is in it. */
+enum { FCT_BLOCK = 512, FCT_SPAN = 64 };
 
 /* A cluster of more than FCT_BLOCK faces. */
 typedef struct fct_upper {
@@ -25,6 +20,11 @@ typedef struct fct_upper {
 
 #define FCT_IS_BLOCK 0x80000000u
 
+/* A cone of normals; the axis is 0 where there is none. */
+typedef struct fct_cap {
+    float axis[3], angle;
+} fct_cap;
+
 /* All of a tree: clusters above blocks in preorder, and blocks (subtrees' roots, single leaves too) by place.
  */
 typedef struct fct_outline {
@@ -32,18 +32,17 @@ typedef struct fct_outline {
     uint32_t upper_count;
     uint32_t *blocks, block_count; /* node ids */
     fct_sums *sums;                /* of blocks */
+    fct_cap *caps;                 /* of blocks */
+    uint32_t *introduced;          /* per FCT_SPAN places: vertices used by faces before them */
 } fct_outline;
 
-void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *out);
-void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out);
+/* How many vertices are used by faces before a place; they are the first of the tree's order. */
+uint32_t fct_vertices_before(const fct_tree *tree, const fct_outline *outline, size_t place);
 
-/* Writes area, moment, centroid and plane, from the eigenvectors of the covariance, which become the frame
- * (u, v, normal). Returns about the radius of the cluster, 1 where it has none. */
-double fct_sums_store(const fct_sums *sums, v3 frame[3], fct_cluster *out);
-
-/* All but cost and links, from the sums, corners and normals of faces [first, end) of a stream. */
-void fct_faces_describe(fct_points corners, fct_points normals, const fct_sums *sums, size_t first,
-                        size_t end, fct_cluster *out);
+/* One cluster alone, which is in all lanes of the rows: all but cost and links. The normals are rows of four
+ * floats. */
+void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
+                         uint32_t normal_count, const fct_sums *sums, fct_cluster *out);
 
 /* Describes the upper clusters of a tree whose blocks are done. Errors: MEMORY, CANCELLED. */
 fct_result fct_tree_describe_upper(fct_tree *tree, fct_outline *outline);

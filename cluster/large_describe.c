@@ -9,7 +9,7 @@
  */
 #include <string.h>
 
-#include "base/eigen.h"
+#include "cluster/box.h"
 #include "cluster/cone.h"
 #include "cluster/large_lookup.h"
 
@@ -17,7 +17,8 @@
 enum { SAMPLES = 64, STACK = 512, MOST = 1 << 18, HARD = 1 << 11, FRAMES = 4 };
 
 typedef struct block_faces {
-    float corners[3][3 * FCT_BLOCK], normals[3][FCT_BLOCK];
+    fct_octet_row corners[3 * FCT_BLOCK];
+    float normals[FCT_BLOCK][4];
 } block_faces;
 
 typedef struct describer {
@@ -83,10 +84,9 @@ static bool load_block(describer *d, uint32_t first, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         float corners[9], normal[3];
         if (!face_at(d, first + i, corners)) return false;
-        for (int k = 0; k < 3; ++k)
-            for (int j = 0; j < 3; ++j) d->faces->corners[j][3 * i + (uint32_t)k] = corners[3 * k + j];
+        for (uint32_t k = 0; k < 3; ++k) fct_octet_row_fill(&d->faces->corners[3 * i + k], corners + 3 * k);
         fct_unit_normal(corners, triangle, normal);
-        for (int j = 0; j < 3; ++j) d->faces->normals[j][i] = normal[j];
+        memcpy(d->faces->normals[i], normal, sizeof normal);
     }
     return true;
 }
@@ -95,15 +95,13 @@ static bool describe_block(describer *d, uint32_t root) {
     fct_large *l = d->large;
     uint32_t stack[FCT_BLOCK], top = 0, first = l->upper[root].first;
     const block_faces *f = d->faces;
-    fct_points corners = {f->corners[0], f->corners[1], f->corners[2]};
-    fct_points normals = {f->normals[0], f->normals[1], f->normals[2]};
     if (!load_block(d, first, l->upper[root].count)) return false;
     stack[top++] = root;
     while (top > 0) {
         uint32_t node = stack[--top];
         fct_cluster *c = &l->upper[node];
-        fct_faces_describe(corners, normals, &d->upper[node], c->first - first, c->first - first + c->count,
-                           c);
+        fct_points_describe(f->corners + 3 * (c->first - first), 3 * c->count, f->normals[c->first - first],
+                            c->count, &d->upper[node], c);
         for (int k = 0; k < 2; ++k)
             if (c->child[k] < l->upper_count) stack[top++] = c->child[k];
     }
@@ -190,13 +188,13 @@ static void rotation_of(describer *d, place p, float rotation[4]) {
     memcpy(rotation, c ? c->box_rotation : world, sizeof world);
 }
 
-static bool fit_box(describer *d, uint32_t node, const v3 frame[3], const float samples[][9]) {
+static bool fit_box(describer *d, uint32_t node, const float samples[][9]) {
     static const float world[4] = {0, 0, 0, 1};
     fct_cluster *c = &d->large->upper[node];
     float rotations[FRAMES][4], axes[FRAMES][3][3];
     fct_extents extents[FRAMES];
     int best = 0;
-    fct_box_rotation(frame, rotations[0]);
+    memcpy(rotations[0], c->box_rotation, sizeof rotations[0]);
     memcpy(rotations[1], world, sizeof world);
     for (int k = 0; k < 2; ++k) rotation_of(d, child_of_upper(d, c->child[k]), rotations[2 + k]);
     bool hard = false; /* thousands of clusters tie for the farthest point: two frames must do */
@@ -265,21 +263,21 @@ static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
 
 /* --- All --- */
 
+/* By its samples, whose cone and box are then replaced by its own. */
 static bool describe_large(describer *d, uint32_t node) {
+    static const uint32_t triangle[3] = {0, 1, 2};
     fct_cluster *c = &d->large->upper[node];
-    float samples[SAMPLES][9], corners[3][SAMPLES];
-    v3 frame[3];
-    double values[3];
-    fct_eigen3(d->upper[node].covariance, values, frame);
-    double size = fct_sums_store(&d->upper[node], frame, c);
+    fct_octet_row corners[SAMPLES];
+    float samples[SAMPLES][9], normals[SAMPLES][4];
     for (uint32_t i = 0; i < SAMPLES; ++i) {
         uint32_t at = c->first + (uint32_t)((uint64_t)i * c->count / SAMPLES);
         if (!face_at(d, at, samples[i])) return false;
-        for (int k = 0; k < 3; ++k) corners[k][i] = samples[i][3 * (i % 3) + (uint32_t)k];
+        fct_octet_row_fill(&corners[i], samples[i] + 3 * (i % 3));
+        fct_unit_normal(samples[i], triangle, normals[i]);
+        normals[i][3] = 0;
     }
-    fct_box_turn((fct_points){corners[0], corners[1], corners[2]}, 0, SAMPLES, size, frame);
-    return fit_box(d, node, (const v3 *)frame, (const float(*)[9])samples) &&
-           find_cone(d, node, (const float(*)[9])samples);
+    fct_points_describe(corners, SAMPLES, normals[0], SAMPLES, &d->upper[node], c);
+    return fit_box(d, node, (const float(*)[9])samples) && find_cone(d, node, (const float(*)[9])samples);
 }
 
 static void sum_up(describer *d) {

@@ -35,6 +35,42 @@ static void transposing(void **state) {
     }
 }
 
+static void small_matrices(void **state) {
+    (void)state;
+    double in[4][4], out[4];
+    float rows[8][4], column[8];
+    const float *starts[8];
+    d4 m[4];
+    f8 columns[3];
+    for (int i = 0; i < 8; ++i) {
+        for (int k = 0; k < 4; ++k) rows[i][k] = (float)(10 * i + k), in[i % 4][k] = 10 * (i % 4) + k;
+        starts[i] = rows[i];
+    }
+    for (int i = 0; i < 4; ++i) m[i] = d4_load(in[i]);
+    d4_transpose(m);
+    for (int i = 0; i < 4; ++i) {
+        d4_store(out, m[i]);
+        for (int k = 0; k < 4; ++k) assert_true(out[k] == in[k][i]);
+    }
+    f8_load_columns(starts, columns);
+    for (int k = 0; k < 3; ++k) {
+        f8_store(column, columns[k]);
+        for (int i = 0; i < 8; ++i) assert_true(column[i] == rows[i][k]);
+    }
+}
+
+static void some_lanes(void **state) {
+    (void)state;
+    const uint32_t in[8] = {3, 1, 4, 1, 5, 9, 2, 6};
+    for (uint32_t mask = 0; mask < 256; ++mask) {
+        uint32_t out[9] = {0, 0, 0, 0, 0, 0, 0, 0, 77}, count = 0;
+        i8_store_some(out, i8_load(in), mask);
+        for (uint32_t i = 0; i < 8; ++i)
+            if (mask >> i & 1) assert_int_equal(out[count++], in[i]);
+        assert_int_equal(out[8], 77);
+    }
+}
+
 static void integers(void **state) {
     (void)state;
     const uint32_t u[8] = {5, 0xFFFFFFFF, 3, 5, 0x80000000, 9, 0x7FFFFFFF, 5},
@@ -92,6 +128,8 @@ static void doubles(void **state) {
     d4 x = d4_load(p), y = d4_load(q);
     d4_store(out, d4_div(d4_sub(x, y), d4_add(d4_mul(y, y), d4_set(1))));
     for (int i = 0; i < 4; ++i) assert_true(out[i] == (p[i] - q[i]) / (q[i] * q[i] + 1));
+    assert_int_equal(d4_lt(x, y), 1);
+    assert_int_equal(d4_lt(y, x), 14);
     d4_store(out, d4_if_lt(x, y, d4_min(x, y), d4_max(x, y)));
     for (int i = 0; i < 4; ++i) assert_true(out[i] == p[i]);
     d4_store(out, d4_sqrt(d4_abs(y)));
@@ -124,10 +162,29 @@ static void upper_halves(void **state) {
     for (uint32_t i = 0; i < 8; ++i) assert_true(out[i] == in[i] >> 32);
 }
 
+static void double_fours(void **state) {
+    (void)state;
+    const double p[8] = {1, -2, 1e300, 0, 9, -7, 0.25, 5}, q[8] = {3, -4, 2, -0.5, 8, 7, 0.125, 5};
+    double out[8];
+    float narrow[8];
+    d8 x = d8_load(p), y = d8_load(q);
+    d8_store(out, d8_div(d8_sub(x, y), d8_add(d8_mul(y, y), d8_set(1))));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == (p[i] - q[i]) / (q[i] * q[i] + 1));
+    assert_int_equal(d8_lt(x, y), 0x21);
+    assert_int_equal(d8_lt(y, x), 0x5E);
+    d8_store(out, d8_if_lt(x, y, d8_min(x, y), d8_max(x, y)));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == p[i]);
+    d8_store(out, d8_sqrt(d8_abs(y)));
+    for (int i = 0; i < 8; ++i) assert_true(out[i] == sqrt(fabs(q[i])));
+    d8_store_floats(narrow, d8_load_floats(a));
+    for (int i = 0; i < 8; ++i) assert_true(narrow[i] == a[i]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(floats),       cmocka_unit_test(transposing), cmocka_unit_test(integers),
-        cmocka_unit_test(choosing),     cmocka_unit_test(doubles),     cmocka_unit_test(points),
+        cmocka_unit_test(floats),       cmocka_unit_test(transposing),  cmocka_unit_test(small_matrices),
+        cmocka_unit_test(some_lanes),   cmocka_unit_test(integers),     cmocka_unit_test(choosing),
+        cmocka_unit_test(doubles),      cmocka_unit_test(double_fours), cmocka_unit_test(points),
         cmocka_unit_test(upper_halves), cmocka_unit_test(truncating),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
