@@ -137,11 +137,20 @@ void fct_metric_direction(const fct_metric *metric, const float *positions, cons
     if (area > 0) sym3_add_outer(direction->moment, 1 / area, vector);
 }
 
-static inline void load_lanes(const fct_record *records, const fct_pair *pairs, uint32_t count, bool second,
-                              lanes *out) {
+/* A whole FCT_LANES of pairs, the first again where there are fewer. */
+typedef struct pair_lanes {
+    fct_pair pairs[FCT_LANES];
+} pair_lanes;
+
+static inline const fct_pair *fill_up(const fct_pair *pairs, uint32_t count, pair_lanes *filled) {
+    if (count == FCT_LANES) return pairs;
+    for (uint32_t i = 0; i < FCT_LANES; ++i) filled->pairs[i] = pairs[i < count ? i : 0];
+    return filled->pairs;
+}
+
+static inline void load_lanes(const fct_record *records, const fct_pair *pairs, bool second, lanes *out) {
     for (uint32_t i = 0; i < FCT_LANES; ++i) {
-        const fct_pair *pair = &pairs[i < count ? i : 0];
-        const float *record = records[second ? pair->b : pair->a].covariance;
+        const float *record = records[second ? pairs[i].b : pairs[i].a].covariance;
         out->rows[i] = f8_load(record);
         out->rows[i + 8] = f8_load(record + 8);
     }
@@ -149,9 +158,9 @@ static inline void load_lanes(const fct_record *records, const fct_pair *pairs, 
     f8_transpose(out->rows + 8);
 }
 
-static inline f8 load_shared(const fct_pair *pairs, uint32_t count) {
+static inline f8 load_shared(const fct_pair *pairs) {
     float shared[FCT_LANES];
-    for (uint32_t i = 0; i < FCT_LANES; ++i) shared[i] = pairs[i < count ? i : 0].shared;
+    for (uint32_t i = 0; i < FCT_LANES; ++i) shared[i] = pairs[i].shared;
     return f8_load(shared);
 }
 
@@ -298,10 +307,12 @@ void fct_metric_costs(const fct_metric *metric, const fct_record *records, const
                       const fct_pair *pairs, uint32_t count, float *costs) {
     lanes a, b, u;
     f8 invert_area, invert_weight;
-    load_lanes(records, pairs, count, false, &a);
-    load_lanes(records, pairs, count, true, &b);
+    pair_lanes filled;
+    pairs = fill_up(pairs, count, &filled);
+    load_lanes(records, pairs, false, &a);
+    load_lanes(records, pairs, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
-    join(metric, &a, &b, load_shared(pairs, count), invert_weight, &u);
+    join(metric, &a, &b, load_shared(pairs), invert_weight, &u);
     f8 shape = shape_error(&a, &b, &u, invert_area);
     if (metric->cost == FCT_COST_MEAN) {
         mean_costs(metric, &u, shape, directions, pairs, count, costs);
@@ -321,10 +332,12 @@ void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direct
                        const fct_pair *pairs, uint32_t count) {
     lanes a, b, u;
     f8 invert_area, invert_weight;
-    load_lanes(records, pairs, count, false, &a);
-    load_lanes(records, pairs, count, true, &b);
+    pair_lanes filled;
+    pairs = fill_up(pairs, count, &filled);
+    load_lanes(records, pairs, false, &a);
+    load_lanes(records, pairs, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
-    join(metric, &a, &b, load_shared(pairs, count), invert_weight, &u);
+    join(metric, &a, &b, load_shared(pairs), invert_weight, &u);
     u.fit = total_fit(metric, &u, invert_area, invert_weight);
     f8_transpose(u.rows);
     f8_transpose(u.rows + 8);
