@@ -79,17 +79,16 @@ static void place_roots(const orderer *o, uint8_t *roots) {
     const fct_work *work = o->work;
     fct_tree *tree = o->tree;
     uint32_t faces = work->face_count, kept = o->kept, place = 0, count = 0;
-    /* roots: of nodes and, behind them, of faces */
-    memset(roots, 0, (size_t)kept + faces);
-    roots[0] = kept == work->merge_count;
-    for (uint32_t rank = kept; rank < work->merge_count; ++rank)
+    /* roots: of nodes and, behind them, of faces; what no node kept has for a child */
+    memset(roots, kept + 1 < faces, (size_t)kept + faces);
+    if (kept + 1 == faces) roots[0] = 1;
+    for (uint32_t m = 0; m < work->merge_count && kept + 1 < faces; ++m) {
+        if (!is_kept(o, m)) continue;
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = work->children[(uint32_t)o->sorted[rank]][k];
-            if (child < faces)
-                roots[kept + child] = 1;
-            else if (o->ranks[child - faces] < kept)
-                roots[kept - 1 - o->ranks[child - faces]] = 1;
+            uint32_t child = work->children[m][k];
+            roots[child < faces ? kept + child : kept - 1 - o->ranks[child - faces]] = 0;
         }
+    }
     for (uint32_t i = 0; i < kept; ++i) {
         if (!roots[i]) continue;
         uint32_t merge = (uint32_t)o->sorted[kept - 1 - i];
