@@ -10,6 +10,7 @@
  */
 #include "cluster/describe.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "base/parallel.h"
@@ -29,7 +30,7 @@ typedef struct block_scratch {
     uint32_t before[CORNERS + 8];   /* by corner: 1 + the last corner before it at the same vertex, or 0 */
     uint32_t last[CORNERS];         /* by vertex: 1 + its last corner so far */
     uint32_t old[CORNERS];          /* vertices that other blocks used before */
-    uint16_t slots[SLOTS];          /* their numbers by a hash, or EMPTY */
+    uint16_t slots[SLOTS];          /* their numbers by a hash, or UINT16_MAX */
     uint16_t by_size[FCT_BLOCK];    /* nodes, largest first */
     uint32_t lists[8][CORNERS + 8]; /* of the points of eight nodes, and the points */
     fct_octet_row rows[CORNERS];
@@ -127,6 +128,7 @@ static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first
 
 /* The number of a vertex that other blocks used before, counted from `count` on. */
 static uint32_t number_old(uint32_t vertex, uint32_t *count, block_scratch *s) {
+    static_assert(SLOTS > CORNERS, "there is always a free slot");
     uint32_t slot = vertex % SLOTS;
     for (; s->slots[slot] != UINT16_MAX; slot = (slot + 1) % SLOTS)
         if (s->old[s->slots[slot]] == vertex) return s->slots[slot];
@@ -363,7 +365,7 @@ fct_result fct_tree_describe(fct_tree *tree) {
     describer d = {.tree = tree};
     fct_result result = prepare(env, &d);
     if (result == FCT_OK)
-        result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 4, describe_blocks, &d);
+        result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 2, describe_blocks, &d);
     if (result == FCT_OK) result = fct_tree_describe_upper(tree, &d.outline);
     fct_release(env, tree->links);
     tree->links = NULL;
