@@ -10,12 +10,13 @@
  */
 #include "cluster/describe.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "base/parallel.h"
 #include "base/simd.h"
 
-enum { CORNERS = 3 * FCT_BLOCK, SLOTS = 4096, EXACT = 64 };
+enum { CORNERS = 3 * FCT_BLOCK, SLOTS = 4096, EXACT = 64, SIZES = EXACT - 1 + FCT_BLOCK / 32 };
 
 /* Room for one block. Vertices have numbers of the block's own: those that it is the first to use are one run
  * of the tree's order, the others follow. Points are rows of four floats. */
@@ -29,8 +30,8 @@ typedef struct block_scratch {
     uint32_t before[CORNERS + 8];   /* by corner: 1 + the last corner before it at the same vertex, or 0 */
     uint32_t last[CORNERS];         /* by vertex: 1 + its last corner so far */
     uint32_t old[CORNERS];          /* vertices that other blocks used before */
-    uint16_t slots[SLOTS];          /* their numbers by a hash, or EMPTY */
-    uint16_t by_size[FCT_BLOCK];    /* nodes, smallest first */
+    uint16_t slots[SLOTS];          /* their numbers by a hash, or UINT16_MAX */
+    uint16_t by_size[FCT_BLOCK];    /* nodes, largest first */
     uint32_t lists[8][CORNERS + 8]; /* of the points of eight nodes, and the points */
     fct_octet_row rows[CORNERS];
 } block_scratch;
@@ -127,6 +128,7 @@ static uint32_t list_subtree(const fct_tree *tree, uint32_t root, uint32_t first
 
 /* The number of a vertex that other blocks used before, counted from `count` on. */
 static uint32_t number_old(uint32_t vertex, uint32_t *count, block_scratch *s) {
+    static_assert(SLOTS > CORNERS, "there is always a free slot");
     uint32_t slot = vertex % SLOTS;
     for (; s->slots[slot] != UINT16_MAX; slot = (slot + 1) % SLOTS)
         if (s->old[s->slots[slot]] == vertex) return s->slots[slot];
@@ -170,27 +172,34 @@ static void load_faces(size_t faces, block_scratch *s) {
     }
 }
 
-/* Nodes by their faces, exactly as far as many have as many. */
-static void sort_nodes(uint32_t count, block_scratch *s) {
-    uint32_t starts[EXACT + 2] = {0};
-    for (uint32_t i = 0; i < count; ++i)
-        ++starts[(s->links[i].count < EXACT ? s->links[i].count : EXACT) + 1];
-    for (uint32_t i = 1; i < EXACT + 2; ++i) starts[i] += starts[i - 1];
-    for (uint32_t i = count; i-- > 0;)
-        s->by_size[starts[s->links[i].count < EXACT ? s->links[i].count : EXACT]++] = (uint16_t)i;
+/* By the number of faces, exactly as far as many nodes have as many; 0 is the largest. */
+static inline uint32_t size_class(uint32_t faces) {
+    return SIZES - 1 - (faces < EXACT ? faces : EXACT - 2 + faces / 32);
 }
 
-/* Where the distinct points of faces [first, end) of the block are: those of corners that are the first at
- * their vertex; returns how many. */
+/* Nodes by their faces, so that eight in a row have about as many. */
+static void sort_nodes(uint32_t count, block_scratch *s) {
+    uint32_t starts[SIZES + 1] = {0};
+    for (uint32_t i = 0; i < count; ++i) ++starts[size_class(s->links[i].count) + 1];
+    for (uint32_t i = 1; i < SIZES; ++i) starts[i] += starts[i - 1];
+    for (uint32_t i = 0; i < count; ++i) s->by_size[starts[size_class(s->links[i].count)]++] = (uint16_t)i;
+}
+
+/* Appends where the points of those of eight corners are that are the first at their vertex since `limit`;
+ * returns how many. */
+static inline uint32_t list_eight(const block_scratch *s, uint32_t corner, i8 limit, uint32_t mask,
+                                  uint32_t *list) {
+    mask &= i8_lt(i8_load(s->before + corner), limit);
+    i8_store_some(list, i8_load(s->at + corner), mask);
+    return (uint32_t)__builtin_popcount(mask);
+}
+
+/* Where the distinct points of faces [first, end) of the block are; returns how many. */
 static uint32_t list_points(const block_scratch *s, uint32_t first, uint32_t end, uint32_t *list) {
-    uint32_t count = 0, last = 3 * end;
-    i8 limit = i8_set(3 * first + 1);
-    for (uint32_t c = 3 * first; c < last; c += 8) {
-        uint32_t mask = i8_lt(i8_load(s->before + c), limit);
-        if (c + 8 > last) mask &= (1u << (last - c)) - 1;
-        i8_store_some(list + count, i8_load(s->at + c), mask);
-        count += (uint32_t)__builtin_popcount(mask);
-    }
+    uint32_t count = 0, corner = 3 * first, last = 3 * end;
+    i8 limit = i8_set(corner + 1);
+    for (; corner + 8 <= last; corner += 8) count += list_eight(s, corner, limit, 255, list + count);
+    if (corner < last) count += list_eight(s, corner, limit, (1u << (last - corner)) - 1, list + count);
     return count;
 }
 
@@ -356,7 +365,7 @@ fct_result fct_tree_describe(fct_tree *tree) {
     describer d = {.tree = tree};
     fct_result result = prepare(env, &d);
     if (result == FCT_OK)
-        result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 4, describe_blocks, &d);
+        result = fct_parallel_for_progress(env, "boxes", d.outline.block_count, 2, describe_blocks, &d);
     if (result == FCT_OK) result = fct_tree_describe_upper(tree, &d.outline);
     fct_release(env, tree->links);
     tree->links = NULL;

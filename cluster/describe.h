@@ -6,7 +6,7 @@
 #include "cluster/tree.h"
 
 /* Faces of a cluster that is described at one go with all that is in it. */
-enum { FCT_BLOCK = 512, FCT_SPAN = 64 };
+enum { FCT_BLOCK = 1024, FCT_SPAN = 64 };
 
 /* A cluster of more than FCT_BLOCK faces. */
 typedef struct fct_upper {

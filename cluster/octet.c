@@ -179,18 +179,18 @@ static inline f8 width(range r) {
     return f8_sub(r.high, r.low);
 }
 
-/* Turned by an angle below 45 degrees, and by what it leaves of 90. */
+/* Turned by an angle below 45 degrees, and by what it leaves of 90. The points are measured in units of the
+ * cosine, which saves half of the products. */
 static inline void try_pair(const plane_points *p, float cosine, float sine, turn *best) {
-    f8 c = f8_set(cosine), s = f8_set(sine);
+    f8 c = f8_set(cosine), tangent = f8_set(sine / cosine);
     range x = {f8_set(0), f8_set(0)}, y = x, other_x = x, other_y = x;
     for (uint32_t j = 0; j < p->count; ++j) {
-        f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
-        f8 cu = f8_mul(c, u), sv = f8_mul(s, v), cv = f8_mul(c, v), su = f8_mul(s, u);
-        widen(&x, f8_add(cu, sv)), widen(&y, f8_sub(cv, su));
-        widen(&other_x, f8_add(su, cv)), widen(&other_y, f8_sub(sv, cu));
+        f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]), tu = f8_mul(tangent, u), tv = f8_mul(tangent, v);
+        widen(&x, f8_add(u, tv)), widen(&y, f8_sub(v, tu));
+        widen(&other_x, f8_add(tu, v)), widen(&other_y, f8_sub(tv, u));
     }
-    offer(best, width(x), width(y), p->height, cosine, sine);
-    offer(best, width(other_x), width(other_y), p->height, sine, cosine);
+    offer(best, f8_mul(c, width(x)), f8_mul(c, width(y)), p->height, cosine, sine);
+    offer(best, f8_mul(c, width(other_x)), f8_mul(c, width(other_y)), p->height, sine, cosine);
 }
 
 /* Not at all, and by 45 degrees. */
