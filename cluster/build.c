@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/pool.h"
+#include "cluster/locality.h"
 #include "cluster/tree.h"
 
 fct_tree_def fct_tree_def_default(void) {
@@ -113,7 +114,11 @@ static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree
     tree->clusters = fct_allocate(env, mesh->face_count, sizeof *tree->clusters);
     if (!tree->clusters) return fct_fail_memory(env, "the tree");
     fct_pool_create(env, tree->clusters, (size_t)mesh->face_count * sizeof *tree->clusters, &pool);
-    fct_result result = build_links(env, &pool.env, mesh, def, &dual, tree);
+    fct_local_mesh local;
+    fct_result result = fct_local_mesh_create(&pool.env, mesh, &local);
+    if (result == FCT_OK) result = build_links(env, &pool.env, &local.mesh, def, &dual, tree);
+    if (result == FCT_OK) fct_local_mesh_restore(env, &local, tree->face_ids, tree->vertex_ids);
+    fct_local_mesh_release(&pool.env, &local);
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};

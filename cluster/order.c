@@ -74,31 +74,24 @@ static bool is_kept(const orderer *o, uint32_t merge) {
     return o->kept == o->work->merge_count || o->ranks[merge] < o->kept;
 }
 
-/* Places roots in order of node id, then faces that no node holds. */
-static void place_roots(const orderer *o, uint8_t *roots) {
+/* Places roots in order of node id, then faces that no node holds. held: per build id. */
+static void place_roots(const orderer *o, uint8_t *held) {
     const fct_work *work = o->work;
     fct_tree *tree = o->tree;
-    uint32_t faces = work->face_count, kept = o->kept, place = 0, count = 0;
-    /* roots: of nodes and, behind them, of faces; what no node kept has for a child */
-    memset(roots, kept + 1 < faces, (size_t)kept + faces);
-    if (kept + 1 == faces) roots[0] = 1;
-    for (uint32_t m = 0; m < work->merge_count && kept + 1 < faces; ++m) {
-        if (!is_kept(o, m)) continue;
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = work->children[m][k];
-            roots[child < faces ? kept + child : kept - 1 - o->ranks[child - faces]] = 0;
-        }
-    }
-    for (uint32_t i = 0; i < kept; ++i) {
-        if (!roots[i]) continue;
-        uint32_t merge = (uint32_t)o->sorted[kept - 1 - i];
+    uint32_t faces = work->face_count, place = 0, count = 0;
+    memset(held, 0, (size_t)faces + work->merge_count);
+    for (uint32_t m = 0; m < work->merge_count; ++m)
+        if (is_kept(o, m)) held[work->children[m][0]] = held[work->children[m][1]] = 1;
+    for (uint32_t i = 0; i < o->kept && place < faces; ++i) {
+        uint32_t merge = (uint32_t)o->sorted[o->kept - 1 - i];
+        if (held[faces + merge]) continue;
         o->firsts[merge] = place, o->depths[merge] = 0;
         place += o->counts[merge];
         tree->roots[count++] = i;
     }
     for (uint32_t f = 0; f < faces && place < faces; ++f) {
-        if (!roots[kept + f]) continue;
-        tree->roots[count++] = kept + place;
+        if (held[f]) continue;
+        tree->roots[count++] = o->kept + place;
         tree->face_ids[place++] = f;
     }
     tree->view.root_count = count;
@@ -303,17 +296,17 @@ static fct_result rank_merges(const fct_env *env, orderer *o) {
 static fct_result place(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, merges = o->work->merge_count;
     fct_tree *tree = o->tree;
-    uint8_t *roots = fct_allocate(env, o->kept + faces, sizeof *roots);
+    uint8_t *held = fct_allocate(env, faces + merges, sizeof *held);
     o->firsts = fct_allocate(env, merges, sizeof *o->firsts);
     o->depths = fct_allocate(env, merges, sizeof *o->depths);
     tree->links = fct_allocate(tree->env, o->kept, sizeof *tree->links);
-    bool complete = roots && o->firsts && o->depths && tree->links;
+    bool complete = held && o->firsts && o->depths && tree->links;
     if (complete) {
-        place_roots(o, roots);
+        place_roots(o, held);
         place_faces(o);
         fct_parallel_for(env, merges, GRAIN, link_nodes, o);
     }
-    fct_release(env, roots);
+    fct_release(env, held);
     return complete ? FCT_OK : fct_fail_memory(env, "ordering the tree");
 }
 
