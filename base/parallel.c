@@ -1,23 +1,26 @@
 /* base/parallel.c: work shared between the calling thread and helpers, threads that the process keeps.
  *
  * The caller works through the chunks itself. Free helpers are offered the job and join in when the system
- * lets them run; when no chunk is left the caller takes the offer back from those that have not begun, so
- * that it waits for chunks that others work on and never for a thread that is not scheduled. A helper's state
- * is one word: FREE or ASLEEP -> job (the caller offers) -> FREE (takes back), or job | AT_WORK (the helper
- * begins)
- * -> job | AT_WORK | AWAITED (the caller sleeps) -> FREE (the helper is done with the job's memory).
+ * lets them run; when no chunk is left, the caller takes the offer back from those that have not begun. So it
+ * waits for chunks that others work on, and never for a thread that is not let run.
  *
- * Any number of callers share the helpers; each starts what it misses. A child of fork() begins without.
+ * A helper's state is one word: FREE or ASLEEP -> job (the caller offers) -> FREE (and takes back), or
+ * job | AT_WORK (the helper begins) -> job | AT_WORK | AWAITED (the caller sleeps) -> FREE (the helper has
+ * left the job). Any number of callers share the helpers, each starting what it misses. A child of fork() has
+ * none.
  */
 #include "base/parallel.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 
-/* 20 to 50 microseconds, in pauses of the processor: about what it takes to wake a thread. */
-enum { MOST_HELPERS = 255, SPINS = 1000 };
+/* Who waits looks SPINS times, half a millisecond or so, and after KEEP of them, 20 to 50 microseconds, lets
+ * others have the processor in between. To wake a sleeper takes 50 to 100 microseconds on a virtual machine.
+ */
+enum { MOST_HELPERS = 255, KEEP = 1000, SPINS = 10000 };
 
 /* States, beside the address of a job, which is a multiple of 64. */
 enum { FREE = 0, AT_WORK = 1, AWAITED = 2, ASLEEP = 4, LEAVING = 8 };
@@ -67,14 +70,15 @@ static void sleep_while(helper *h, uintptr_t state) {
 
 /* The first other state that is seen, or `state` if it lasts. */
 static uintptr_t spin_while(const helper *h, uintptr_t state) {
-    uintptr_t seen = state;
-    for (int i = 0; i < SPINS && seen == state; ++i) {
+    for (int i = 0; i < SPINS; ++i) {
 #if defined(__x86_64__)
         __builtin_ia32_pause();
 #endif
-        seen = atomic_load_explicit(&h->state, memory_order_acquire);
+        uintptr_t seen = atomic_load_explicit(&h->state, memory_order_acquire);
+        if (seen != state) return seen;
+        if (i >= KEEP && i % 32 == 0) sched_yield();
     }
-    return seen;
+    return state;
 }
 
 static void *help(void *argument) {

@@ -10,8 +10,8 @@
 
 #include "base/env.h"
 
-/* Work on items [begin, end), which are chunk number `chunk`; `thread`, less than fct_env_threads(env) and
- * than the number of chunks and no one else's in the same call, is for scratch space only. */
+/* Work on items [begin, end), which are chunk number `chunk`; `thread` < fct_env_threads(env), no one else's
+ * in the same call, is for scratch space only. */
 typedef void fct_chunk_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
 
 static inline size_t fct_chunk_count(size_t count, size_t grain) {

