@@ -414,6 +414,15 @@ static fct_result one_round(fct_rounds *r, uint32_t *merges) {
     return FCT_OK;
 }
 
+static void number_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const fct_rounds *r = user;
+    for (uint32_t s = (uint32_t)begin; s < end; ++s) {
+        r->now.slots[s] = s;
+        atomic_store_explicit(&r->least[0][s], UINT64_MAX, memory_order_relaxed);
+    }
+}
+
 /* The work's lists become the first generation. */
 static fct_result enter_lists(fct_rounds *r) {
     fct_work *work = r->work;
@@ -427,7 +436,7 @@ static fct_result enter_lists(fct_rounds *r) {
                               .keys = fct_allocate(work->env, count + SLACK, sizeof *r->now.keys)};
     work->lists = (fct_lists){0};
     if (!r->now.slots || !r->now.keys) return fct_fail_memory(work->env, "clustering");
-    for (uint32_t s = 0; s < work->face_count; ++s) r->now.slots[s] = s;
+    fct_parallel_for(work->env, work->face_count, GRAIN, number_faces, r);
     r->fresh = true;
     return FCT_OK;
 }
@@ -442,6 +451,8 @@ static fct_result enter_edges(fct_rounds *r) {
         return fct_fail_memory(work->env, "clustering");
     for (uint32_t s = 0; s < work->face_count; ++s)
         if (work->nodes[s] != FCT_NONE) {
+            if (work->heights[s] > r->start_height) r->start_height = work->heights[s];
+            atomic_store_explicit(&r->least[0][live], UINT64_MAX, memory_order_relaxed);
             r->renumbered[s] = live;
             now->slots[live++] = s;
         }
@@ -491,13 +502,7 @@ static fct_result run(fct_rounds *r) {
     fct_work *work = r->work;
     fct_result result = work->lists.neighbors ? enter_lists(r) : enter_edges(r);
     if (result != FCT_OK) return result;
-    for (uint32_t i = 0; i < r->now.count; ++i) {
-        uint32_t height = work->heights[r->now.slots[i]];
-        if (height > r->start_height) r->start_height = height;
-    }
     r->unbound = !work->materials && r->start_height < FCT_FREE_HEIGHT;
-    for (uint32_t i = 0; i < r->now.count; ++i)
-        atomic_store_explicit(&r->least[0][i], UINT64_MAX, memory_order_relaxed);
     fct_parallel_for(work->env, r->now.count, GRAIN, price_first, r);
     for (uint32_t merges = UINT32_MAX; r->now.count > FEW && merges > r->now.count / 64;) {
         result = fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
