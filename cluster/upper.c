@@ -170,6 +170,9 @@ static void fit_box(const upper_job *job, const fct_upper *u, fct_cluster *c) {
 
 /* Of half a chord: what a cone may be wider than its normals need, for a search that closes early. */
 static const double slack = 5e-7;
+/* Beyond this half chord (169 degrees) a cone is taken to be all directions: of loose triangles, whose
+ * normals go anywhere, nothing could be left closed. */
+static const double nearly_all = 0.995;
 
 /* Not less than half the chord between the axis and the farthest normal of a cone about another axis: the
  * sine of half the sum of their angle and the cone's, by series that end on the safe side; 1 from pi on. */
@@ -209,6 +212,7 @@ static double widen_by_block(const fct_tree *tree, uint32_t root, v3 axis, doubl
             fct_unit_normal(tree->positions, tree->triangles + 3 * (size_t)(b.node - nodes), normal);
             double half = 0.5 * v3_norm(v3_sub(v3_load(normal), axis)); /* may be no number */
             widest = half > widest ? half : widest;
+            if (widest > nearly_all) return 1;
         }
     }
     return widest;
@@ -229,6 +233,7 @@ static float cone_of(const upper_job *job, const fct_upper *u, const fct_cluster
     for (uint32_t i = first; i < end; ++i)
         if (reach_of(v3_load(o->caps[i].axis), (double)o->caps[i].angle, axis) > widest + slack)
             widest = widen_by_block(job->tree, o->blocks[i], axis, widest);
+    if (widest == 1) return fct_cone_angle(4);
     widest = 2 * (widest + slack);
     return fct_cone_angle((float)(widest * widest));
 }
