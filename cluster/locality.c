@@ -146,7 +146,9 @@ static fct_result sort_mesh(const fct_env *env, sorter *s) {
 fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, fct_local_mesh *out) {
     sorter s = {.from = mesh, .to = out};
     *out = (fct_local_mesh){.mesh = *mesh};
-    if (mesh->face_count < LEAST_FACES || !is_scattered(&s)) return FCT_OK;
+    /* with more vertices than faces few are shared: nothing to be near to, three times the work */
+    bool loose = mesh->vertex_count > mesh->face_count;
+    if (loose || mesh->face_count < LEAST_FACES || !is_scattered(&s)) return FCT_OK;
     fct_result result = allocate(env, &s) ? sort_mesh(env, &s) : fct_fail_memory(env, "sorting the mesh");
     fct_release(env, s.items);
     fct_release(env, s.ranks);

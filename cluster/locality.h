@@ -10,8 +10,8 @@ typedef struct fct_local_mesh {
     uint32_t *faces, *vertices; /* the mesh's own ids of both; NULL: they are the same */
 } fct_local_mesh;
 
-/* The mesh itself where neighbours lie near each other in memory, as a rule, or where it is small; it must
- * outlive *out. Errors: MEMORY; then *out needs no release. */
+/* The mesh itself where neighbours lie near each other in memory, as a rule, where it is small or loose; it
+ * must outlive *out. Errors: MEMORY; then *out needs no release. */
 fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, fct_local_mesh *out);
 /* Turns ids into those of the mesh. */
 void fct_local_mesh_restore(const fct_env *env, const fct_local_mesh *local, uint32_t *face_ids,
