@@ -9,7 +9,7 @@
 #include "cluster/work.h"
 
 enum {
-    FCT_ROUND_GRAIN = 1 << 13, /* clusters a chunk */
+    FCT_ROUND_GRAIN = 1 << 12, /* clusters a chunk */
     FCT_LIST_SLACK = 8,        /* entries behind each chunk's lists (and all lists) that may be overwritten */
     FCT_SHORT_LIST = 100
 };
