@@ -24,7 +24,8 @@ enum { GRAIN = FCT_ROUND_GRAIN, SLACK = FCT_LIST_SLACK, FEW = 4096, QUEUE = 128,
 #define EARLY_PATIENCE 2.0f
 #define PATIENCE       1.2f
 
-#define SIZE_BITS 31u /* low bits of a key: log2 of the union's faces */
+#define SIZE_BITS  31u              /* low bits of a key: log2 of the union's faces */
+#define ROUGH_BITS ((1u << 20) - 1) /* what is less than an eighth of an octave */
 
 /* --- The least edge of a cluster --- */
 
@@ -239,12 +240,13 @@ static void find_mates(void *user, size_t begin, size_t end, size_t chunk, uint3
 static void offer_left_over(const fct_rounds *r, edge_queue *queue) {
     for (uint32_t q = 0; q < queue->count; ++q) {
         uint32_t i = queue->clusters[q], other = queue->others[q], key = r->now.keys[queue->entries[q]];
-        if (key <= r->limits[other]) offer(r, r->least[1], i, other, key);
+        if (key <= r->limits[other]) offer(r, r->least[1], i, other, (key & ~ROUGH_BITS) | (key & SIZE_BITS));
     }
     queue->count = 0;
 }
 
-/* Offers edges between clusters that have no mate. */
+/* Offers edges between clusters that have no mate, by their rough costs: where costs fall along a way, each
+ * would like the next best, and only the last two of it would come together. */
 static void offer_rest(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const fct_rounds *r = user;
