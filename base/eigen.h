@@ -2,7 +2,7 @@
 #ifndef FCT_BASE_EIGEN_H
 #define FCT_BASE_EIGEN_H
 
-#include "base/simd.h"
+#include "base/simd_d8.h"
 #include "base/vec.h"
 
 /* m = xx xy xz yy yz zz. Ascending eigenvalues and unit eigenvectors, a right-handed frame, for any finite m,

@@ -286,11 +286,11 @@ static const uint32_t fct_lanes_of[256] = {
     0x76521,  0x765210,  0x7653,   0x76530,   0x76531,   0x765310,  0x76532,  0x765320,  0x765321, 0x7653210,
     0x7654,   0x76540,   0x76541,  0x765410,  0x76542,   0x765420,  0x765421, 0x7654210, 0x76543,  0x765430,
     0x765431, 0x7654310, 0x765432, 0x7654320, 0x7654321, 0x76543210};
-/* Stores the lanes whose bit is set, one after the other; all eight places may be written. */
-static inline void i8_store_some(uint32_t *p, i8 a, uint32_t mask) {
-    i8 lanes = _mm256_srlv_epi32(_mm256_set1_epi32((int)fct_lanes_of[mask]),
-                                 _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-    _mm256_storeu_si256((__m256i *)(void *)p, _mm256_permutevar8x32_epi32(a, lanes));
+/* The numbers of the mask's bits in the first lanes, 0 in those left. */
+static inline i8 i8_chosen(uint32_t mask) {
+    __m256i numbers = _mm256_srlv_epi32(_mm256_set1_epi32((int)fct_lanes_of[mask]),
+                                        _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+    return _mm256_and_si256(numbers, _mm256_set1_epi32(7));
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p));
@@ -555,9 +555,11 @@ static inline i8 i8_gather(const uint32_t *table, i8 index) {
     for (int i = 0; i < 8; ++i) index.v[i] = (int32_t)table[(uint32_t)index.v[i]];
     return index;
 }
-static inline void i8_store_some(uint32_t *p, i8 a, uint32_t mask) {
-    for (int i = 0; i < 8; ++i)
-        if (mask >> i & 1) *p++ = (uint32_t)a.v[i];
+static inline i8 i8_chosen(uint32_t mask) {
+    i8 r = {{0}};
+    for (int i = 0, to = 0; i < 8; ++i)
+        if (mask >> i & 1) r.v[to++] = i;
+    return r;
 }
 static inline i8 i8_load_bytes(const uint8_t *p) {
     i8 r;
@@ -576,56 +578,9 @@ static inline f8 f8_lookup16(f8 low, f8 high, i8 index) {
 #undef FCT_M8
 #endif
 
-/* Eight doubles as two fours, whose waits overlap. */
-typedef struct d8 {
-    d4 low, high;
-} d8;
-
-static inline d8 d8_set(double a) {
-    return (d8){d4_set(a), d4_set(a)};
-}
-static inline d8 d8_load(const double *p) {
-    return (d8){d4_load(p), d4_load(p + 4)};
-}
-static inline d8 d8_load_floats(const float *p) {
-    return (d8){d4_load_floats(p), d4_load_floats(p + 4)};
-}
-static inline void d8_store(double *p, d8 a) {
-    d4_store(p, a.low), d4_store(p + 4, a.high);
-}
-static inline void d8_store_floats(float *p, d8 a) {
-    d4_store_floats(p, a.low), d4_store_floats(p + 4, a.high);
-}
-static inline d8 d8_add(d8 a, d8 b) {
-    return (d8){d4_add(a.low, b.low), d4_add(a.high, b.high)};
-}
-static inline d8 d8_sub(d8 a, d8 b) {
-    return (d8){d4_sub(a.low, b.low), d4_sub(a.high, b.high)};
-}
-static inline d8 d8_mul(d8 a, d8 b) {
-    return (d8){d4_mul(a.low, b.low), d4_mul(a.high, b.high)};
-}
-static inline d8 d8_div(d8 a, d8 b) {
-    return (d8){d4_div(a.low, b.low), d4_div(a.high, b.high)};
-}
-static inline d8 d8_sqrt(d8 a) {
-    return (d8){d4_sqrt(a.low), d4_sqrt(a.high)};
-}
-static inline d8 d8_abs(d8 a) {
-    return (d8){d4_abs(a.low), d4_abs(a.high)};
-}
-static inline d8 d8_min(d8 a, d8 b) {
-    return (d8){d4_min(a.low, b.low), d4_min(a.high, b.high)};
-}
-static inline d8 d8_max(d8 a, d8 b) {
-    return (d8){d4_max(a.low, b.low), d4_max(a.high, b.high)};
-}
-static inline d8 d8_if_lt(d8 a, d8 b, d8 x, d8 y) {
-    return (d8){d4_if_lt(a.low, b.low, x.low, y.low), d4_if_lt(a.high, b.high, x.high, y.high)};
-}
-/* Bit i: a_i < b_i. */
-static inline uint32_t d8_lt(d8 a, d8 b) {
-    return d4_lt(a.low, b.low) | d4_lt(a.high, b.high) << 4;
+/* Stores the lanes whose bit is set, one after the other; all eight places may be written. */
+static inline void i8_store_some(uint32_t *p, i8 a, uint32_t mask) {
+    i8_store(p, i8_lookup8(a, i8_chosen(mask)));
 }
 
 #endif

@@ -2,7 +2,7 @@
  * loses. */
 #include "cluster/cone.h"
 
-#include "base/simd.h"
+#include "base/simd_d8.h"
 
 void fct_unit_normal(const float *positions, const uint32_t triangle[3], float normal[3]) {
     v3 p[3];

@@ -81,16 +81,14 @@ typedef struct edge_queue {
 /* What walks read, in variables of their own: every store of eight numbers might change it where it lies. */
 typedef struct generation_view {
     const uint32_t *starts, *lengths, *others, *keys;
-    const uint8_t (*packing)[8];
 } generation_view;
 
 static inline generation_view view(const fct_rounds *r) {
-    return (generation_view){r->now.starts, r->now.lengths, r->now.others, r->now.keys, r->packing};
+    return (generation_view){r->now.starts, r->now.lengths, r->now.others, r->now.keys};
 }
 
-static inline void enqueue(edge_queue *queue, const uint8_t packing[][8], uint32_t i, uint32_t first,
-                           i8 others, uint32_t mask) {
-    i8 order = i8_load_bytes(packing[mask]);
+static inline void enqueue(edge_queue *queue, uint32_t i, uint32_t first, i8 others, uint32_t mask) {
+    i8 order = i8_chosen(mask);
     i8_store(queue->clusters + queue->count, i8_set(i));
     i8_store(queue->others + queue->count, i8_lookup8(others, order));
     i8_store(queue->entries + queue->count, i8_add(i8_set(first), order));
@@ -180,10 +178,10 @@ static void price_range(const fct_rounds *r, uint32_t begin, uint32_t end) {
                 i8 keys = i8_load(now.keys + start + k);
                 unpriced &= i8_eq(keys, i8_set(FCT_KEY_OPEN));
                 higher &= ~unpriced & i8_no_more(keys, i8_set(FCT_KEY_BLOCKED - 1));
-                enqueue(&known, now.packing, i, start + k, others, higher);
+                enqueue(&known, i, start + k, others, higher);
                 if (known.count >= QUEUE) offer_queued(r, &known);
             }
-            enqueue(&open, now.packing, i, start + k, others, unpriced);
+            enqueue(&open, i, start + k, others, unpriced);
             if (open.count >= QUEUE) price_queued(r, &open, false);
         }
     }
@@ -261,7 +259,7 @@ static void offer_rest(void *user, size_t begin, size_t end, size_t chunk, uint3
             i8 others = i8_load(now.others + start + k);
             uint32_t mask =
                 higher_ends(i, others, length - k) & i8_no_more(i8_load(now.keys + start + k), limit);
-            enqueue(&queue, now.packing, i, start + k, others, mask);
+            enqueue(&queue, i, start + k, others, mask);
             if (queue.count >= QUEUE) offer_left_over(r, &queue);
         }
     }
@@ -524,9 +522,6 @@ static bool allocate_rounds(fct_rounds *r, size_t live) {
     r->kept = fct_allocate(env, chunks + 1, sizeof *r->kept);
     r->merged = fct_allocate(env, chunks, sizeof *r->merged);
     r->room = fct_allocate(env, chunks, sizeof *r->room);
-    for (uint32_t held = 0; held < 256; ++held)
-        for (uint32_t lane = 0, to = 0; lane < 8; ++lane)
-            if (held >> lane & 1) r->packing[held][to++] = (uint8_t)lane;
     return r->least[0] && r->least[1] && r->mates && r->renumbered && r->kept && r->merged && r->room;
 }
 

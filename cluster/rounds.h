@@ -50,7 +50,6 @@ typedef struct fct_rounds {
     uint32_t *renumbered; /* in the place of limits: this round's number to the next's, | MERGED */
     uint64_t *parents;    /* in the place of least[1]: per cluster of the next round, mate << 32 | cluster */
     uint32_t *kept, *merged, *room; /* per chunk: counts, then places; kept has one more */
-    uint8_t packing[256][8];        /* by which lanes hold something: these lanes first */
     fct_list_scratch *scratch;      /* one a thread */
 } fct_rounds;
 

@@ -168,9 +168,9 @@ static inline void fold_into(lanes *a, lanes *b) {
 }
 
 /* Moves lanes that hold something to the front; returns how many. */
-static inline uint32_t pack(const fct_rounds *r, lanes *l) {
+static inline uint32_t pack(lanes *l) {
     uint32_t held = ~i8_eq(l->others, i8_set(FCT_NONE)) & 0xFF, count = (uint32_t)__builtin_popcount(held);
-    i8 order = i8_load_bytes(r->packing[held]), filled = i8_less(numbers(0), i8_set(count));
+    i8 order = i8_chosen(held), filled = i8_less(numbers(0), i8_set(count));
     l->others = i8_if(filled, i8_lookup8(l->others, order), i8_set(FCT_NONE));
     l->keys = i8_lookup8(l->keys, order);
     l->shared = f8_lookup8(l->shared, order);
@@ -186,7 +186,7 @@ static inline void store(const fct_rounds *r, const lanes *l, uint32_t place) {
 static inline uint32_t keep_lanes(const fct_rounds *r, uint32_t i, uint32_t next, uint32_t place) {
     lanes l = load_list(r, i, next);
     fold(&l);
-    uint32_t count = pack(r, &l);
+    uint32_t count = pack(&l);
     store(r, &l, place);
     return count;
 }
@@ -195,20 +195,20 @@ static inline uint32_t join_lanes(const fct_rounds *r, uint32_t i, uint32_t mate
                                   uint32_t place) {
     lanes a = load_list(r, i, next), b = load_list(r, mate, next);
     a.keys = b.keys = i8_set(FCT_KEY_OPEN);
-    uint32_t count = pack(r, &a), all = count + pack(r, &b);
+    uint32_t count = pack(&a), all = count + pack(&b);
     if (all <= 8) {
         i8 lane = numbers(0), back = i8_add(lane, i8_set(8 - count)), first = i8_less(lane, i8_set(count));
         a.others = i8_if(first, a.others, i8_lookup8(b.others, back));
         a.shared = f8_if(first, a.shared, f8_lookup8(b.shared, back));
         fold(&a);
-        count = pack(r, &a);
+        count = pack(&a);
         store(r, &a, place);
         return count;
     }
     fold(&a), fold(&b), fold_into(&a, &b);
-    count = pack(r, &a);
+    count = pack(&a);
     store(r, &a, place);
-    uint32_t more = pack(r, &b);
+    uint32_t more = pack(&b);
     store(r, &b, place + count);
     return count + more;
 }
