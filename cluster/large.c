@@ -44,9 +44,10 @@ static uint64_t least_bytes(uint64_t faces, uint64_t vertices, bool mean) {
 
 fct_build_need fct_tree_build_need(uint32_t face_count, uint32_t vertex_count, const fct_tree_def *def) {
     bool mean = def && def->cost == FCT_COST_MEAN;
-    uint64_t face = 200 + (mean ? MEAN_BYTES : 0);
-    return (fct_build_need){.in_memory =
-                                face * face_count + 12 * (uint64_t)face_count + 24 * (uint64_t)vertex_count,
+    uint64_t faces = face_count, vertices = vertex_count, direction = mean ? MEAN_BYTES : 0;
+    uint64_t contracting = (212 + direction) * faces + 24 * vertices,
+             describing = 184 * faces + 40 * vertices;
+    return (fct_build_need){.in_memory = contracting > describing ? contracting : describing,
                             .in_parts = least_bytes(face_count, vertex_count, mean)};
 }
 

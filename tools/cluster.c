@@ -124,7 +124,7 @@ static bool fits(const tool *t, const fct_tree_def *def, uint32_t faces, uint32_
     return fct_tree_build_need(faces, vertices, def).in_memory <= memory_left(t);
 }
 
-/* All of it in memory. A mesh that turns out not to fit is given up, with *large set. */
+/* All of it in memory. Where that turns out not to fit it is given up, with *large set. */
 static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input, const char *output,
                              bool *large, fct_large_stats *s) {
     fct_mesh mesh = {0};
@@ -140,6 +140,12 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     t->unit = "faces";
     double read = tool_seconds();
     code = tool_result(t, fct_tree_build(&t->env, &mesh, def, &stats, &tree));
+    *large = code == TOOL_MEMORY && t->max_memory && strcmp(input, "-") != 0;
+    if (*large) { /* it took more than the estimate */
+        t->error[0] = 0, t->memory_refused = false;
+        code = TOOL_DONE;
+        goto done;
+    }
     if (tool_context(t, code, input) != TOOL_DONE) goto done;
     double built = tool_seconds();
     code = tool_result(t, fct_tree_save(&t->env, tree, output));
