@@ -41,13 +41,14 @@ typedef struct fct_cluster {
 /* The oriented box, whose extents hold every vertex for exactly these axes. */
 FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
 
-/* GREEDY: always the cheapest edge (8.2). ROUNDS: all mutually cheapest pairs at once; the default. */
+/* GREEDY: always the cheapest edge (8.2). ROUNDS: all mutually cheapest pairs at once, and of those left over
+ * pairs that are nearly so; the default. */
 typedef enum fct_cluster_method { FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS } fct_cluster_method;
 /* MEAN: E = a1 E_fit + a2 E_dir + a3 E_shape of the union (8.18). INCREMENT, the default: the growth of the
- * total error, a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 (w E_shape + 5e7 wa wb w |xb - xa|^2),
- * where w is area and x the centroid; the last term rounds off clusters that are too large to be flat.
- * E_shape is (8.17) as printed. All on the model scaled to a bounding-box diagonal of 1; default weights 1e4,
- * 1, .006 (INCREMENT) and 1e6, 1, 1 (MEAN: weight 1 on a model of diagonal 1000). */
+ * total error, a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 (w E_shape + 5e9 wa wb w |xb - xa|^2 (1 -
+ * |S| / w)), where w is area and x the centroid; the last term rounds off clusters that are too large to be
+ * flat. E_shape is (8.17) as printed. All on the model scaled to a bounding-box diagonal of 1; default
+ * weights 1e4, 1, .006 (INCREMENT) and 1e6, 1, 1 (MEAN: weight 1 on a model of diagonal 1000). */
 typedef enum fct_cluster_cost { FCT_COST_INCREMENT, FCT_COST_MEAN } fct_cluster_cost;
 /* POINTS: each face adds its three corners (8.3). AREA: the surface integral over the triangles. */
 typedef enum fct_fit_measure { FCT_FIT_AREA, FCT_FIT_POINTS } fct_fit_measure;
