@@ -46,6 +46,16 @@ typedef union lanes {
 _Static_assert(sizeof(fct_record) == 16 * sizeof(float) && sizeof(lanes) == 16 * sizeof(f8),
                "field for field");
 
+/* A record is half in one row, half in another, before the rows are turned. */
+static inline void load_record(const fct_record *record, uint32_t row, lanes *to) {
+    memcpy(&to->rows[row], record, sizeof *to->rows);
+    memcpy(&to->rows[row + 8], (const char *)record + sizeof *to->rows, sizeof *to->rows);
+}
+static inline void store_record(const lanes *from, uint32_t row, fct_record *record) {
+    memcpy(record, &from->rows[row], sizeof *from->rows);
+    memcpy((char *)record + sizeof *from->rows, &from->rows[row + 8], sizeof *from->rows);
+}
+
 static inline f8 f8_mad(f8 a, f8 b, f8 c) {
     return f8_add(a, f8_mul(b, c));
 }
@@ -121,8 +131,7 @@ void fct_metric_faces(const fct_metric *metric, const float *positions, const ui
     f8_transpose(out.rows);
     f8_transpose(out.rows + 8);
     for (uint32_t i = 0; i < count; ++i) {
-        f8_store(records[i].covariance, out.rows[i]);
-        f8_store(records[i].covariance + 8, out.rows[i + 8]);
+        store_record(&out, i, &records[i]);
     }
 }
 
@@ -150,9 +159,7 @@ static inline const fct_pair *fill_up(const fct_pair *pairs, uint32_t count, pai
 
 static inline void load_lanes(const fct_record *records, const fct_pair *pairs, bool second, lanes *out) {
     for (uint32_t i = 0; i < FCT_LANES; ++i) {
-        const float *record = records[second ? pairs[i].b : pairs[i].a].covariance;
-        out->rows[i] = f8_load(record);
-        out->rows[i + 8] = f8_load(record + 8);
+        load_record(&records[second ? pairs[i].b : pairs[i].a], i, out);
     }
     f8_transpose(out->rows);
     f8_transpose(out->rows + 8);
@@ -342,9 +349,7 @@ void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direct
     f8_transpose(u.rows);
     f8_transpose(u.rows + 8);
     for (uint32_t i = 0; i < count; ++i) {
-        float *record = records[pairs[i].a].covariance;
-        f8_store(record, u.rows[i]);
-        f8_store(record + 8, u.rows[i + 8]);
+        store_record(&u, i, &records[pairs[i].a]);
         if (!directions) continue;
         fct_direction *da = &directions[pairs[i].a];
         const fct_direction *db = &directions[pairs[i].b];
