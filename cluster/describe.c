@@ -25,7 +25,8 @@ typedef struct block_scratch {
     fct_node_link links[FCT_BLOCK];
     const fct_sums *parts[FCT_BLOCK][2];
     fct_sums leaves[FCT_BLOCK + 4], nodes[FCT_BLOCK];
-    float points[CORNERS][4], normals[FCT_BLOCK + 4][4];
+    float points[4 * CORNERS]; /* x, y, z, 0 */
+    float normals[FCT_BLOCK + 4][4];
     uint32_t at[CORNERS + 8];       /* by corner: where its point begins */
     uint32_t before[CORNERS + 8];   /* by corner: 1 + the last corner before it at the same vertex, or 0 */
     uint32_t last[CORNERS];         /* by vertex: 1 + its last corner so far */
@@ -150,7 +151,7 @@ static void load_points(const describer *d, size_t first, size_t faces, block_sc
     uint32_t fresh = fct_vertices_before(d->tree, &d->outline, first + faces) - introduced, count = fresh;
     memset(s->slots, 0xFF, sizeof s->slots);
     memset(s->last, 0, 3 * faces * sizeof *s->last);
-    for (uint32_t v = 0; v < fresh; ++v) load_point(view, introduced + v, s->points[v]);
+    for (uint32_t v = 0; v < fresh; ++v) load_point(view, introduced + v, s->points + 4 * v);
     for (uint32_t c = 0; c < 3 * faces; ++c) {
         uint32_t vertex = corners[c] - introduced; /* wraps around for an old one */
         if (vertex >= fresh) vertex = number_old(corners[c], &count, s);
@@ -158,7 +159,7 @@ static void load_points(const describer *d, size_t first, size_t faces, block_sc
         s->before[c] = s->last[vertex];
         s->last[vertex] = c + 1;
     }
-    for (uint32_t v = fresh; v < count; ++v) load_point(view, s->old[v], s->points[v]);
+    for (uint32_t v = fresh; v < count; ++v) load_point(view, s->old[v], s->points + 4 * v);
 }
 
 /* Sums and normals of the block's faces. */
@@ -167,7 +168,7 @@ static void load_faces(size_t faces, block_scratch *s) {
         const float *corners[3][4];
         for (size_t l = 0; l < 4; ++l)
             for (size_t k = 0; k < 3; ++k)
-                corners[k][l] = s->points[0] + s->at[3 * (i + l < faces ? i + l : i) + k];
+                corners[k][l] = s->points + s->at[3 * (i + l < faces ? i + l : i) + k];
         fct_sums_four((const float *const(*)[4])corners, s->leaves + i, s->normals + i);
     }
 }
@@ -219,7 +220,7 @@ static uint32_t load_rows(block_scratch *s, const uint32_t counts[8]) {
     for (uint32_t j = 0; j < longest; ++j) {
         const float *points[8];
         f8 p[3];
-        for (uint32_t i = 0; i < 8; ++i) points[i] = s->points[0] + s->lists[i][j];
+        for (uint32_t i = 0; i < 8; ++i) points[i] = s->points + s->lists[i][j];
         f8_load_columns(points, p);
         f8_store(s->rows[j].x, p[0]), f8_store(s->rows[j].y, p[1]), f8_store(s->rows[j].z, p[2]);
     }
