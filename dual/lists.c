@@ -193,11 +193,16 @@ static void match_sides(void *user, size_t begin, size_t end, size_t chunk, uint
     (void)thread;
     const builder *b = user;
     tally t = {0};
+    const uint64_t *last = b->sides + bucket_begin(b, end);
     for (size_t v = begin; v < end; ++v) {
         uint64_t *bucket = b->sides + bucket_begin(b, v);
         size_t count = bucket_begin(b, v + 1) - bucket_begin(b, v);
-        bool done = count <= FEW / 2 ? match_few(b, bucket, (uint32_t)count, true, &t)
-                    : count <= FEW   ? match_few(b, bucket, (uint32_t)count, false, &t)
+        uint64_t copy[FEW + 1] = {0};
+        const uint64_t *few = bucket;
+        /* what is read behind the bucket must not be another chunk's, which may be sorting it */
+        if (count <= FEW && last - bucket <= FEW) few = memcpy(copy, bucket, count * sizeof *copy);
+        bool done = count <= FEW / 2 ? match_few(b, few, (uint32_t)count, true, &t)
+                    : count <= FEW   ? match_few(b, few, (uint32_t)count, false, &t)
                                      : false;
         if (!done) match_many(b, bucket, count, &t);
     }
