@@ -166,9 +166,6 @@ static inline uint32_t f8_le(f8 a, f8 b) {
 static inline uint32_t f8_lt(f8 a, f8 b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LT_OQ));
 }
-static inline uint32_t f8_eq(f8 a, f8 b) {
-    return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_EQ_OQ));
-}
 static inline i8 i8_set(uint32_t a) {
     return _mm256_set1_epi32((int)a);
 }
@@ -450,9 +447,6 @@ static inline uint32_t f8_le(f8 a, f8 b) {
 }
 static inline uint32_t f8_lt(f8 a, f8 b) {
     FCT_M8(a.v[i] < b.v[i]);
-}
-static inline uint32_t f8_eq(f8 a, f8 b) {
-    FCT_M8(a.v[i] == b.v[i]);
 }
 static inline i8 i8_set(uint32_t a) {
     i8 r;

@@ -12,30 +12,6 @@ void fct_unit_normal(const float *positions, const uint32_t triangle[3], float n
     v3_store(normal, length > 0 ? v3_scale(n, 1 / length) : (v3){NAN, NAN, NAN});
 }
 
-static inline f8 chord2(fct_points n, size_t i, const f8 axis[3]) {
-    f8 x = f8_sub(f8_load(n.x + i), axis[0]), y = f8_sub(f8_load(n.y + i), axis[1]),
-       z = f8_sub(f8_load(n.z + i), axis[2]);
-    return f8_add(f8_add(f8_mul(x, x), f8_mul(y, y)), f8_mul(z, z));
-}
-
-float fct_cone_widen(float widest, fct_points n, size_t begin, size_t end, const float axis[3]) {
-    size_t i = begin;
-    if (end - begin >= 8) {
-        f8 a[3] = {f8_set(axis[0]), f8_set(axis[1]), f8_set(axis[2])}, most = f8_set(widest);
-        for (; i + 8 <= end; i += 8) most = f8_max(chord2(n, i, a), most); /* NaN is passed over */
-        if (i < end) most = f8_max(chord2(n, end - 8, a), most);
-        float lanes[8];
-        f8_store(lanes, most);
-        for (int k = 0; k < 8; ++k) widest = lanes[k] > widest ? lanes[k] : widest;
-        return widest;
-    }
-    for (; i < end; ++i) {
-        float x = n.x[i] - axis[0], y = n.y[i] - axis[1], z = n.z[i] - axis[2], d = x * x + y * y + z * z;
-        widest = d > widest ? d : widest;
-    }
-    return widest;
-}
-
 /* asin(x) for x in [0, 1] within 4e-10, less than a float shows: a polynomial up to 1/2, half the angle
  * beyond. */
 static inline d8 arc_sine(d8 x) {

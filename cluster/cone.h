@@ -7,10 +7,7 @@
 /* A triangle's unit normal in floats; NaN where it has no area. */
 void fct_unit_normal(const float *positions, const uint32_t triangle[3], float normal[3]);
 
-/* The larger of `widest` and the squared chords between a unit axis and unit normals [begin, end). */
-float fct_cone_widen(float widest, fct_points normals, size_t begin, size_t end, const float axis[3]);
-
-/* The angle of a squared chord, enlarged by what floats may have lost, at most pi. */
+/* The angle of a squared chord, enlarged by what floats may have lost, at most pi; of one, of eight. */
 float fct_cone_angle(float widest);
 void fct_cone_angles(const float widest[8], float angles[8]);
 

@@ -58,14 +58,6 @@ fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, ui
     return FCT_OK;
 }
 
-fct_result fct_tree_measure_depth(fct_tree *tree) {
-    uint32_t depth;
-    double mean;
-    fct_result result = fct_tree_find_depth(tree->env, &tree->view, &depth, &mean);
-    tree->view.depth = depth, tree->view.mean_depth = mean;
-    return result;
-}
-
 void fct_tree_measure_bounds(fct_tree *tree) {
     fct_tree_view *view = &tree->view;
     fct_bounds b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};

@@ -63,9 +63,7 @@ static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *o
 /* The attributes of the leaf at a place, but for cost and links. */
 void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out);
 
-/* Depths from the children links; view->depth and view->mean_depth. Errors: MEMORY. */
-fct_result fct_tree_measure_depth(fct_tree *tree);
-/* The same of any view, without writing to it. */
+/* Largest and mean depth of the leaves, from the children links. Errors: MEMORY. */
 fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean);
 /* view->bounds from the positions. */
 void fct_tree_measure_bounds(fct_tree *tree);

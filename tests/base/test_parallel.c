@@ -228,7 +228,7 @@ static int meet_in_child(void) {
 static void a_child_gets_helpers_of_its_own(void **state) {
     (void)state;
 #ifdef __SANITIZE_THREAD__
-    skip(); /* which allows no threads there */
+    skip(); /* which allows a child no threads */
 #endif
     assert_int_equal(hold_meeting(4, 0), 0);
     assert_int_equal(in_child(meet_in_child), 0);
@@ -283,7 +283,7 @@ static int call_with_helper_starved(void) {
 static void nobody_waits_for_who_is_not_let_run(void **state) {
     (void)state;
 #ifdef __SANITIZE_THREAD__
-    skip();
+    skip(); /* as above */
 #endif
     assert_int_equal(in_child(call_with_helper_starved), 0);
 }
