@@ -1,7 +1,7 @@
 /* bvh/bvh.c: creation, and the public ray queries over either backend. */
 #include "bvh/bvh.h"
 #include "base/parallel.h"
-#include "bvh/ray.h"
+#include "bvh/ray/ray.h"
 
 #include <float.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 #define FCT_BVH_BVH_H
 
 #include "base/env.h"
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/bvh.h"
 
 /* Boxes are widened by more than float rounding can do, so that no triangle the triangle test would accept is

@@ -13,10 +13,10 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "base/math/simd.h"
+#include "base/math/vec.h"
 #include "base/parallel.h"
-#include "base/simd.h"
 #include "base/sort.h"
-#include "base/vec.h"
 
 enum { GRAIN = 1 << 13, SEVERAL = 0x80000000u };
 enum { FEW = 16 }; /* sides in a bucket that is matched without sorting */

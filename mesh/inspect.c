@@ -9,9 +9,9 @@
 #include <math.h>
 
 #include "base/env.h"
+#include "base/math/vec.h"
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "base/vec.h"
 #include "facetree/mesh.h"
 
 static uint32_t find(uint32_t *parent, uint32_t i) {

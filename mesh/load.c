@@ -2,7 +2,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/file.h"
+#include "base/io/file.h"
 #include "mesh/parse.h"
 
 typedef struct format {

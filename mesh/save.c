@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/file.h"
+#include "base/io/file.h"
 #include "mesh/soup.h"
 #include "mesh/write.h"
 

@@ -7,7 +7,7 @@
 #ifndef FCT_MESH_STREAM_H
 #define FCT_MESH_STREAM_H
 
-#include "base/spool.h"
+#include "base/io/spool.h"
 #include "facetree/mesh.h"
 
 typedef struct fct_stream fct_stream;

@@ -7,7 +7,7 @@
  */
 #include "mesh/triangulate.h"
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 
 /* Twice the signed area of the triangle a b c. */
 static double turn(const double a[2], const double b[2], const double c[2]) {

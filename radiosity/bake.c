@@ -2,8 +2,8 @@
 #include <string.h>
 
 #include "facetree/radiosity.h"
-#include "radiosity/output.h"
-#include "radiosity/reference.h"
+#include "radiosity/output/output.h"
+#include "radiosity/rivals/reference.h"
 
 #define DEFAULT_ERROR 2e-5
 /* Diagonals of bounds whose parts have areas that floats can tell. */

@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 
 #define FCT_PI 3.14159265358979323846
 

@@ -2,7 +2,7 @@
 #ifndef FCT_SCENE_TRANSFORM_H
 #define FCT_SCENE_TRANSFORM_H
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/scene.h"
 
 extern const float fct_transform_identity[12];

@@ -6,8 +6,8 @@
  * around the smaller end) at a hub, a point of more than SIMPLIFY_HUB faces, and O(both rings) elsewhere.
  */
 #include "base/parallel.h"
-#include "simplify/loss.h"
-#include "simplify/placement.h"
+#include "simplify/cost/loss.h"
+#include "simplify/cost/placement.h"
 
 /* Cosine of the largest angle by which a face may turn in one contraction. */
 #define MIN_TURN_COSINE .1

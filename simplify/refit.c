@@ -8,8 +8,8 @@
  * valence) a pass; the search is parallel, the sums run in the order of the samples.
  */
 #include "base/parallel.h"
-#include "simplify/nearest.h"
-#include "simplify/quadric.h"
+#include "simplify/cost/nearest.h"
+#include "simplify/cost/quadric.h"
 
 #define STEP    .5
 #define DAMPING .1

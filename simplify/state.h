@@ -14,7 +14,7 @@
 #define FCT_SIMPLIFY_STATE_H
 
 #include "base/env.h"
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/simplify.h"
 #include "simplify/queue.h"
 

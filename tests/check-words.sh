@@ -3,7 +3,7 @@
 # usage: check-words.sh [ROOT]
 cd "${1:-$(dirname "$0")/..}" || exit 2
 bad=0
-sources() { find base mesh dual cluster bvh scene radiosity simplify "$@" -name '*.c' -o -name '*.h' -o -name '*.cpp' 2>/dev/null | sort; }
+sources() { find base mesh dual cluster partition bvh scene radiosity simplify "$@" -name '*.c' -o -name '*.h' -o -name '*.cpp' 2>/dev/null | sort; }
 # forbid WHY PATTERN FILE...
 forbid() {
     why=$1 pattern=$2
@@ -14,7 +14,7 @@ forbid() {
         bad=1
     fi
 }
-everything=$(find base mesh dual cluster bvh scene radiosity simplify tools include tests bench examples docs cmake \
+everything=$(find base mesh dual cluster partition bvh scene radiosity simplify tools include tests bench examples docs cmake \
     CMakeLists.txt CMakePresets.json README.md CHANGELOG.md run test .ci -type f 2>/dev/null |
     grep -vE '^tests/check-words\.sh$|^tests/fuzz/seeds/|\.(png|svg|glb|ply|fct)$' | sort)
 library=$(sources)

@@ -1,7 +1,7 @@
 /* tools/bake.c: facetree bake: a scene's radiosity to vertex colours, in one file or one file an object, and
  * to probes. */
 #define _GNU_SOURCE
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <limits.h>
 #include <math.h>

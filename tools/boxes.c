@@ -1,5 +1,5 @@
 /* tools/boxes.c: facetree boxes: the oriented boxes of clusters, as JSON or as a mesh of boxes. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* tools/closest.c: facetree closest: the surface point nearest to each point of a text file. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* tools/cluster.c: facetree cluster: mesh files to hierarchy files. Several files are shared out to one
  * process a core, so that small and large ones keep all cores busy. */
 #define _GNU_SOURCE
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* tools/compare.c: facetree compare: the distance between two surfaces, and between their colours. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 enum { KEY_SAMPLES = TOOL_KEY };
 

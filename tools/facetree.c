@@ -1,5 +1,5 @@
 /* tools/facetree.c: the program: finds the subcommand and hands over. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <stdlib.h>
 #include <string.h>

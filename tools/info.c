@@ -1,5 +1,5 @@
 /* tools/info.c: facetree info: what a mesh, a hierarchy file or a scene holds. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <inttypes.h>
 #include <limits.h>

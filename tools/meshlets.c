@@ -1,7 +1,7 @@
 /* tools/meshlets.c: facetree meshlets: meshlets with their bounds, as JSON, as arrays for the GPU, or as a
  * mesh of many colours. */
 #define _DEFAULT_SOURCE
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <endian.h>
 #include <math.h>

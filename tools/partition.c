@@ -1,6 +1,6 @@
 /* tools/partition.c: facetree partition: clusters, flat pieces or charts, as labels or as a mesh of many
  * colours; which of them are neighbours. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <math.h>
 #include <stdlib.h>

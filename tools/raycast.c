@@ -1,6 +1,6 @@
 /* tools/raycast.c: facetree raycast: rays from a text file to hits, and the check of one backend against the
  * other. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* tools/simplify.c: facetree simplify: fewer triangles, same shape and colours. */
-#include "tools/tool.h"
+#include "tools/kit/tool.h"
 
 #include <math.h>
 #include <stdlib.h>

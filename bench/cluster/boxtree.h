@@ -7,7 +7,7 @@
 #ifndef FCT_BENCH_CLUSTER_BOXTREE_H
 #define FCT_BENCH_CLUSTER_BOXTREE_H
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/cluster.h"
 
 typedef struct box_tree {

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "bench/cluster/bench.h"
 #include "facetree/dual.h"
 

@@ -2,7 +2,7 @@
  * and tiny matrices. */
 #include "support.h"
 
-#include "base/eigen.h"
+#include "base/math/eigen.h"
 
 static double next(uint64_t *state) {
     *state = *state * 6364136223846793005u + 1442695040888963407u;

@@ -1,7 +1,7 @@
 /* Every operation on eight or four numbers does to each lane what it says, in either form of the header. */
 #include "support.h"
 
-#include "base/simd_d8.h"
+#include "base/math/simd_d8.h"
 
 static const float a[8] = {1, -2, 0.5f, 1e30f, -0.0f, 7, 3, -1e-30f};
 static const float b[8] = {2, -3, 0.5f, 1, 4, -7, 3, 1e-30f};

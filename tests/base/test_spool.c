@@ -6,7 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/spool.h"
+#include "base/io/spool.h"
 
 static char folder[] = "/tmp/facetree-spool-XXXXXX";
 

@@ -4,7 +4,7 @@
 
 #include "support.h"
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/bvh.h"
 
 typedef struct model {

@@ -4,7 +4,7 @@
 
 #include "support.h"
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/cluster.h"
 
 static inline void check_node_geometry(const fct_tree_view *view, const fct_cluster *c) {

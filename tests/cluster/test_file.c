@@ -4,8 +4,8 @@
 
 #include <unistd.h>
 
-#include "base/file.h"
-#include "cluster/format.h"
+#include "base/io/file.h"
+#include "cluster/file/format.h"
 
 static const char *const path = "test_file.fct";
 

@@ -2,7 +2,7 @@
 #include "check_tree.h"
 #include "shapes.h"
 
-#include "cluster/locality.h"
+#include "cluster/tree/locality.h"
 
 /* A sphere of 36,480 triangles with colours and materials, faces or vertices or both in any order. */
 static fct_mesh make_shuffled(const fct_env *env, bool faces, bool vertices) {

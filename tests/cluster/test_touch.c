@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 
 static const char *const path = "test_touch.fct";
 enum { PAGE = 4096, LONE = 200, RINGS = SANITIZED ? 150 : 300 };

@@ -4,8 +4,8 @@
 
 #include <float.h>
 
-#include "base/file.h"
-#include "cluster/format.h"
+#include "base/io/file.h"
+#include "cluster/file/format.h"
 
 typedef struct mistake {
     const char *message;

@@ -6,8 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/file.h"
-#include "cluster/file.h"
+#include "base/io/file.h"
+#include "cluster/file/file.h"
 
 static const char *const folder = "test_writer_folder";
 static const char *const path = "test_writer_folder/tree.fct";

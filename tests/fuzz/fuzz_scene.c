@@ -1,7 +1,7 @@
 /* Whatever the text is: an error, or a scene whose parts refer to one another in range and can be shot at. */
 #include "facetree/scene.h"
 #include "fuzz/fuzz.h"
-#include "scene/load.h"
+#include "scene/read/load.h"
 
 #include <math.h>
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "cluster/format.h"
+#include "cluster/file/format.h"
 #include "facetree/bvh.h"
 #include "fuzz/fuzz.h"
 

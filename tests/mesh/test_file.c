@@ -2,7 +2,7 @@
 #define _GNU_SOURCE
 #include <dirent.h>
 
-#include "base/file.h"
+#include "base/io/file.h"
 #include "mesh_support.h"
 
 static const char folder[] = "facetree_test_folder";

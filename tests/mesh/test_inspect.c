@@ -1,5 +1,5 @@
 /* tests/mesh/test_inspect.c: counts against pictures, brute force, and real meshes. */
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "mesh_support.h"
 
 static fct_mesh_report inspect(const fct_env *env, const fct_mesh *mesh) {

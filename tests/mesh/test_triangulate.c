@@ -1,5 +1,5 @@
 /* tests/mesh/test_triangulate.c: triangles of polygons cover them once: areas add up and none turns over. */
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "mesh/triangulate.h"
 #include "mesh_support.h"
 

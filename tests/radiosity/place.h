@@ -2,7 +2,7 @@
 #ifndef FCT_TESTS_RADIOSITY_PLACE_H
 #define FCT_TESTS_RADIOSITY_PLACE_H
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/scene.h"
 #include "radiosity/sample.h"
 #include "support.h"

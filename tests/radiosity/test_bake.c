@@ -1,7 +1,7 @@
 /* The solver against closed forms (docs/radiosity.md lists them) and its own invariants. */
 #include "support.h"
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/radiosity.h"
 
 static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};

@@ -1,7 +1,7 @@
 /* Direct light of lamps: closed forms, brute force over triangles, shadows, and odd places to stand. */
 #include "place.h"
-#include "radiosity/lamp.h"
-#include "radiosity/polygon.h"
+#include "radiosity/light/lamp.h"
+#include "radiosity/light/polygon.h"
 
 typedef struct fixture {
     fct_env env;

@@ -1,6 +1,6 @@
 /* The path tracer against closed forms that need no solver. */
 #include "place.h"
-#include "radiosity/reference.h"
+#include "radiosity/rivals/reference.h"
 
 static fct_env plain; /* outlives every scene */
 

@@ -1,7 +1,7 @@
 /* Output surfaces: no T-junctions, sizes, creases, footholds, refinement. */
 #include "place.h"
-#include "radiosity/split.h"
-#include "radiosity/surface.h"
+#include "radiosity/output/split.h"
+#include "radiosity/output/surface.h"
 
 static fct_env plain; /* outlives every scene */
 

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 #include <png.h>
 
-#include "tools/picture.h"
-#include "tools/raster.h"
+#include "tools/render/picture.h"
+#include "tools/render/raster.h"
 
 enum { WIDTH = 61, HEIGHT = 43, SAMPLES = 16, PIXELS = WIDTH * HEIGHT };
 

@@ -3,7 +3,7 @@
 #include "support.h"
 
 #include "facetree/scene.h"
-#include "scene/load.h"
+#include "scene/read/load.h"
 #include "scene/transform.h"
 
 static char folder[] = "/tmp/facetree-gltf-XXXXXX";

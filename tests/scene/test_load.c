@@ -6,9 +6,9 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "base/file.h"
+#include "base/io/file.h"
 #include "facetree/scene.h"
-#include "scene/load.h"
+#include "scene/read/load.h"
 
 static char folder[] = "/tmp/facetree-scene-XXXXXX";
 

@@ -2,7 +2,7 @@
 #ifndef FCT_TESTS_SIMPLIFY_SHAPES_H
 #define FCT_TESTS_SIMPLIFY_SHAPES_H
 
-#include "base/vec.h"
+#include "base/math/vec.h"
 #include "facetree/simplify.h"
 #include "support.h"
 

@@ -1,0 +1,129 @@
+/* base/io/file.c: see file.h. With output.c the only file that opens files. */
+#define _GNU_SOURCE
+#include "base/io/file.h"
+#include "base/io/output.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const unsigned char empty[1];
+
+static fct_result fail_input(const fct_env *env, const char *path) {
+    return fct_fail(env, FCT_ERROR_INPUT, "%s: cannot be read: %s", path, strerror(errno));
+}
+
+static fct_result read_stream(const fct_env *env, const char *path, int descriptor, fct_file *out) {
+    unsigned char *data = NULL;
+    size_t capacity = 0, size = 0;
+    fct_result result = FCT_OK;
+    for (;;) {
+        result = fct_grow(env, (void **)&data, &capacity, size + 65536, 1);
+        if (result != FCT_OK) goto failed;
+        ssize_t got = read(descriptor, data + size, capacity - size);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) {
+            result = fail_input(env, path);
+            goto failed;
+        }
+        if (got == 0) break;
+        size += (size_t)got;
+    }
+    *out = (fct_file){.data = data, .size = size};
+    return FCT_OK;
+failed:
+    fct_release(env, data);
+    return result;
+}
+
+fct_result fct_file_open(const fct_env *env, const char *path, fct_file *out) {
+    *out = (fct_file){0};
+    if (!strcmp(path, "-")) return read_stream(env, "standard input", STDIN_FILENO, out);
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) return fail_input(env, path);
+    fct_result result = FCT_OK;
+    struct stat status;
+    if (fstat(descriptor, &status)) {
+        result = fail_input(env, path);
+    } else if (!S_ISREG(status.st_mode)) {
+        result = read_stream(env, path, descriptor, out);
+    } else if (status.st_size == 0) {
+        *out = (fct_file){.data = empty, .mapped = true};
+    } else {
+        size_t size = (size_t)status.st_size;
+        void *data = mmap(NULL, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+        if (data == MAP_FAILED)
+            result = fail_input(env, path);
+        else
+            *out = (fct_file){.data = data, .size = size, .mapped = true};
+    }
+    close(descriptor);
+    return result;
+}
+
+void fct_file_close(const fct_env *env, fct_file *file) {
+    if (!file->mapped)
+        fct_release(env, (void *)file->data);
+    else if (file->data != empty)
+        munmap((void *)file->data, file->size);
+    *file = (fct_file){0};
+}
+
+static fct_result fail_output(const fct_env *env, const char *path, int error) {
+    return fct_fail(env, FCT_ERROR_OUTPUT, "%s: cannot be written: %s", path,
+                    error ? strerror(error) : "the stream failed");
+}
+
+/* Flushes `stream` after produce and tells what became of it all. */
+static fct_result finish(const fct_env *env, const char *path, FILE *stream, fct_result result) {
+    if (result != FCT_OK) return result;
+    errno = 0;
+    if (fflush(stream) || ferror(stream)) return fail_output(env, path, errno);
+    return FCT_OK;
+}
+
+static fct_result write_directly(const fct_env *env, const char *path,
+                                 fct_result (*produce)(void *user, FILE *stream), void *user) {
+    FILE *stream = fopen(path, "wbe");
+    if (!stream) return fail_output(env, path, errno);
+    fct_result result = finish(env, path, stream, produce(user, stream));
+    if (fclose(stream) && result == FCT_OK) result = fail_output(env, path, errno);
+    return result;
+}
+
+fct_result fct_file_write_atomic(const fct_env *env, const char *path,
+                                 fct_result (*produce)(void *user, FILE *stream), void *user) {
+    if (!strcmp(path, "-")) return finish(env, "standard output", stdout, produce(user, stdout));
+    struct stat status;
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
+        return write_directly(env, path, produce, user);
+    fct_output output;
+    fct_result result = fct_output_open(env, path, 0, &output);
+    if (result != FCT_OK) return result;
+    int descriptor = dup(output.descriptor);
+    FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "wb");
+    if (!stream) {
+        result = fail_output(env, path, errno);
+        if (descriptor >= 0) close(descriptor);
+        fct_output_abandon(&output);
+        return result;
+    }
+    setvbuf(stream, NULL, _IOFBF, 1 << 18);
+    result = finish(env, path, stream, produce(user, stream));
+    if (fclose(stream) && result == FCT_OK) result = fail_output(env, path, errno);
+    if (result == FCT_OK) return fct_output_finish(&output);
+    fct_output_abandon(&output);
+    return result;
+}
+
+void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use) {
+    if (!file->mapped || file->data == empty || !size) return;
+    static const int advices[] = {MADV_RANDOM, MADV_SEQUENTIAL, MADV_NORMAL};
+    uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), begin = offset / page * page;
+    (void)!madvise((char *)file->data + begin, offset + size - begin, advices[use]);
+}

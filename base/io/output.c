@@ -1,0 +1,170 @@
+/* base/io/output.c: see output.h and, for whole files, file.h. The only file that writes files of the
+ * library.
+ */
+#define _GNU_SOURCE
+#include "base/io/output.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/io/file.h"
+
+/* The disk is set to work whenever so much has been written, instead of at the end. */
+#define PORTION ((uint64_t)64 << 20)
+
+static fct_result fail_output(const fct_env *env, const char *path, int error) {
+    return fct_fail(env, FCT_ERROR_OUTPUT, "%s: cannot be written: %s", path,
+                    error ? strerror(error) : "the stream failed");
+}
+
+/* Creates a new file beside `target` and writes its name into `temporary`. The process id and a count make
+ * the name; O_EXCL makes it ours. */
+static int create_beside(const char *target, char *temporary, size_t size) {
+    for (int i = 0; i < 1000; ++i) {
+        if ((size_t)snprintf(temporary, size, "%s.%ld-%d.tmp", target, (long)getpid(), i) >= size) {
+            errno = ENAMETOOLONG;
+            return -1;
+        }
+        int descriptor = open(temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (descriptor >= 0 || errno != EEXIST) return descriptor;
+    }
+    return -1;
+}
+
+/* A file without a name, for what ends in a pipe or a device. */
+static int create_spool(void) {
+    const char *folder = getenv("TMPDIR");
+    char name[PATH_MAX];
+    if ((size_t)snprintf(name, sizeof name, "%s/facetree.XXXXXX", folder && *folder ? folder : "/tmp") >=
+        sizeof name) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    int descriptor = mkostemp(name, O_CLOEXEC);
+    if (descriptor >= 0) unlink(name);
+    return descriptor;
+}
+
+/* A rename is on the disk only when its folder is. Folders that cannot be synchronised (some network file
+ * systems) are left alone. */
+static void synchronise_folder(const char *target) {
+    char folder[PATH_MAX];
+    snprintf(folder, sizeof folder, "%s", target);
+    char *slash = strrchr(folder, '/');
+    if (!slash)
+        strcpy(folder, ".");
+    else
+        slash[slash == folder] = 0;
+    int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor < 0) return;
+    (void)!fsync(descriptor);
+    close(descriptor);
+}
+
+/* Opens what `path` will be: a file beside it, or a spool. */
+static fct_result create(const fct_env *env, const char *path, fct_output *out) {
+    struct stat status;
+    bool standard = !strcmp(path, "-"), exists = !standard && stat(path, &status) == 0;
+    *out = (fct_output){.env = env, .descriptor = -1};
+    if ((size_t)snprintf(out->path, sizeof out->path, "%s", path) >= sizeof out->path)
+        return fail_output(env, path, ENAMETOOLONG);
+    if (exists && S_ISDIR(status.st_mode)) return fail_output(env, path, EISDIR);
+    if (exists && access(path, W_OK)) return fail_output(env, path, errno);
+    if (standard || (exists && !S_ISREG(status.st_mode))) {
+        out->spooled = true;
+        out->descriptor = create_spool();
+    } else {
+        if (!exists || !realpath(path, out->target)) strcpy(out->target, out->path);
+        out->descriptor = create_beside(out->target, out->temporary, sizeof out->temporary);
+    }
+    if (out->descriptor < 0) return fail_output(env, path, errno);
+    if (exists && !out->spooled) (void)!fchmod(out->descriptor, status.st_mode & 07777);
+    return FCT_OK;
+}
+
+fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, fct_output *out) {
+    fct_result result = create(env, path, out);
+    if (result != FCT_OK) return result;
+    /* Some file systems cannot reserve; they tell of a full disk when it is full. */
+    if (size && fallocate(out->descriptor, 0, 0, (off_t)size) && (errno == ENOSPC || errno == EFBIG))
+        result = fail_output(env, path, errno);
+    else if (ftruncate(out->descriptor, (off_t)size))
+        result = fail_output(env, path, errno);
+    if (result != FCT_OK) fct_output_abandon(out);
+    return result;
+}
+
+fct_result fct_output_write(fct_output *output, uint64_t offset, const void *data, size_t size) {
+    const char *from = data;
+    for (size_t done = 0; done < size;) {
+        ssize_t got = pwrite(output->descriptor, from + done, size - done, (off_t)(offset + done));
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) return fail_output(output->env, output->path, got ? errno : ENOSPC);
+        done += (size_t)got;
+    }
+    output->pending += size;
+    if (output->pending < PORTION) return FCT_OK;
+    output->pending = 0;
+    (void)!sync_file_range(output->descriptor, 0, 0, SYNC_FILE_RANGE_WRITE);
+    return FCT_OK;
+}
+
+fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data, size_t size) {
+    char *to = data;
+    for (size_t done = 0; done < size;) {
+        ssize_t got = pread(output->descriptor, to + done, size - done, (off_t)(offset + done));
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) return fail_output(output->env, output->path, got ? errno : EIO);
+        done += (size_t)got;
+    }
+    return FCT_OK;
+}
+
+/* Copies the spool to a stream, a device or a pipe. */
+static fct_result copy_spool(fct_output *output) {
+    bool standard = !strcmp(output->path, "-");
+    FILE *to = standard ? stdout : fopen(output->path, "wbe");
+    if (!to) return fail_output(output->env, output->path, errno);
+    char block[1 << 16];
+    ssize_t got;
+    fct_result result = FCT_OK;
+    off_t offset = 0;
+    errno = 0;
+    while ((got = pread(output->descriptor, block, sizeof block, offset)) > 0) {
+        if (fwrite(block, 1, (size_t)got, to) != (size_t)got) break;
+        offset += got;
+    }
+    if (got || fflush(to) || ferror(to))
+        result = fail_output(output->env, standard ? "standard output" : output->path, errno);
+    if (!standard && fclose(to) && result == FCT_OK) result = fail_output(output->env, output->path, errno);
+    return result;
+}
+
+static fct_result take_name(const fct_output *output) {
+    if (fsync(output->descriptor) || rename(output->temporary, output->target))
+        return fail_output(output->env, output->path, errno);
+    synchronise_folder(output->target);
+    return FCT_OK;
+}
+
+fct_result fct_output_finish(fct_output *output) {
+    fct_result result = output->spooled ? copy_spool(output) : take_name(output);
+    if (result != FCT_OK) {
+        fct_output_abandon(output);
+        return result;
+    }
+    close(output->descriptor);
+    output->descriptor = -1;
+    return result;
+}
+
+void fct_output_abandon(fct_output *output) {
+    if (output->descriptor < 0) return;
+    close(output->descriptor);
+    if (!output->spooled) unlink(output->temporary);
+    output->descriptor = -1;
+}

@@ -1,0 +1,158 @@
+/* bvh/ray/embree.c: Embree behind the same queries, over the same scaled triangles in the order of places.
+ *
+ * One device for each structure. Robust traversal, as watertight as ours. Embree runs with denormals flushed
+ * to zero, as it asks for; the caller's floating point mode is restored after each call.
+ */
+#include "bvh/ray/ray.h"
+
+#include <embree3/rtcore.h>
+#include <stdio.h>
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+typedef unsigned float_mode;
+static float_mode flush_denormals(void) {
+    float_mode before = _mm_getcsr();
+    _mm_setcsr(before | 0x8040u);
+    return before;
+}
+static void restore_mode(float_mode mode) {
+    _mm_setcsr(mode);
+}
+#else
+typedef int float_mode;
+static float_mode flush_denormals(void) {
+    return 0;
+}
+static void restore_mode(float_mode mode) {
+    (void)mode;
+}
+#endif
+
+struct fct_embree {
+    RTCDevice device;
+    RTCScene scene;
+    float *positions;
+    uint32_t *triangles;
+    size_t own_bytes;      /* of these two */
+    _Atomic int64_t bytes; /* of Embree */
+};
+
+static bool count_memory(void *user, ssize_t bytes, bool post) {
+    (void)post;
+    fct_embree *embree = user;
+    embree->bytes += bytes;
+    return true;
+}
+
+/* `made`: what was asked for is there; without it there is an error, whatever the device says. */
+static fct_result check_device(const fct_env *env, RTCDevice device, bool made) {
+    enum RTCError error = rtcGetDeviceError(device);
+    if (made && error == RTC_ERROR_NONE) return FCT_OK;
+    if (error == RTC_ERROR_OUT_OF_MEMORY) return fct_fail_memory(env, "Embree");
+    return fct_fail(env, FCT_ERROR_INTERNAL, "Embree failed with error %d", (int)error);
+}
+
+/* Scaled copies; a degenerate face becomes a point, which Embree never hits. */
+static fct_result copy_triangles(const fct_bvh *bvh, fct_embree *embree) {
+    const fct_tree_view *view = &bvh->view;
+    /* Embree reads 16 bytes at every vertex. */
+    embree->positions = fct_allocate(bvh->env, 3 * (size_t)view->vertex_count + 4, sizeof(float));
+    embree->triangles = fct_allocate(bvh->env, 3 * (size_t)view->face_count, sizeof(uint32_t));
+    embree->own_bytes = 12 * ((size_t)view->vertex_count + view->face_count);
+    if (!embree->positions || !embree->triangles) return fct_fail_memory(bvh->env, "Embree's triangles");
+    for (uint32_t i = 0; i < view->vertex_count; ++i)
+        fct_bvh_position(bvh, i, embree->positions + 3 * (size_t)i);
+    for (uint32_t f = 0; f < view->face_count; ++f) {
+        bool point = fct_bvh_degenerate(bvh, f);
+        for (size_t c = 0; c < 3; ++c)
+            embree->triangles[3 * (size_t)f + c] = view->triangles[3 * (size_t)f + (point ? 0 : c)];
+    }
+    return FCT_OK;
+}
+
+static fct_result build_scene(const fct_bvh *bvh, fct_embree *embree) {
+    char config[64];
+    snprintf(config, sizeof config, "threads=%u", fct_env_threads(bvh->env));
+    embree->device = rtcNewDevice(config);
+    if (!embree->device) return check_device(bvh->env, NULL, false);
+    rtcSetDeviceMemoryMonitorFunction(embree->device, count_memory, embree);
+    embree->scene = rtcNewScene(embree->device);
+    RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!embree->scene || !geometry) return check_device(bvh->env, embree->device, false);
+    rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, embree->positions, 0,
+                               12, bvh->view.vertex_count);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, embree->triangles, 0, 12,
+                               bvh->view.face_count);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(embree->scene, geometry, 0);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(embree->scene);
+    return check_device(bvh->env, embree->device, true);
+}
+
+fct_result fct_embree_create(fct_bvh *bvh) {
+    fct_embree *embree = fct_allocate_zero(bvh->env, 1, sizeof *embree);
+    if (!embree) return fct_fail_memory(bvh->env, "Embree");
+    bvh->embree = embree;
+    fct_result result = fct_progress(bvh->env, "ray structure", 0);
+    if (result == FCT_OK) result = copy_triangles(bvh, embree);
+    if (result == FCT_OK) {
+        float_mode mode = flush_denormals();
+        result = build_scene(bvh, embree);
+        restore_mode(mode);
+    }
+    return result == FCT_OK ? fct_progress(bvh->env, "ray structure", 1) : result;
+}
+
+void fct_embree_destroy(const fct_env *env, fct_embree *embree) {
+    if (!embree) return;
+    if (embree->scene) rtcReleaseScene(embree->scene);
+    if (embree->device) rtcReleaseDevice(embree->device);
+    fct_release(env, embree->positions);
+    fct_release(env, embree->triangles);
+    fct_release(env, embree);
+}
+
+size_t fct_embree_bytes(const fct_embree *embree) {
+    return embree->own_bytes + (size_t)embree->bytes;
+}
+
+static struct RTCRay embree_ray(const fct_prepared_ray *ray) {
+    return (struct RTCRay){.org_x = ray->origin[0],
+                           .org_y = ray->origin[1],
+                           .org_z = ray->origin[2],
+                           .tnear = ray->t_min,
+                           .dir_x = ray->direction[0],
+                           .dir_y = ray->direction[1],
+                           .dir_z = ray->direction[2],
+                           .tfar = ray->t_max,
+                           .mask = ~0u};
+}
+
+bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRayHit query = {.ray = embree_ray(ray), .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    float_mode mode = flush_denormals();
+    rtcIntersect1(bvh->embree->scene, &context, &query);
+    restore_mode(mode);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    *hit = (fct_raw_hit){.t = query.ray.tfar, .u = query.hit.u, .v = query.hit.v, .place = query.hit.primID};
+    const uint32_t *corner = bvh->embree->triangles + 3 * (size_t)hit->place;
+    v3 p[3];
+    for (int c = 0; c < 3; ++c) p[c] = v3_load(bvh->embree->positions + 3 * (size_t)corner[c]);
+    hit->normal = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+    return true;
+}
+
+bool fct_embree_any(const fct_bvh *bvh, const fct_prepared_ray *ray) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRay query = embree_ray(ray);
+    float_mode mode = flush_denormals();
+    rtcOccluded1(bvh->embree->scene, &context, &query);
+    restore_mode(mode);
+    return query.tfar < 0;
+}

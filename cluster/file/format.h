@@ -1,0 +1,67 @@
+/* cluster/file/format.h: the hierarchy file's header and sections as they lie in the file, version 2; byte by
+ * byte in docs/hierarchy-file.md. Little endian; the structs are the layout. */
+#ifndef FCT_CLUSTER_FORMAT_H
+#define FCT_CLUSTER_FORMAT_H
+
+#include "cluster/file/file.h"
+
+enum {
+    FCT_FORMAT_VERSION = 2,
+    FCT_FORMAT_ORDER_MARK = 0x01020304,
+    FCT_FORMAT_ALIGNMENT = 64,
+    FCT_FORMAT_BLOCK = 1 << 20, /* bytes that are hashed together */
+    FCT_FORMAT_CUT = 2048       /* clusters of the cut, at most */
+};
+
+/* Flags. */
+enum { FCT_FORMAT_COLORS = 1, FCT_FORMAT_MATERIALS = 2, FCT_FORMAT_NAMES = 4 };
+
+typedef struct fct_format_section {
+    uint32_t kind, reserved;
+    uint64_t offset, size, checksum;
+} fct_format_section;
+
+typedef struct fct_format_header {
+    unsigned char magic[8];
+    uint32_t version, order_mark;
+    uint64_t file_size;
+    uint64_t checksum;  /* XXH3-64 of the head with this field zero */
+    uint64_t head_size; /* header, source, names */
+    uint32_t face_count, vertex_count, node_count, root_count, material_count, depth;
+    uint32_t boundary_edges, nonmanifold_edges, component_count, flags;
+    double mean_depth;
+    uint64_t source_hash;
+    uint32_t method, cost, fit_measure, wanted_roots;
+    double fit_weight, direction_weight, shape_weight, max_cost;
+    fct_bounds bounds;
+    uint64_t source_size, names_size;
+    uint32_t cut_count, section_count;
+    fct_format_section sections[FCT_SECTION_COUNT];
+} fct_format_header;
+
+_Static_assert(sizeof(fct_format_header) == 512 && sizeof(fct_cluster) == 132,
+               "the file's layout is these structs'");
+
+extern const unsigned char fct_format_magic[8];
+
+/* "nodes" and so on, for messages. */
+const char *fct_format_section_name(int section);
+
+/* Kinds, offsets and sizes of the sections, the head's size and the file's, from the counts, the flags and
+ * the sizes of source and names. Sums cannot overflow: counts are 32 bits; source and names are at most 2^62.
+ */
+void fct_format_place(fct_format_header *header);
+
+/* Of the whole head, `size` bytes that begin with the header, its checksum taken for zero. */
+uint64_t fct_format_head_checksum(const void *head, size_t size);
+
+static inline size_t fct_format_block_count(uint64_t size) {
+    return (size_t)((size + FCT_FORMAT_BLOCK - 1) / FCT_FORMAT_BLOCK);
+}
+
+/* Hashes of the blocks of `size` bytes that begin at a block's start, in parallel. */
+void fct_format_hash_blocks(const fct_env *env, const void *data, size_t size, uint64_t *hashes);
+/* The checksum of a section from those of its blocks. */
+uint64_t fct_format_fold(const uint64_t *hashes, size_t count);
+
+#endif

@@ -1,0 +1,180 @@
+/* cluster/merge/greedy.c: the dissertation's loop: contract the cheapest dual edge until none is left (8.2).
+ *
+ * In and out: the live edges of an fct_work. Each cluster has a singly linked list of its edges; a merge
+ * walks the two lists once, adds up edges that now lead to the same neighbour, and prices what remains. Edges
+ * whose union would be too tall wait outside the heap until one of their ends changes, which bounds how often
+ * an edge is priced by the height of the tree: O(F log^2 F) at worst, whatever the valence. Ties go to the
+ * smaller union, then to a hash of the edge: by edge number a flat grid would become chains.
+ */
+#include <string.h>
+
+#include "base/heap.h"
+#include "base/parallel.h"
+#include "base/sort.h"
+#include "cluster/merge/work.h"
+
+typedef struct greedy {
+    fct_work *work;
+    fct_edge *edges;
+    float *costs;
+    uint32_t (*next)[2]; /* per edge and end: the next link of that end's list; a link is 2 edge + end */
+    uint32_t *heads;     /* per slot: first link */
+    uint32_t *seen;      /* per slot: the edge of the list being walked that leads there, if it does */
+    fct_heap heap;
+    bool across;
+    uint32_t waiting, batch[FCT_LANES]; /* edges to be priced together */
+} greedy;
+
+static uint64_t edge_key(const greedy *g, uint32_t e) {
+    const fct_edge *edge = &g->edges[e];
+    uint32_t faces = g->work->records[edge->a].count + g->work->records[edge->b].count;
+    uint64_t size = 31 - (uint32_t)__builtin_clz(faces), hash = (uint32_t)(e * 2654435769u) >> 5;
+    uint64_t cost = fct_float_key(g->costs[e]);
+    return g->work->balanced ? (uint64_t)faces << 32 | cost : cost << 32 | size << 27 | hash;
+}
+
+static bool waits(const greedy *g, const fct_edge *edge) {
+    const uint32_t *materials = g->work->materials;
+    if (!g->across && materials && materials[edge->a] != materials[edge->b]) return true;
+    return !fct_work_allowed(g->work, edge->a, edge->b);
+}
+
+static void price_batch(greedy *g) {
+    fct_pair pairs[FCT_LANES];
+    float costs[FCT_LANES];
+    for (uint32_t i = 0; i < g->waiting; ++i) pairs[i] = g->edges[g->batch[i]];
+    if (g->waiting) fct_work_costs(g->work, pairs, g->waiting, costs);
+    for (uint32_t i = 0; i < g->waiting; ++i) {
+        g->costs[g->batch[i]] = costs[i];
+        fct_heap_set(&g->heap, g->batch[i], edge_key(g, g->batch[i]));
+    }
+    g->waiting = 0;
+}
+
+static void price(greedy *g, uint32_t e) {
+    if (waits(g, &g->edges[e])) {
+        fct_heap_remove(&g->heap, e);
+        return;
+    }
+    g->batch[g->waiting++] = e;
+    if (g->waiting == FCT_LANES) price_batch(g);
+}
+
+static void price_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    greedy *g = user;
+    for (size_t e = begin; e < end; e += FCT_LANES) {
+        uint32_t count = end - e < FCT_LANES ? (uint32_t)(end - e) : FCT_LANES;
+        fct_work_costs(g->work, g->edges + e, count, g->costs + e);
+    }
+}
+
+static void link_edges(greedy *g) {
+    memset(g->heads, 0xFF, (size_t)g->work->face_count * sizeof *g->heads);
+    memset(g->seen, 0xFF, (size_t)g->work->face_count * sizeof *g->seen);
+    for (uint32_t e = g->work->edge_count; e-- > 0;) {
+        uint32_t ends[2] = {g->edges[e].a, g->edges[e].b};
+        for (uint32_t i = 0; i < 2; ++i) {
+            g->next[e][i] = g->heads[ends[i]];
+            g->heads[ends[i]] = 2 * e + i;
+        }
+    }
+}
+
+/* Moves what is worth keeping of the list at `link`, the edges of slot `from`, to the end of a's new list:
+ * no dead edges, none between a and b, one for each neighbour. */
+static uint32_t *keep_links(greedy *g, uint32_t link, uint32_t from, uint32_t a, uint32_t b, uint32_t *tail) {
+    while (link != FCT_NONE) {
+        uint32_t e = link / 2, end = link & 1, after = g->next[e][end];
+        fct_edge *edge = &g->edges[e];
+        uint32_t other = end ? edge->a : edge->b;
+        if (edge->a == FCT_NONE) {
+            link = after;
+            continue;
+        }
+        if (other == a || other == b) {
+            fct_heap_remove(&g->heap, e);
+            edge->a = FCT_NONE;
+        } else if (g->seen[other] != FCT_NONE) {
+            g->edges[g->seen[other]].shared += edge->shared;
+            fct_heap_remove(&g->heap, e);
+            edge->a = FCT_NONE;
+        } else {
+            g->seen[other] = e;
+            if (from == b) *(end ? &edge->b : &edge->a) = a;
+            *tail = link;
+            tail = &g->next[e][end];
+        }
+        link = after;
+    }
+    return tail;
+}
+
+static void contract(greedy *g, uint32_t e) {
+    uint32_t a = g->edges[e].a, b = g->edges[e].b;
+    fct_work_merge(g->work, a, b, g->edges[e].shared, g->costs[e]);
+    uint32_t first = g->heads[a], second = g->heads[b], *tail = &g->heads[a];
+    tail = keep_links(g, first, a, a, b, tail);
+    tail = keep_links(g, second, b, a, b, tail);
+    *tail = FCT_NONE;
+    for (uint32_t link = g->heads[a]; link != FCT_NONE; link = g->next[link / 2][link & 1]) {
+        const fct_edge *edge = &g->edges[link / 2];
+        g->seen[link & 1 ? edge->a : edge->b] = FCT_NONE;
+        price(g, link / 2);
+    }
+    price_batch(g);
+}
+
+static fct_result run(greedy *g) {
+    fct_work *work = g->work;
+    fct_parallel_for(work->env, work->edge_count, 1 << 13, price_chunk, g);
+    for (uint32_t e = 0; e < work->edge_count; ++e)
+        if (!waits(g, &g->edges[e])) fct_heap_append(&g->heap, e, edge_key(g, e));
+    fct_heap_order(&g->heap);
+    for (uint32_t step = 0;; ++step) {
+        if (step % 8192 == 0) {
+            fct_result result =
+                fct_progress(work->env, "clusters", work->merge_count / (double)work->face_count);
+            if (result != FCT_OK) return result;
+        }
+        uint32_t e = fct_heap_pop(&g->heap);
+        if (e == FCT_NONE) break;
+        uint32_t a = g->edges[e].a, b = g->edges[e].b;
+        if (work->frozen && (work->frozen[a] || work->frozen[b]))
+            work->frozen[a] = work->frozen[b] = 1; /* the cheapest partner is, so it stays the cheapest */
+        else
+            contract(g, e);
+    }
+    uint32_t kept = 0;
+    for (uint32_t e = 0; e < work->edge_count; ++e)
+        if (g->edges[e].a != FCT_NONE) g->edges[kept++] = g->edges[e];
+    work->edge_count = kept;
+    return FCT_OK;
+}
+
+fct_result fct_work_greedy(fct_work *work, bool across) {
+    const fct_env *env = work->env;
+    fct_result result = fct_work_list_edges(work);
+    if (result != FCT_OK || work->edge_count == 0) return result;
+    if (work->edge_count >= UINT32_MAX / 2) return fct_fail_memory(env, "so many dual edges");
+    greedy g = {.work = work, .edges = work->edges, .across = across};
+    g.costs = fct_allocate(env, work->edge_count, sizeof *g.costs);
+    g.next = fct_allocate(env, work->edge_count, sizeof *g.next);
+    g.heads = fct_allocate(env, work->face_count, sizeof *g.heads);
+    g.seen = fct_allocate(env, work->face_count, sizeof *g.seen);
+    result = fct_heap_create(env, work->edge_count, &g.heap);
+    if (result == FCT_OK) {
+        if (!g.costs || !g.next || !g.heads || !g.seen) {
+            result = fct_fail_memory(env, "clustering");
+        } else {
+            link_edges(&g);
+            result = run(&g);
+        }
+    }
+    fct_heap_release(env, &g.heap);
+    fct_release(env, g.costs);
+    fct_release(env, g.next);
+    fct_release(env, g.heads);
+    fct_release(env, g.seen);
+    return result;
+}

@@ -1,0 +1,232 @@
+/* cluster/merge/rounds_join.c: the lists of the next round: a union's list is those of its parts, renumbered,
+ * doubles added up.
+ *
+ * Most lists have at most eight entries: these are joined in registers, each lane beside every other, for
+ * branches on what they hold could not be foretold. Longer ones are put together in a scratch area, where a
+ * byte for every live number says at which place it was seen last; what stands there tells whether that was
+ * in this list. The longest are sorted.
+ */
+#include <string.h>
+
+#include "base/math/simd.h"
+#include "cluster/merge/rounds.h"
+
+/* A long list in its place. */
+typedef struct list {
+    uint32_t *others, *keys;
+    float *shared;
+} list;
+
+static inline bool before(const list *l, size_t p, size_t q) {
+    return l->others[p] != l->others[q] ? l->others[p] < l->others[q] : l->shared[p] < l->shared[q];
+}
+
+static void swap(const list *l, size_t p, size_t q) {
+    uint32_t other = l->others[p], key = l->keys[p];
+    float shared = l->shared[p];
+    l->others[p] = l->others[q], l->keys[p] = l->keys[q], l->shared[p] = l->shared[q];
+    l->others[q] = other, l->keys[q] = key, l->shared[q] = shared;
+}
+
+static void sift_down(const list *l, size_t at, size_t count) {
+    for (size_t child; (child = 2 * at + 1) < count; at = child) {
+        if (child + 1 < count && before(l, child, child + 1)) ++child;
+        if (!before(l, at, child)) break;
+        swap(l, at, child);
+    }
+}
+
+static void sort_list(const list *l, size_t count) {
+    for (size_t i = count / 2; i-- > 0;) sift_down(l, i, count);
+    for (size_t i = count; i-- > 1;) {
+        swap(l, 0, i);
+        sift_down(l, 0, i);
+    }
+}
+
+/* Adds up neighbouring doubles; a double stands for a merge, so its cost is open. */
+static uint32_t join_sorted(const list *l, uint32_t count) {
+    uint32_t to = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (to > 0 && l->others[to - 1] == l->others[i])
+            l->shared[to - 1] += l->shared[i];
+        else
+            l->others[to] = l->others[i], l->keys[to] = l->keys[i], l->shared[to++] = l->shared[i];
+    }
+    return to;
+}
+
+/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`. */
+static uint32_t renumber_list(const fct_rounds *r, uint32_t i, uint32_t self, const list *l, uint32_t count) {
+    uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
+    for (; from < end; ++from) {
+        uint32_t number = r->renumbered[r->now.others[from]];
+        if ((number & ~FCT_MERGED) == self) continue;
+        l->others[count] = number & ~FCT_MERGED;
+        l->shared[count] = r->now.shared[from];
+        l->keys[count++] = (number | own) & FCT_MERGED ? FCT_KEY_OPEN : r->now.keys[from];
+    }
+    return count;
+}
+
+static uint32_t join_long(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+    list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
+    uint32_t count = renumber_list(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = renumber_list(r, mate, next, &l, count);
+    sort_list(&l, count);
+    return join_sorted(&l, count);
+}
+
+/* Adds the list of live cluster i; returns how many places are taken. Without branches but the loop's, for
+ * which way they go could not be foretold. */
+static inline uint32_t add_list(const fct_rounds *r, uint32_t i, bool merged, fct_list_scratch *s,
+                                uint32_t count) {
+    uint8_t *places = s->places;
+    uint32_t from = r->now.starts[i], end = from + r->now.lengths[i];
+    for (; from < end; ++from) {
+        uint32_t number = r->renumbered[r->now.others[from]], other = number & ~FCT_MERGED;
+        uint32_t seen = places[other];
+        bool known = (seen < count) & (s->others[seen] == other);
+        uint32_t at = known ? seen : count;
+        float sum = s->shared[at];
+        s->others[at] = other;
+        s->shared[at] = (known ? sum : 0) + r->now.shared[from];
+        places[other] = (uint8_t)at;
+        s->keys[at] = merged || number & FCT_MERGED ? FCT_KEY_OPEN : r->now.keys[from];
+        count += !known;
+    }
+    return count;
+}
+
+static uint32_t join_short(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
+                           fct_list_scratch *s) {
+    s->others[0] = next, s->places[next] = 0;
+    uint32_t count = add_list(r, i, mate != FCT_NONE, s, 1);
+    if (mate != FCT_NONE) count = add_list(r, mate, true, s, count);
+    --count;
+    memcpy(r->next.others + place, s->others + 1, count * sizeof *s->others);
+    memcpy(r->next.keys + place, s->keys + 1, count * sizeof *s->keys);
+    memcpy(r->next.shared + place, s->shared + 1, count * sizeof *s->shared);
+    return count;
+}
+
+/* --- Lists of at most eight, in registers --- */
+
+/* Lanes that hold nothing have FCT_NONE. */
+typedef struct lanes {
+    i8 others, keys;
+    f8 shared;
+} lanes;
+
+static inline i8 numbers(uint32_t first) {
+    static const uint32_t all[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+    return i8_load(all + first);
+}
+
+/* The list of live cluster i in the next round's numbers, without what leads to `self`. */
+static inline lanes load_list(const fct_rounds *r, uint32_t i, uint32_t self) {
+    const fct_generation *now = &r->now;
+    uint32_t start = now->starts[i];
+    i8 within = i8_less(numbers(0), i8_set(now->lengths[i])), flag = i8_set(FCT_MERGED);
+    i8 number = i8_gather(r->renumbered, i8_and(i8_load(now->others + start), within));
+    i8 other = i8_without(number, flag), merged = i8_same(i8_and(number, flag), flag);
+    i8 gone = i8_or(i8_same(other, i8_set(self)), i8_same(within, i8_set(0)));
+    return (lanes){i8_or(other, gone), i8_or(i8_load(now->keys + start), merged),
+                   f8_load(now->shared + start)};
+}
+
+/* Lanes of l, turned by `turn`, beside those of `to`: where both hold the same number its border is added. */
+static inline f8 add_equal(const lanes *to, f8 sum, const lanes *l, i8 turn) {
+    i8 equal = i8_same(to->others, i8_lookup8(l->others, turn));
+    return f8_add(sum, f8_only(f8_lookup8(l->shared, turn), equal));
+}
+
+/* The first of several lanes with one number gets the borders of all, the others are emptied. */
+static inline void fold(lanes *l) {
+    f8 sum = l->shared;
+    i8 gone = i8_set(0), eight = i8_set(8);
+    for (uint32_t turn = 1; turn < 8; ++turn) {
+        i8 from = numbers(turn), equal = i8_same(l->others, i8_lookup8(l->others, from));
+        i8 later = i8_less(i8_add(numbers(0), i8_set(turn)), eight);
+        sum = f8_add(sum, f8_only(f8_lookup8(l->shared, from), i8_and(equal, later)));
+        gone = i8_or(gone, i8_without(equal, later));
+    }
+    l->shared = sum;
+    l->others = i8_or(l->others, gone);
+}
+
+/* What both hold goes to a. */
+static inline void fold_into(lanes *a, lanes *b) {
+    f8 sum = a->shared;
+    i8 gone = i8_set(0);
+    for (uint32_t turn = 0; turn < 8; ++turn) {
+        sum = add_equal(a, sum, b, numbers(turn));
+        gone = i8_or(gone, i8_same(b->others, i8_lookup8(a->others, numbers(turn))));
+    }
+    a->shared = sum;
+    b->others = i8_or(b->others, gone);
+}
+
+/* Moves lanes that hold something to the front; returns how many. */
+static inline uint32_t pack(lanes *l) {
+    uint32_t held = ~i8_eq(l->others, i8_set(FCT_NONE)) & 0xFF, count = (uint32_t)__builtin_popcount(held);
+    i8 order = i8_chosen(held), filled = i8_less(numbers(0), i8_set(count));
+    l->others = i8_if(filled, i8_lookup8(l->others, order), i8_set(FCT_NONE));
+    l->keys = i8_lookup8(l->keys, order);
+    l->shared = f8_lookup8(l->shared, order);
+    return count;
+}
+
+static inline void store(const fct_rounds *r, const lanes *l, uint32_t place) {
+    i8_store(r->next.others + place, l->others);
+    i8_store(r->next.keys + place, l->keys);
+    f8_store(r->next.shared + place, l->shared);
+}
+
+static inline uint32_t keep_lanes(const fct_rounds *r, uint32_t i, uint32_t next, uint32_t place) {
+    lanes l = load_list(r, i, next);
+    fold(&l);
+    uint32_t count = pack(&l);
+    store(r, &l, place);
+    return count;
+}
+
+static inline uint32_t join_lanes(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next,
+                                  uint32_t place) {
+    lanes a = load_list(r, i, next), b = load_list(r, mate, next);
+    a.keys = b.keys = i8_set(FCT_KEY_OPEN);
+    uint32_t count = pack(&a), all = count + pack(&b);
+    if (all <= 8) {
+        i8 lane = numbers(0), back = i8_add(lane, i8_set(8 - count)), first = i8_less(lane, i8_set(count));
+        a.others = i8_if(first, a.others, i8_lookup8(b.others, back));
+        a.shared = f8_if(first, a.shared, f8_lookup8(b.shared, back));
+        fold(&a);
+        count = pack(&a);
+        store(r, &a, place);
+        return count;
+    }
+    fold(&a), fold(&b), fold_into(&a, &b);
+    count = pack(&a);
+    store(r, &a, place);
+    uint32_t more = pack(&b);
+    store(r, &b, place + count);
+    return count + more;
+}
+
+static inline uint32_t join(const fct_rounds *r, uint32_t next, fct_list_scratch *scratch) {
+    uint32_t i = (uint32_t)r->parents[next], mate = (uint32_t)(r->parents[next] >> 32),
+             place = r->next.starts[next];
+    uint32_t length = r->now.lengths[i], other = mate == FCT_NONE ? 0 : r->now.lengths[mate];
+    if (length <= 8 && other <= 8)
+        return mate == FCT_NONE ? keep_lanes(r, i, next, place) : join_lanes(r, i, mate, next, place);
+    if (length <= FCT_SHORT_LIST && other <= FCT_SHORT_LIST)
+        return join_short(r, i, mate, next, place, scratch);
+    return join_long(r, i, mate, next, place);
+}
+
+void fct_rounds_join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)begin, (void)end;
+    fct_rounds *r = user;
+    for (uint32_t next = r->kept[chunk]; next < r->kept[chunk + 1]; ++next)
+        r->next.lengths[next] = join(r, next, &r->scratch[thread]);
+}

@@ -1,0 +1,93 @@
+/* cluster/merge/work.h: a clustering in progress: live clusters, the edges between them, and the merges so
+ * far.
+ *
+ * A cluster lives in the slot of one of its faces. Build ids: f < F is the leaf of face f, F + i is merge i;
+ * a merge's children always have smaller build ids.
+ */
+#ifndef FCT_CLUSTER_WORK_H
+#define FCT_CLUSTER_WORK_H
+
+#include "base/env.h"
+#include "cluster/merge/metric.h"
+#include "dual/lists.h"
+
+typedef fct_pair fct_edge; /* a, b: slots */
+
+typedef struct fct_work {
+    const fct_env *env;
+    fct_metric metric;
+    uint32_t face_count;
+    /* per slot */
+    fct_record *records;
+    fct_direction *directions; /* MEAN only */
+    uint8_t *heights;          /* of the subtree */
+    uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
+    bool steep;                /* the reserve of height may be used */
+    bool balanced;             /* the greedy loop goes by size first, then by cost */
+    uint32_t stranded;         /* clusters that edges lead to but grafting found no place for */
+    const uint32_t *materials; /* of the face of the slot, or NULL */
+    /* Per slot, or NULL. Nonzero: the cluster has neighbours that are not here. It never merges, and a
+     * cluster whose cheapest partner it is waits rather than take the next best (it may become frozen, too).
+     * Only clusters with edges need one. */
+    uint8_t *frozen;
+    /* per merge, F - 1 of them */
+    uint32_t (*children)[2]; /* build ids */
+    float *costs;
+    uint32_t merge_count;
+    uint32_t phase_ends[3]; /* merges within materials, across materials, without a shared edge */
+    /* live edges, in the unit model: before the first contraction as lists by face, afterwards once each */
+    fct_lists lists;
+    fct_edge *edges;
+    uint32_t edge_count;
+    uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
+} fct_work;
+
+/* The greatest height of a cluster of `count` faces: 3 log2 n - 1, so that a join of parts keeps the whole
+ * tree within 3 log2 F; as long as `mild`, no more than 2 log2 n + 8 either, which leaves the rest in
+ * reserve. */
+uint32_t fct_height_limit(uint32_t count, bool mild);
+
+/* Records of all faces and the edges of the dual graph. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out);
+/* The same for a piece of a model with these bounds, by which costs are measured. */
+fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
+                                  const fct_tree_def *def, fct_work *out);
+void fct_work_release(fct_work *work);
+/* Releases all but the merges. */
+void fct_work_release_clusters(fct_work *work);
+
+/* Costs of merging count <= FCT_LANES pairs of slots. */
+static inline void fct_work_costs(const fct_work *work, const fct_pair *pairs, uint32_t count, float *costs) {
+    fct_metric_costs(&work->metric, work->records, work->directions, pairs, count, costs);
+}
+static inline float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared) {
+    float cost;
+    fct_work_costs(work, &(fct_pair){a, b, shared}, 1, &cost);
+    return cost;
+}
+enum { FCT_FREE_HEIGHT = 8 }; /* clusters that are lower may always merge */
+/* Whether the union keeps the height limit. */
+bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
+/* Notes the merge; slot a holds the union, slot b dies. */
+void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost);
+/* The same for count <= FCT_LANES pairs with no slot in common, which become merges `merge` and on, on
+ * several threads; the caller counts. */
+void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
+                     uint32_t count);
+
+/* Turns the lists into edges, if there are lists. Errors: MEMORY. */
+fct_result fct_work_list_edges(fct_work *work);
+
+/* Contracts along live edges, cheapest first, until no allowed one is left; with `across` false only between
+ * clusters of one material. Leaves the edges that remain. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_greedy(fct_work *work, bool across);
+/* The same, but merging all mutually cheapest pairs at once as long as that pays. Errors: MEMORY, CANCELLED.
+ */
+fct_result fct_work_rounds(fct_work *work, bool across);
+/* Hangs clusters that edges still lead to, but heights forbid to merge, into their neighbours' trees; see
+ * graft.c. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh);
+/* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
+fct_result fct_work_join(fct_work *work, const fct_mesh *mesh);
+
+#endif

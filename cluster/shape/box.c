@@ -1,0 +1,111 @@
+/* cluster/shape/box.c: oriented boxes of streams of points.
+ *
+ * Extents are taken in double along the very axes that fct_cluster_box expands from the stored quaternion, so
+ * that a box holds its points for exactly these, and is as tight as they allow.
+ */
+#include "cluster/shape/box.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "base/math/simd.h"
+
+/* fmax and fmin are calls here, for they must look out for NaN. */
+static inline double greater(double a, double b) {
+    return a > b ? a : b;
+}
+static inline double lesser(double a, double b) {
+    return a < b ? a : b;
+}
+
+void fct_box_axes(const float q[4], float axes[3][3]) {
+    double x = (double)q[0], y = (double)q[1], z = (double)q[2], w = (double)q[3];
+    double s = 2 / (x * x + y * y + z * z + w * w);
+    v3_store(axes[0], (v3){1 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)});
+    v3_store(axes[1], (v3){s * (x * y - w * z), 1 - s * (x * x + z * z), s * (y * z + w * x)});
+    v3_store(axes[2], (v3){s * (x * z + w * y), s * (y * z - w * x), 1 - s * (x * x + y * y)});
+}
+
+void fct_cluster_box(const fct_cluster *cluster, fct_box *out) {
+    for (int k = 0; k < 3; ++k) out->center[k] = cluster->box_center[k], out->half[k] = cluster->box_half[k];
+    fct_box_axes(cluster->box_rotation, out->axes);
+}
+
+typedef struct lanes {
+    d4 low[3], high[3];
+} lanes;
+
+static inline void widen(lanes *l, const float *x, const float *y, const float *z, d4 a[3][3]) {
+    d4 px = d4_load_floats(x), py = d4_load_floats(y), pz = d4_load_floats(z);
+    for (int k = 0; k < 3; ++k) {
+        d4 d = d4_add(d4_add(d4_mul(px, a[k][0]), d4_mul(py, a[k][1])), d4_mul(pz, a[k][2]));
+        l->low[k] = d4_min(d, l->low[k]);
+        l->high[k] = d4_max(d, l->high[k]);
+    }
+}
+
+void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size_t end,
+                     const float axes[3][3]) {
+    if (begin >= end) return;
+    d4 a[3][3];
+    lanes l;
+    for (int k = 0; k < 3; ++k) {
+        for (int i = 0; i < 3; ++i) a[k][i] = d4_set((double)axes[k][i]);
+        l.low[k] = d4_set(extents->low[k]), l.high[k] = d4_set(extents->high[k]);
+    }
+    size_t i = begin;
+    for (; i + 4 <= end; i += 4) widen(&l, points.x + i, points.y + i, points.z + i, a);
+    if (i < end && end - begin >= 4) {
+        widen(&l, points.x + end - 4, points.y + end - 4, points.z + end - 4, a);
+    } else if (i < end) {
+        float tail[3][4];
+        for (size_t k = 0; k < 4; ++k) {
+            size_t from = begin + k < end ? begin + k : begin;
+            tail[0][k] = points.x[from], tail[1][k] = points.y[from], tail[2][k] = points.z[from];
+        }
+        widen(&l, tail[0], tail[1], tail[2], a);
+    }
+    for (int k = 0; k < 3; ++k) {
+        double low[4], high[4];
+        d4_store(low, l.low[k]);
+        d4_store(high, l.high[k]);
+        extents->low[k] = lesser(lesser(low[0], low[1]), lesser(low[2], low[3]));
+        extents->high[k] = greater(greater(high[0], high[1]), greater(high[2], high[3]));
+    }
+}
+
+/* The next float above one that is not below 0. */
+static float above(float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    bits += bits < 0x7F800000u;
+    memcpy(&value, &bits, sizeof bits);
+    return value;
+}
+
+bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_cluster *cluster) {
+    /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
+    v3 center = point, a[3];
+    double size = 0;
+    bool within = true;
+    for (int k = 0; k < 3; ++k) {
+        a[k] = v3_load(axes[k]);
+        center = v3_mad(center, 0.5 * (e->low[k] + e->high[k]) - v3_dot(point, a[k]), a[k]);
+        size = greater(size, greater(fabs(e->low[k]), fabs(e->high[k])));
+    }
+    v3_store(cluster->box_center, center);
+    center = v3_load(cluster->box_center);
+    for (int k = 0; k < 3; ++k) {
+        double middle = v3_dot(center, a[k]), half = greater(e->high[k] - middle, middle - e->low[k]);
+        half += 16 * DBL_EPSILON * size; /* whatever order of operations checks it */
+        cluster->box_half[k] = above((float)half);
+        within = within && isfinite(cluster->box_half[k]) && isfinite(cluster->box_center[k]);
+        cluster->box_half[k] = cluster->box_half[k] < FLT_MAX ? cluster->box_half[k] : FLT_MAX;
+    }
+    return within;
+}
+
+double fct_box_area(const fct_extents *e) {
+    double x = e->high[0] - e->low[0], y = e->high[1] - e->low[1], z = e->high[2] - e->low[2];
+    return x * y + y * z + z * x;
+}

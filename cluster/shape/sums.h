@@ -1,0 +1,22 @@
+/* cluster/shape/sums.h: sums over the surface of a cluster. */
+#ifndef FCT_CLUSTER_SUMS_H
+#define FCT_CLUSTER_SUMS_H
+
+#include <stdint.h>
+
+#include "base/math/vec.h"
+
+/* Centre and covariance about it by `weight`. Twenty doubles, which four clusters' sums are turned on their
+ * side by. */
+typedef struct fct_sums {
+    double area, weight, moment[6], covariance[6];
+    v3 vector, center;
+} fct_sums;
+
+/* Of four triangles, whose corners are rows of four floats, x y z and one more; their unit normals too, in
+ * such rows: NaN where a triangle has no area. */
+void fct_sums_four(const float *const corners[3][4], fct_sums *out, float (*normals)[4]);
+void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *out);
+void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out);
+
+#endif

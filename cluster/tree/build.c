@@ -1,0 +1,161 @@
+/* cluster/tree/build.c: fct_tree_build: dual graph, contraction, order, boxes. */
+#include <assert.h>
+#include <string.h>
+
+#include "base/pool.h"
+#include "cluster/tree/locality.h"
+#include "cluster/tree/tree.h"
+
+fct_tree_def fct_tree_def_default(void) {
+    return (fct_tree_def){.size = sizeof(fct_tree_def),
+                          .method = FCT_CLUSTER_ROUNDS,
+                          .cost = FCT_COST_INCREMENT,
+                          .fit_measure = FCT_FIT_AREA,
+                          .fit_weight = -1,
+                          .direction_weight = -1,
+                          .shape_weight = -1,
+                          .root_count = 1,
+                          .max_cost = INFINITY};
+}
+
+/* Along edges as far as heights allow, then with the reserve of height. */
+static fct_result contract_edges(fct_work *work, fct_cluster_method method, bool across) {
+    work->steep = false;
+    fct_result result =
+        method == FCT_CLUSTER_ROUNDS ? fct_work_rounds(work, across) : fct_work_greedy(work, across);
+    work->steep = true;
+    return result == FCT_OK ? fct_work_greedy(work, across) : result;
+}
+
+static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_method method) {
+    fct_result result = FCT_OK;
+    if (mesh->materials) result = contract_edges(work, method, false);
+    work->phase_ends[0] = work->merge_count;
+    if (result == FCT_OK) result = contract_edges(work, method, true);
+    if (result == FCT_OK) result = fct_work_graft(work, mesh);
+    return result;
+}
+
+/* Contraction along edges, and once more by size where heights left neighbours apart: stars of a tall hub. */
+static fct_result make_parts(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                             fct_work *work) {
+    fct_result result = contract(work, mesh, def->method);
+    if (result != FCT_OK || work->stranded == 0) return result;
+    fct_work_release(work);
+    result = fct_work_create(env, mesh, def, work);
+    if (result != FCT_OK) return result;
+    work->balanced = true;
+    return contract(work, mesh, FCT_CLUSTER_GREEDY);
+}
+
+/* The options as used, with the default weights filled in. */
+static fct_tree_def used_def(const fct_tree_def *def, const fct_metric *metric) {
+    fct_tree_def used = *def;
+    used.fit_weight = (double)metric->fit_weight;
+    used.direction_weight = (double)metric->direction_weight;
+    used.shape_weight = (double)metric->shape_weight;
+    used.source = NULL;
+    return used;
+}
+
+static fct_result copy_source(const fct_env *env, const fct_tree_def *def, fct_tree *tree) {
+    tree->view.source_hash = def->source_hash;
+    if (!def->source) return FCT_OK;
+    size_t size = strlen(def->source) + 1;
+    tree->source = fct_allocate(env, size, 1);
+    if (!tree->source) return fct_fail_memory(env, "the tree");
+    memcpy(tree->source, def->source, size);
+    tree->view.source = tree->source;
+    return FCT_OK;
+}
+
+/* Of the mesh's edges; what contraction along them leaves over is a part each, unless heights forbade one. */
+static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts, bool complete,
+                              fct_tree *tree) {
+    fct_edge_counts all = *counts;
+    fct_result result = complete ? FCT_OK : fct_tree_count_edges(env, &tree->view, FCT_EDGE_PORTION, &all);
+    tree->view.boundary_edges = all.boundary, tree->view.nonmanifold_edges = all.nonmanifold;
+    tree->view.component_count = all.components;
+    return result;
+}
+
+/* Everything up to the face order. `env` is for what goes with the tree, the work's own memory is the pool's.
+ */
+static fct_result build_links(const fct_env *env, const fct_env *pool, const fct_mesh *mesh,
+                              const fct_tree_def *def, double *dual, fct_tree *tree) {
+    fct_work work;
+    fct_result result = fct_work_create(pool, mesh, def, &work);
+    if (result != FCT_OK) return result;
+    *dual = fct_seconds();
+    result = make_parts(pool, mesh, def, &work);
+    work.phase_ends[1] = work.merge_count;
+    const fct_edge_counts counts = {work.boundary_edges, work.nonmanifold_edges,
+                                    mesh->face_count - work.merge_count};
+    const bool complete = work.stranded == 0 && (work.edge_count == 0 || !mesh->materials);
+    if (result == FCT_OK) result = fct_work_join(&work, mesh);
+    work.phase_ends[2] = work.merge_count;
+    if (result == FCT_OK) {
+        tree->view.def = used_def(def, &work.metric);
+        result = fct_tree_order(&work, mesh, def, tree);
+    }
+    fct_work_release(&work);
+    if (result == FCT_OK) result = copy_source(env, def, tree);
+    if (result == FCT_OK) fct_tree_measure_bounds(tree);
+    if (result == FCT_OK) result = take_counts(env, &counts, complete, tree);
+    return result;
+}
+
+/* The nodes' memory, the largest part of a tree, serves the contraction first: memory that is touched for the
+ * first time costs more than most of what is done in it. */
+static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                        fct_tree_stats *stats, fct_tree *tree) {
+    double start = fct_seconds(), dual = start;
+    fct_pool pool;
+    tree->clusters = fct_allocate(env, mesh->face_count, sizeof *tree->clusters);
+    if (!tree->clusters) return fct_fail_memory(env, "the tree");
+    fct_pool_create(env, tree->clusters, (size_t)mesh->face_count * sizeof *tree->clusters, &pool);
+    fct_local_mesh local;
+    fct_result result = fct_local_mesh_create(&pool.env, mesh, &local);
+    if (result == FCT_OK) result = build_links(env, &pool.env, &local.mesh, def, &dual, tree);
+    if (result == FCT_OK) fct_local_mesh_restore(env, &local, tree->face_ids, tree->vertex_ids);
+    fct_local_mesh_release(&pool.env, &local);
+    double contracted = fct_seconds();
+    if (result == FCT_OK) result = fct_tree_describe(tree);
+    if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};
+    return result;
+}
+
+fct_result fct_tree_check_def(const fct_env *env, const fct_tree_def *def) {
+    if (def->size != sizeof *def)
+        return fct_fail(env, FCT_ERROR_DATA, "fct_tree_def has size %u, this library's is %zu", def->size,
+                        sizeof *def);
+    const double weights[3] = {def->fit_weight, def->direction_weight, def->shape_weight};
+    for (int k = 0; k < 3; ++k)
+        if (!(weights[k] <= 1e30))
+            return fct_fail(env, FCT_ERROR_DATA, "a weight of %g, expected at most 1e30", weights[k]);
+    if (isnan(def->max_cost)) return fct_fail(env, FCT_ERROR_DATA, "the largest cost is no number");
+    return FCT_OK;
+}
+
+fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                          fct_tree_stats *stats, fct_tree **out) {
+    *out = NULL;
+    fct_tree_def options = def ? *def : fct_tree_def_default();
+    fct_result result = fct_tree_check_def(env, &options);
+    if (result != FCT_OK) return result;
+    if (mesh->face_count == 0) return fct_fail(env, FCT_ERROR_DATA, "a mesh without faces has no tree");
+    result = fct_mesh_validate(env, mesh);
+    if (result != FCT_OK) return result;
+    fct_tree *tree = fct_tree_new(env);
+    if (!tree) return fct_fail_memory(env, "the tree");
+    result = build(env, mesh, &options, stats, tree);
+#ifndef NDEBUG
+    if (result == FCT_OK) result = fct_tree_verify(env, tree);
+    assert(result != FCT_ERROR_DATA);
+#endif
+    if (result == FCT_OK)
+        *out = tree;
+    else
+        fct_tree_destroy(tree);
+    return result;
+}

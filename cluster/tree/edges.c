@@ -1,0 +1,96 @@
+/* cluster/tree/edges.c: what the edges of a tree's mesh say of it: how many have one face, how many three or
+ * more, and how many parts they connect, as the dual graph has it (dual.h).
+ *
+ * Sides are sorted by vertex pair, in as many lots as keep the memory at a portion of them, so that a mesh of
+ * 10^8 triangles can be verified where its dual graph would not fit: a lot has the pairs whose hash falls to
+ * it, and all of a pair's faces. 4 bytes a face and 24 a side of a lot. A build knows all this already.
+ */
+#include "base/sort.h"
+#include "cluster/tree/tree.h"
+
+typedef struct side_list {
+    const fct_tree_view *view;
+    uint64_t *keys;
+    uint32_t *faces;
+    uint32_t *parents; /* of faces, towards smaller numbers */
+    uint32_t lots;
+} side_list;
+
+/* The side's vertex pair; 0, which no pair is, for a side from a vertex to itself. */
+static uint64_t side_key(const uint32_t triangle[3], int k) {
+    uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
+    if (a == b) return 0;
+    return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+}
+
+static uint32_t lot_of(uint64_t key, uint32_t lots) {
+    return (uint32_t)((key * 0x9E3779B97F4A7C15u >> 32) * lots >> 32);
+}
+
+static uint32_t find_part(uint32_t *parents, uint32_t face) {
+    while (parents[face] != face) face = parents[face] = parents[parents[face]];
+    return face;
+}
+
+/* Lists the sides of a lot, or only counts them where there is no list yet. */
+static size_t list_sides(const side_list *list, uint32_t lot) {
+    size_t count = 0;
+    for (uint32_t f = 0; f < list->view->face_count; ++f)
+        for (int k = 0; k < 3; ++k) {
+            uint64_t key = side_key(list->view->triangles + 3 * (size_t)f, k);
+            if (!key || (list->lots > 1 && lot_of(key, list->lots) != lot)) continue;
+            if (list->keys) list->keys[count] = key, list->faces[count] = f;
+            ++count;
+        }
+    return count;
+}
+
+/* Runs of one pair; a face that has it twice counts once. */
+static void count_runs(side_list *list, size_t count, fct_edge_counts *out) {
+    for (size_t i = 0, end; i < count; i = end) {
+        uint32_t faces = 1, part = find_part(list->parents, list->faces[i]);
+        for (end = i + 1; end < count && list->keys[end] == list->keys[i]; ++end) {
+            if (list->faces[end] == list->faces[end - 1]) continue;
+            uint32_t other = find_part(list->parents, list->faces[end]);
+            ++faces;
+            if (other == part) continue;
+            --out->components;
+            list->parents[other > part ? other : part] = other < part ? other : part;
+            part = other < part ? other : part;
+        }
+        out->boundary += faces == 1, out->nonmanifold += faces >= 3;
+    }
+}
+
+static fct_result count_lots(const fct_env *env, side_list *list, size_t most, fct_edge_counts *out) {
+    list->keys = fct_allocate(env, most, sizeof *list->keys);
+    list->faces = fct_allocate(env, most, sizeof *list->faces);
+    fct_result result =
+        list->keys && list->faces && list->parents ? FCT_OK : fct_fail_memory(env, "counting edges");
+    for (uint32_t f = 0; result == FCT_OK && f < list->view->face_count; ++f) list->parents[f] = f;
+    for (uint32_t lot = 0; result == FCT_OK && lot < list->lots; ++lot) {
+        size_t count = list_sides(list, lot);
+        result = fct_progress(env, "edges", (double)lot / list->lots);
+        if (result == FCT_OK) result = fct_sort_pairs(env, list->keys, list->faces, count);
+        if (result == FCT_OK) count_runs(list, count, out);
+    }
+    return result;
+}
+
+fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, uint32_t portion,
+                                fct_edge_counts *out) {
+    uint64_t sides = 3 * (uint64_t)view->face_count;
+    side_list list = {.view = view, .lots = (uint32_t)(sides / portion + 1)};
+    size_t most = 0;
+    for (uint32_t lot = 0; lot < list.lots; ++lot) {
+        size_t count = list_sides(&list, lot);
+        if (count > most) most = count;
+    }
+    *out = (fct_edge_counts){.components = view->face_count};
+    list.parents = fct_allocate(env, view->face_count, sizeof *list.parents);
+    fct_result result = count_lots(env, &list, most, out);
+    fct_release(env, list.keys);
+    fct_release(env, list.faces);
+    fct_release(env, list.parents);
+    return result;
+}

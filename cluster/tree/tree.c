@@ -1,0 +1,123 @@
+/* cluster/tree/tree.c: a tree from beginning to end: views, depth, bounds, labels, the mesh in its own order.
+ * What reads all faces asks for fct_tree_check first. */
+#include "cluster/tree/tree.h"
+
+#include <string.h>
+
+fct_tree *fct_tree_new(const fct_env *env) {
+    fct_tree *tree = fct_allocate_zero(env, 1, sizeof *tree);
+    if (tree) {
+        tree->env = env;
+        tree->view.source = "";
+    }
+    return tree;
+}
+
+void fct_tree_destroy(fct_tree *tree) {
+    if (!tree) return;
+    const fct_env *env = tree->env;
+    fct_release(env, tree->clusters);
+    fct_release(env, tree->links);
+    fct_release(env, tree->roots);
+    fct_release(env, tree->face_ids);
+    fct_release(env, tree->vertex_ids);
+    fct_release(env, tree->triangles);
+    fct_release(env, tree->materials);
+    fct_release(env, tree->positions);
+    fct_release(env, tree->colors);
+    bool own_names = tree->names && !tree->file.data;
+    for (uint32_t i = 0; own_names && i < tree->view.material_count; ++i) fct_release(env, tree->names[i]);
+    fct_release(env, tree->names);
+    fct_release(env, tree->source);
+    fct_release(env, tree->path);
+    fct_file_close(env, &tree->file);
+    fct_release(env, tree);
+}
+
+fct_tree_view fct_tree_get(const fct_tree *tree) {
+    return tree->view;
+}
+
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean) {
+    *depth = 0, *mean = 0;
+    uint8_t *depths = fct_allocate_zero(env, view->node_count, 1);
+    if (!depths) return fct_fail_memory(env, "the tree");
+    uint64_t total = 0;
+    for (uint32_t i = 0; i < view->node_count; ++i)
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = view->clusters[i].child[k], below = depths[i] + 1u;
+            if (child < view->node_count) {
+                depths[child] = (uint8_t)(below < 255 ? below : 255);
+            } else {
+                total += below;
+                if (below > *depth) *depth = below;
+            }
+        }
+    fct_release(env, depths);
+    *mean = (double)total / view->face_count;
+    return FCT_OK;
+}
+
+void fct_tree_measure_bounds(fct_tree *tree) {
+    fct_tree_view *view = &tree->view;
+    fct_bounds b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t v = 0; v < view->vertex_count; ++v)
+        for (int k = 0; k < 3; ++k) {
+            float x = view->positions[3 * v + k];
+            if (x < b.lower[k]) b.lower[k] = x;
+            if (x > b.upper[k]) b.upper[k] = x;
+        }
+    view->bounds = b;
+}
+
+fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out) {
+    const fct_tree_view *view = &tree->view;
+    unsigned arrays = (view->colors ? FCT_MESH_COLORS : 0u) | (view->materials ? FCT_MESH_MATERIALS : 0u);
+    *out = (fct_mesh){0};
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
+    result = fct_mesh_create(env, view->vertex_count, view->face_count, arrays, out);
+    if (result != FCT_OK) return result;
+    for (size_t v = 0; v < view->vertex_count; ++v) {
+        size_t to = 3 * (size_t)view->vertex_ids[v];
+        memcpy(out->positions + to, view->positions + 3 * v, 3 * sizeof(float));
+        if (out->colors) memcpy(out->colors + to, view->colors + 3 * v, 3 * sizeof(float));
+    }
+    for (size_t f = 0; f < view->face_count; ++f) {
+        for (size_t k = 0; k < 3; ++k)
+            out->triangles[3 * (size_t)view->face_ids[f] + k] = view->vertex_ids[view->triangles[3 * f + k]];
+        if (out->materials) out->materials[view->face_ids[f]] = view->materials[f];
+    }
+    if (!view->material_names) {
+        out->material_count = view->material_count;
+        return FCT_OK;
+    }
+    out->material_names = fct_allocate_zero(env, view->material_count, sizeof *out->material_names);
+    if (out->material_names) out->material_count = view->material_count;
+    bool complete = out->material_names != NULL;
+    for (uint32_t i = 0; i < out->material_count; ++i) {
+        size_t size = strlen(view->material_names[i]) + 1;
+        out->material_names[i] = fct_allocate(env, size, 1);
+        if (out->material_names[i])
+            memcpy(out->material_names[i], view->material_names[i], size);
+        else
+            complete = false;
+    }
+    if (complete) return FCT_OK;
+    fct_mesh_release(env, out);
+    return fct_fail_memory(env, "material names");
+}
+
+fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
+                           uint32_t *labels) {
+    const fct_tree_view *view = &tree->view;
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
+    for (uint32_t i = 0; i < count; ++i) {
+        bool leaf = nodes[i] >= view->node_count;
+        uint32_t first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
+        uint32_t faces = leaf ? 1 : view->clusters[nodes[i]].count;
+        for (uint32_t place = first; place < first + faces; ++place) labels[view->face_ids[place]] = i;
+    }
+    return FCT_OK;
+}

@@ -1,0 +1,149 @@
+/* mesh/ply/bind.c: see ply_read.h. */
+#include <string.h>
+
+#include "mesh/color.h"
+#include "mesh/ply/read.h"
+#include "mesh/ply/value.h"
+
+/* Groups of properties that are used when all of them are there; a later group with the same destination wins
+ * over an earlier one. */
+typedef struct group {
+    fct_ply_kind kind;
+    const char *names[3];
+    size_t width;
+    enum { POSITIONS, NORMALS, COLORS, TEXCOORDS, POLYGON_COLORS } destination;
+} group;
+
+static const group groups[] = {
+    {FCT_PLY_VERTICES, {"x", "y", "z"}, 3, POSITIONS},
+    {FCT_PLY_VERTICES, {"nx", "ny", "nz"}, 3, NORMALS},
+    {FCT_PLY_VERTICES, {"diffuse_red", "diffuse_green", "diffuse_blue"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"red", "green", "blue"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"texture_u", "texture_v"}, 2, TEXCOORDS},
+    {FCT_PLY_VERTICES, {"u", "v"}, 2, TEXCOORDS},
+    {FCT_PLY_VERTICES, {"s", "t"}, 2, TEXCOORDS},
+    {FCT_PLY_FACES, {"red", "green", "blue"}, 3, POLYGON_COLORS},
+    {FCT_PLY_FACES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, POLYGON_COLORS},
+};
+
+static bool named(const fct_ply_property *property, const char *name) {
+    return fct_text_word_is(property->name, property->name_length, name);
+}
+
+static ptrdiff_t find_property(const fct_ply_property *properties, size_t count, bool list,
+                               const char *name) {
+    for (size_t i = 0; i < count; ++i)
+        if ((properties[i].count_type != FCT_PLY_NONE) == list && named(properties + i, name))
+            return (ptrdiff_t)i;
+    return FCT_PLY_NOWHERE;
+}
+
+static ptrdiff_t find_any(const fct_ply_property *properties, size_t count, bool list, const char *a,
+                          const char *b) {
+    ptrdiff_t found = find_property(properties, count, list, a);
+    return found != FCT_PLY_NOWHERE ? found : find_property(properties, count, list, b);
+}
+
+/* Appends the group's columns when they are all there. */
+static fct_result bind_group(const fct_env *env, const group *g, const fct_ply_property *properties,
+                             const fct_ply_element *element, float **array, fct_ply_target *out) {
+    ptrdiff_t found[3];
+    for (size_t k = 0; k < g->width; ++k) {
+        found[k] = find_property(properties, element->property_count, false, g->names[k]);
+        if (found[k] == FCT_PLY_NOWHERE) return FCT_OK;
+    }
+    if (!*array) *array = fct_allocate(env, (size_t)element->count, g->width * sizeof(float));
+    if (!*array) return fct_fail_memory(env, "a mesh");
+    if (g->destination == COLORS ||
+        g->destination == POLYGON_COLORS) { /* what was bound before is replaced */
+        while (out->column_count && out->columns[out->column_count - 1].color) --out->column_count;
+    } else if (g->destination == TEXCOORDS) {
+        while (out->column_count && out->columns[out->column_count - 1].stride == 2) --out->column_count;
+    }
+    for (size_t k = 0; k < g->width; ++k)
+        out->columns[out->column_count++] =
+            (fct_ply_column){.property = (size_t)found[k],
+                             .to = *array + k,
+                             .stride = g->width,
+                             .color = g->destination == COLORS || g->destination == POLYGON_COLORS};
+    return FCT_OK;
+}
+
+fct_ply_kind fct_ply_kind_of(const fct_ply_element *element) {
+    if (fct_text_word_is(element->name, element->name_length, "vertex")) return FCT_PLY_VERTICES;
+    if (fct_text_word_is(element->name, element->name_length, "face")) return FCT_PLY_FACES;
+    if (fct_text_word_is(element->name, element->name_length, "tristrips")) return FCT_PLY_STRIPS;
+    return FCT_PLY_OTHER;
+}
+
+fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const fct_ply_element *element,
+                        fct_soup *soup, float **vertex_texcoords, fct_ply_target *out) {
+    const fct_ply_property *properties =
+        element->property_count ? header->properties + element->first_property : NULL;
+    size_t count = element->property_count;
+    *out = (fct_ply_target){.kind = fct_ply_kind_of(element),
+                            .indices = FCT_PLY_NOWHERE,
+                            .texcoords = FCT_PLY_NOWHERE,
+                            .material = FCT_PLY_NOWHERE};
+    float **arrays[] = {&soup->positions, &soup->normals, &soup->colors, vertex_texcoords,
+                        &soup->polygon_colors};
+    for (size_t i = 0; i < sizeof groups / sizeof *groups; ++i) {
+        if (groups[i].kind != out->kind) continue;
+        fct_result result =
+            bind_group(t->env, groups + i, properties, element, arrays[groups[i].destination], out);
+        if (result != FCT_OK) return result;
+    }
+    if (out->kind == FCT_PLY_VERTICES && !soup->positions)
+        return fct_fail(t->env, FCT_ERROR_DATA, "%s: element vertex lacks one of the properties x, y and z",
+                        t->name);
+    if (out->kind != FCT_PLY_FACES && out->kind != FCT_PLY_STRIPS) return FCT_OK;
+    out->indices = find_any(properties, count, true, "vertex_indices", "vertex_index");
+    if (out->indices == FCT_PLY_NOWHERE && element->count)
+        return fct_fail(t->env, FCT_ERROR_DATA, "%s: element %.*s has no list vertex_indices", t->name,
+                        (int)element->name_length, element->name);
+    if (out->kind == FCT_PLY_STRIPS) return FCT_OK;
+    out->texcoords = find_property(properties, count, true, "texcoord");
+    out->material = find_any(properties, count, false, "material_index", "material");
+    if (out->material != FCT_PLY_NOWHERE) {
+        soup->materials = fct_allocate(t->env, (size_t)element->count, sizeof(uint32_t));
+        if (!soup->materials) return fct_fail_memory(t->env, "a mesh");
+    }
+    return FCT_OK;
+}
+
+/* Integers from 0 to 255 (65535 for ushort) are sRGB, floats are linear. What is out of range becomes NaN,
+ * which the check of the whole mesh reports with the element's number. */
+static float color_value(double value, fct_ply_type type) {
+    if (type >= FCT_PLY_FLOAT) return (float)value;
+    double top = type == FCT_PLY_UINT16 ? 65535 : 255;
+    return value >= 0 && value <= top ? fct_linear_from_srgb(value / top) : NAN;
+}
+
+void fct_ply_fill_columns(const fct_ply_target *target, const fct_ply_property *properties,
+                          const unsigned char *base, size_t size, const size_t *offsets, bool swap,
+                          bool as_double, size_t begin, size_t end) {
+    float bytes[256];
+    bool any_color = false;
+    for (size_t c = 0; c < target->column_count; ++c) any_color |= target->columns[c].color;
+    if (any_color && end - begin > 256)
+        for (int i = 0; i < 256; ++i) bytes[i] = fct_linear_from_srgb(i / 255.0);
+    for (size_t c = 0; c < target->column_count; ++c) {
+        fct_ply_column column = target->columns[c];
+        fct_ply_type declared = properties[column.property].type;
+        fct_ply_type type = as_double ? FCT_PLY_DOUBLE : declared;
+        const unsigned char *from = base + offsets[column.property];
+        if (column.color && type == FCT_PLY_UINT8 && end - begin > 256)
+            for (size_t i = begin; i < end; ++i) column.to[i * column.stride] = bytes[from[i * size]];
+        else if (column.color)
+            for (size_t i = begin; i < end; ++i)
+                column.to[i * column.stride] =
+                    color_value(fct_ply_load(from + i * size, type, swap), declared);
+        else if (type == FCT_PLY_FLOAT)
+            for (size_t i = begin; i < end; ++i)
+                column.to[i * column.stride] = (float)fct_ply_float(from + i * size, swap);
+        else
+            for (size_t i = begin; i < end; ++i)
+                column.to[i * column.stride] = (float)fct_ply_load(from + i * size, type, swap);
+    }
+}

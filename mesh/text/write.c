@@ -1,0 +1,145 @@
+/* mesh/text/write.c: OBJ, OFF and STL. */
+#include <math.h>
+#include <string.h>
+
+#include "base/env.h"
+#include "base/math/vec.h"
+#include "mesh/write.h"
+
+static void print_floats(FILE *stream, const float *values, int count) {
+    for (int i = 0; i < count; ++i) fprintf(stream, " %.9g", (double)values[i]);
+}
+
+/* OBJ: v x y z [r g b], vt per corner, vn per vertex, usemtl where the material changes. */
+static void write_obj_faces(const fct_mesh *m, FILE *stream) {
+    uint32_t material = FCT_NONE;
+    for (size_t f = 0; f < m->face_count; ++f) {
+        if (m->materials && m->materials[f] != material) {
+            material = m->materials[f];
+            if (m->material_names)
+                fprintf(stream, "usemtl %s\n", m->material_names[material]);
+            else
+                fprintf(stream, "usemtl material_%u\n", material);
+        }
+        fputc('f', stream);
+        for (int k = 0; k < 3; ++k) {
+            unsigned v = m->triangles[3 * f + k] + 1;
+            unsigned long vt = 3 * (unsigned long)f + (unsigned long)k + 1;
+            if (m->texcoords && m->normals)
+                fprintf(stream, " %u/%lu/%u", v, vt, v);
+            else if (m->texcoords)
+                fprintf(stream, " %u/%lu", v, vt);
+            else if (m->normals)
+                fprintf(stream, " %u//%u", v, v);
+            else
+                fprintf(stream, " %u", v);
+        }
+        fputc('\n', stream);
+    }
+}
+
+fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
+    const fct_mesh *m = sink->mesh;
+    for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
+        if (strpbrk(m->material_names[i], "\r\n"))
+            return fct_fail(sink->env, FCT_ERROR_DATA, "%s: material %u has a line end in its name",
+                            sink->name, i);
+    fct_note_left_out(sink, FCT_MESH_FACE_COLORS);
+    fprintf(stream, "# Facetree %s\n", fct_version());
+    for (size_t v = 0; v < m->vertex_count; ++v) {
+        fputc('v', stream);
+        print_floats(stream, m->positions + 3 * v, 3);
+        if (m->colors) print_floats(stream, m->colors + 3 * v, 3);
+        fputc('\n', stream);
+    }
+    for (size_t i = 0; m->texcoords && i < 3 * (size_t)m->face_count; ++i)
+        fprintf(stream, "vt %.9g %.9g\n", (double)m->texcoords[2 * i], (double)m->texcoords[2 * i + 1]);
+    for (size_t v = 0; m->normals && v < m->vertex_count; ++v) {
+        fputs("vn", stream);
+        print_floats(stream, m->normals + 3 * v, 3);
+        fputc('\n', stream);
+    }
+    write_obj_faces(m, stream);
+    return fct_progress(sink->env, "write", 1);
+}
+
+/* A float that cannot be taken for an integer: OFF tells linear floats from bytes by the point. */
+static void print_component(FILE *stream, float value) {
+    char text[32];
+    snprintf(text, sizeof text, "%.9g", (double)value);
+    fprintf(stream, " %s%s", text, strpbrk(text, ".e") ? "" : ".0");
+}
+
+/* OFF, COFF, NOFF or CNOFF; colours as linear floats. */
+fct_result fct_write_off(const fct_sink *sink, FILE *stream) {
+    const fct_mesh *m = sink->mesh;
+    fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS);
+    fprintf(stream, "%s%sOFF\n%u %u 0\n", m->colors ? "C" : "", m->normals ? "N" : "", m->vertex_count,
+            m->face_count);
+    for (size_t v = 0; v < m->vertex_count; ++v) {
+        print_floats(stream, m->positions + 3 * v, 3);
+        if (m->normals) print_floats(stream, m->normals + 3 * v, 3);
+        for (int k = 0; m->colors && k < 3; ++k) print_component(stream, m->colors[3 * v + k]);
+        fprintf(stream, m->colors ? " 1.0\n" : "\n");
+    }
+    for (size_t f = 0; f < m->face_count; ++f) {
+        const uint32_t *t = m->triangles + 3 * f;
+        fprintf(stream, "3 %u %u %u", t[0], t[1], t[2]);
+        for (int k = 0; m->face_colors && k < 3; ++k) print_component(stream, m->face_colors[3 * f + k]);
+        fputc('\n', stream);
+    }
+    return fct_progress(sink->env, "write", 1);
+}
+
+static void facet_normal(const fct_mesh *m, size_t f, float normal[3]) {
+    const uint32_t *t = m->triangles + 3 * f;
+    v3 p = v3_load(m->positions + 3 * (size_t)t[0]);
+    v3 a = v3_sub(v3_load(m->positions + 3 * (size_t)t[1]), p);
+    v3 b = v3_sub(v3_load(m->positions + 3 * (size_t)t[2]), p);
+    v3_store(normal, v3_unit(v3_cross(a, b)));
+}
+
+static void put_32(unsigned char *p, uint32_t x) {
+    p[0] = (unsigned char)x, p[1] = (unsigned char)(x >> 8);
+    p[2] = (unsigned char)(x >> 16), p[3] = (unsigned char)(x >> 24);
+}
+
+static void write_stl_facet(const fct_mesh *m, size_t f, bool ascii, FILE *stream) {
+    float values[12];
+    facet_normal(m, f, values);
+    for (int c = 0; c < 3; ++c)
+        memcpy(values + 3 + 3 * c, m->positions + 3 * (size_t)m->triangles[3 * f + c], 3 * sizeof(float));
+    if (ascii) {
+        fprintf(stream, "facet normal %.9g %.9g %.9g\nouter loop\n", (double)values[0], (double)values[1],
+                (double)values[2]);
+        for (int c = 1; c < 4; ++c)
+            fprintf(stream, "vertex %.9g %.9g %.9g\n", (double)values[3 * c], (double)values[3 * c + 1],
+                    (double)values[3 * c + 2]);
+        fprintf(stream, "endloop\nendfacet\n");
+        return;
+    }
+    unsigned char record[50] = {0};
+    for (int k = 0; k < 12; ++k) {
+        uint32_t bits;
+        memcpy(&bits, values + k, sizeof bits);
+        put_32(record + 4 * k, bits);
+    }
+    fwrite(record, sizeof record, 1, stream);
+}
+
+/* The head of a binary file must not begin with "solid". */
+fct_result fct_write_stl(const fct_sink *sink, FILE *stream) {
+    const fct_mesh *m = sink->mesh;
+    fct_note_left_out(sink, FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_FACE_COLORS |
+                                FCT_MESH_MATERIALS);
+    if (sink->def->ascii) {
+        fprintf(stream, "solid facetree\n");
+    } else {
+        unsigned char head[84] = "binary STL, Facetree";
+        put_32(head + 80, m->face_count);
+        fwrite(head, sizeof head, 1, stream);
+    }
+    for (size_t f = 0; f < m->face_count; ++f) write_stl_facet(m, f, sink->def->ascii, stream);
+    if (sink->def->ascii) fprintf(stream, "endsolid facetree\n");
+    return fct_progress(sink->env, "write", 1);
+}

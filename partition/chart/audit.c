@@ -1,0 +1,138 @@
+/* partition/chart/audit.c: what charts turned out to be, counted from labels and triangles alone.
+ *
+ * Faces are sorted by chart; mesh edges are named by their first side. Then every chart is walked on its own,
+ * stamping the vertices and edges it uses. It shares no count with the code that made the charts. O(F).
+ */
+#include "base/parallel.h"
+#include "partition/chart/chart.h"
+
+enum { SEEN_ONCE = 1, SEEN_TWICE = 2, SEEN_MORE = 3 };
+
+typedef struct auditor {
+    const fct_charter *charter;
+    uint32_t *places;                    /* faces in order of charts */
+    uint32_t *first;                     /* count + 1: of each chart in places */
+    uint32_t *edges;                     /* first side on the mesh edge of each side */
+    uint32_t *parents;                   /* by place, for union-find */
+    uint32_t *vertex_chart, *edge_chart; /* the chart that used it last */
+    uint32_t *edge_face;                 /* by first side: the face that used it last */
+    uint8_t *edge_uses;                  /* by first side: faces of that chart */
+} auditor;
+
+static void sort_by_chart(auditor *a) {
+    const fct_charter *c = a->charter;
+    uint32_t total = 0;
+    for (uint32_t i = 0; i <= c->count; ++i) a->first[i] = 0;
+    for (uint32_t p = 0; p < c->view->face_count; ++p) ++a->first[c->labels[p]];
+    for (uint32_t i = 0; i <= c->count; ++i) {
+        uint32_t faces = a->first[i];
+        a->first[i] = total;
+        total += faces;
+    }
+    for (uint32_t p = 0; p < c->view->face_count; ++p) a->places[a->first[c->labels[p]]++] = p;
+    for (uint32_t i = c->count; i > 0; --i) a->first[i] = a->first[i - 1];
+    a->first[0] = 0;
+}
+
+static void name_edges(auditor *a, fct_chart_stats *stats) {
+    const fct_charter *c = a->charter;
+    size_t sides = 3 * (size_t)c->view->face_count;
+    for (size_t i = 0; i < sides; ++i) {
+        uint32_t before = c->sides.before[i];
+        a->edges[i] = before == FCT_NONE ? (uint32_t)i : a->edges[before];
+        a->edge_uses[i] = 0, a->edge_chart[i] = FCT_NONE;
+        if (before != FCT_NONE && c->labels[before / 3] != c->labels[i / 3]) a->edge_uses[a->edges[i]] = 1;
+    }
+    for (size_t i = 0; i < sides; ++i) {
+        if (a->edges[i] != i) continue;
+        if (a->edge_uses[i])
+            stats->seam_length += fct_side_length(c->view, i);
+        else if (c->sides.after[i] == FCT_NONE)
+            stats->boundary_length += fct_side_length(c->view, i);
+        a->edge_uses[i] = 0;
+    }
+}
+
+static uint32_t find(uint32_t *parents, uint32_t i) {
+    while (parents[i] != i) {
+        parents[i] = parents[parents[i]];
+        i = parents[i];
+    }
+    return i;
+}
+
+static bool chart_is_disk(auditor *a, uint32_t chart) {
+    const fct_tree_view *view = a->charter->view;
+    uint64_t vertices = 0, edges = 0, faces = a->first[chart + 1] - a->first[chart], joins = 0;
+    bool clean = true;
+    for (uint32_t i = a->first[chart]; i < a->first[chart + 1]; ++i) a->parents[a->places[i]] = a->places[i];
+    for (uint32_t i = a->first[chart]; i < a->first[chart + 1]; ++i) {
+        uint32_t place = a->places[i];
+        clean = clean && !fct_face_repeats(view, place);
+        for (size_t side = 3 * (size_t)place; side < 3 * (size_t)place + 3; ++side) {
+            uint32_t vertex = view->triangles[side], edge = a->edges[side];
+            vertices += a->vertex_chart[vertex] != chart;
+            a->vertex_chart[vertex] = chart;
+            if (a->edge_chart[edge] != chart) {
+                a->edge_chart[edge] = chart, a->edge_uses[edge] = SEEN_ONCE;
+                ++edges;
+            } else {
+                if (a->edge_uses[edge] < SEEN_MORE) ++a->edge_uses[edge];
+                clean = clean && a->edge_uses[edge] <= SEEN_TWICE;
+                uint32_t p = find(a->parents, place), q = find(a->parents, a->edge_face[edge]);
+                if (p != q) a->parents[p < q ? q : p] = p < q ? p : q, ++joins;
+            }
+            a->edge_face[edge] = place;
+        }
+    }
+    return clean && joins + 1 == faces && 2 * edges > 3 * faces && vertices + faces == edges + 1;
+}
+
+static double chart_angle(const auditor *a, uint32_t chart) {
+    const fct_tree_view *view = a->charter->view;
+    v3 s = {0, 0, 0};
+    double largest = 0;
+    for (uint32_t i = a->first[chart]; i < a->first[chart + 1]; ++i)
+        s = v3_add(s, fct_face_vector(view, a->places[i]));
+    for (uint32_t i = a->first[chart]; i < a->first[chart + 1]; ++i)
+        largest = fmax(largest, fct_angle(fct_face_vector(view, a->places[i]), s));
+    return largest;
+}
+
+static void audit(auditor *a, fct_chart_stats *stats) {
+    sort_by_chart(a);
+    name_edges(a, stats);
+    for (uint32_t v = 0; v < a->charter->view->vertex_count; ++v) a->vertex_chart[v] = FCT_NONE;
+    stats->charts = a->charter->count;
+    for (uint32_t i = 0; i < a->charter->count; ++i) {
+        uint32_t faces = a->first[i + 1] - a->first[i];
+        if (faces > stats->largest_faces) stats->largest_faces = faces;
+        stats->non_disks += !chart_is_disk(a, i);
+        stats->largest_angle = fmax(stats->largest_angle, chart_angle(a, i));
+    }
+}
+
+fct_result fct_charts_audit(const fct_env *env, const fct_charter *c, fct_chart_stats *stats) {
+    size_t faces = c->view->face_count;
+    auditor a = {.charter = c};
+    a.places = fct_allocate(env, faces, sizeof *a.places);
+    a.first = fct_allocate(env, (size_t)c->count + 1, sizeof *a.first);
+    a.edges = fct_allocate(env, faces, 3 * sizeof *a.edges);
+    a.parents = fct_allocate(env, faces, sizeof *a.parents);
+    a.vertex_chart = fct_allocate(env, c->view->vertex_count, sizeof *a.vertex_chart);
+    a.edge_chart = fct_allocate(env, faces, 3 * sizeof *a.edge_chart);
+    a.edge_face = fct_allocate(env, faces, 3 * sizeof *a.edge_face);
+    a.edge_uses = fct_allocate(env, faces, 3 * sizeof *a.edge_uses);
+    bool complete = a.places && a.first && a.edges && a.parents && a.vertex_chart && a.edge_chart &&
+                    a.edge_face && a.edge_uses;
+    if (complete) audit(&a, stats);
+    fct_release(env, a.places);
+    fct_release(env, a.first);
+    fct_release(env, a.edges);
+    fct_release(env, a.parents);
+    fct_release(env, a.vertex_chart);
+    fct_release(env, a.edge_chart);
+    fct_release(env, a.edge_face);
+    fct_release(env, a.edge_uses);
+    return complete ? FCT_OK : fct_fail_memory(env, "charts");
+}

@@ -1,0 +1,170 @@
+/* partition/cut.c: cuts from the top down, and the cut by the largest distance to the planes.
+ *
+ * First the frontier is opened level by level, its tests in parallel, until it is wide; then threads take its
+ * subtrees, each with a stack inside the subtree's own range of the output, which no cut of it can outgrow.
+ * Kept nodes are gathered in order of places at the end: the same for every thread count.
+ */
+#include "partition/cut.h"
+
+#include <string.h>
+
+#include "base/math/vec.h"
+#include "base/parallel.h"
+#include "facetree/partition.h"
+
+enum { WIDE = 1 << 10, GRAIN = 1 << 12 };
+
+typedef struct cutter {
+    const fct_tree_view *view;
+    fct_cut_test *test;
+    void *user;
+    uint32_t *nodes;    /* a place each; FCT_NONE where nothing is kept */
+    uint32_t *frontier; /* nodes yet to be tested, in order of places */
+    uint32_t count;
+    bool *kept; /* of the frontier */
+} cutter;
+
+static void test_frontier(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk;
+    cutter *c = user;
+    for (size_t i = begin; i < end; ++i)
+        c->kept[i] = c->frontier[i] >= c->view->node_count || c->test(c->user, c->frontier[i], thread);
+}
+
+/* Opens the frontier until it is wide or empty. `next` holds twice WIDE. */
+static void widen_frontier(const fct_env *env, cutter *c, uint32_t *next) {
+    while (c->count > 0 && c->count < WIDE) {
+        uint32_t count = 0;
+        fct_parallel_for(env, c->count, 1, test_frontier, c);
+        for (uint32_t i = 0; i < c->count; ++i) {
+            uint32_t node = c->frontier[i];
+            if (c->kept[i]) {
+                c->nodes[fct_node_first(c->view, node)] = node;
+            } else {
+                next[count++] = c->view->clusters[node].child[0];
+                next[count++] = c->view->clusters[node].child[1];
+            }
+        }
+        uint32_t *swap = c->frontier;
+        c->frontier = next, next = swap, c->count = count;
+    }
+}
+
+/* Depth first. What is kept and what is on the stack are disjoint, so both fit into the subtree's range, one
+ * from its front and one from its end. */
+static void cut_subtrees(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk;
+    cutter *c = user;
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t root = c->frontier[i], count = fct_node_faces(c->view, root), top = count, kept = 0;
+        uint32_t *range = c->nodes + fct_node_first(c->view, root);
+        range[--top] = root;
+        while (top < count) {
+            uint32_t node = range[top++];
+            if (node >= c->view->node_count || c->test(c->user, node, thread)) {
+                range[kept++] = node;
+            } else {
+                range[--top] = c->view->clusters[node].child[1];
+                range[--top] = c->view->clusters[node].child[0];
+            }
+        }
+        while (kept < count) range[kept++] = FCT_NONE;
+    }
+}
+
+fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *phase, fct_cut_test *test,
+                        void *user, uint32_t *nodes, uint32_t *count) {
+    const fct_tree_view *view = &tree->view;
+    size_t width = view->root_count > 2 * WIDE ? view->root_count : 2 * WIDE;
+    uint32_t *frontiers = fct_allocate(env, width, 2 * sizeof *frontiers);
+    bool *kept = fct_allocate(env, width, sizeof *kept);
+    fct_result result = FCT_OK;
+    *count = 0;
+    if (frontiers && kept) {
+        cutter c = {view, test, user, nodes, frontiers, view->root_count, kept};
+        memcpy(frontiers, view->roots, view->root_count * sizeof *frontiers);
+        memset(nodes, 0xFF, view->face_count * sizeof *nodes);
+        widen_frontier(env, &c, frontiers + width);
+        result = fct_parallel_for_progress(env, phase, c.count, 1, cut_subtrees, &c);
+        for (uint32_t p = 0; p < view->face_count; ++p)
+            if (nodes[p] != FCT_NONE) nodes[(*count)++] = nodes[p];
+    } else {
+        result = fct_fail_memory(env, "cutting a tree");
+    }
+    fct_release(env, frontiers);
+    fct_release(env, kept);
+    return result;
+}
+
+/* --- By distance --- */
+
+/* An upper bound from the box, with room for the rounding of both sides. */
+static double box_distance(const fct_cluster *c) {
+    fct_box box;
+    fct_cluster_box(c, &box);
+    v3 normal = v3_load(c->plane), center = v3_load(box.center);
+    double reach = fabs(v3_dot(normal, center) + (double)c->plane[3]);
+    double size = fabs(center.x) + fabs(center.y) + fabs(center.z) + fabs((double)c->plane[3]);
+    for (int i = 0; i < 3; ++i) {
+        reach += (double)box.half[i] * fabs(v3_dot(normal, v3_load(box.axes[i])));
+        size += (double)box.half[i];
+    }
+    return reach + 1e-14 * size;
+}
+
+/* The largest distance of a vertex, or the first one found that is above `enough`. */
+static double vertex_distance(const fct_tree_view *view, const fct_cluster *c, double enough) {
+    v3 normal = v3_load(c->plane);
+    double largest = 0, offset = (double)c->plane[3];
+    const uint32_t *corners = view->triangles + 3 * (size_t)c->first;
+    for (size_t i = 0; i < 3 * (size_t)c->count && !(largest > enough); ++i)
+        largest =
+            fmax(largest, fabs(v3_dot(normal, v3_load(view->positions + 3 * (size_t)corners[i])) + offset));
+    return largest;
+}
+
+typedef struct distance_cut {
+    const fct_tree *tree;
+    double max_distance;
+    const uint32_t *nodes;
+    double *largest; /* per chunk */
+} distance_cut;
+
+static bool near_plane(void *user, uint32_t node, uint32_t thread) {
+    (void)thread;
+    const distance_cut *cut = user;
+    const fct_cluster *c = &cut->tree->view.clusters[node];
+    return box_distance(c) <= cut->max_distance ||
+           vertex_distance(&cut->tree->view, c, cut->max_distance) <= cut->max_distance;
+}
+
+static void find_largest(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)thread;
+    distance_cut *cut = user;
+    double largest = 0;
+    for (size_t i = begin; i < end; ++i) {
+        fct_cluster c;
+        fct_tree_cluster(cut->tree, cut->nodes[i], &c);
+        if (box_distance(&c) > largest)
+            largest = fmax(largest, vertex_distance(&cut->tree->view, &c, INFINITY));
+    }
+    cut->largest[chunk] = largest;
+}
+
+fct_result fct_tree_cut_at_distance(const fct_env *env, const fct_tree *tree, double max_distance,
+                                    uint32_t *nodes, uint32_t *count, double *largest) {
+    if (!(max_distance >= 0))
+        return fct_fail(env, FCT_ERROR_DATA, "expected a distance of at least 0, found %g", max_distance);
+    distance_cut cut = {.tree = tree, .max_distance = max_distance, .nodes = nodes};
+    fct_result result = fct_tree_check(env, tree);
+    if (result == FCT_OK) result = fct_cut_tree(env, tree, "cut", near_plane, &cut, nodes, count);
+    if (result != FCT_OK || !largest) return result;
+    size_t chunks = fct_chunk_count(*count, GRAIN);
+    cut.largest = fct_allocate(env, chunks, sizeof *cut.largest);
+    if (!cut.largest) return fct_fail_memory(env, "cutting a tree");
+    result = fct_parallel_for_progress(env, "distances", *count, GRAIN, find_largest, &cut);
+    *largest = 0;
+    for (size_t i = 0; i < chunks && result == FCT_OK; ++i) *largest = fmax(*largest, cut.largest[i]);
+    fct_release(env, cut.largest);
+    return result;
+}

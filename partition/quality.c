@@ -1,0 +1,310 @@
+/* partition/quality.c: how good a partition is, measured from the triangles alone.
+ *
+ * A cluster is a range of a list of faces: for nodes of a tree the places themselves, for labels a counting
+ * sort of the faces. Sums are in double per cluster; borders and connectedness come from the dual graph. Area
+ * weights; a cluster without area weighs nothing. Boxes are the tree's, or for labels along the principal
+ * axes of the surface, turned about the normal to the best of eight angles. O(F log F), parallel over
+ * clusters.
+ */
+#include <float.h>
+#include <string.h>
+
+#include "base/math/eigen.h"
+#include "base/parallel.h"
+#include "cluster/tree/tree.h"
+#include "facetree/dual.h"
+#include "partition/labels.h"
+
+enum { TURNS = 8 };
+static const double pi = 3.14159265358979323846;
+
+typedef struct piece {
+    uint32_t first, count;                            /* range of the list */
+    double area, fit, direction, deviation, box_area; /* fit, direction, deviation times area */
+    double perimeter;
+} piece;
+
+typedef struct judge {
+    const fct_mesh *mesh;
+    const fct_tree *tree;   /* NULL where boxes are to be fitted */
+    const uint32_t *nodes;  /* of the tree */
+    const uint32_t *labels; /* by face of the mesh */
+    uint32_t *faces;        /* the list; NULL: face i at place i */
+    uint32_t *parents;      /* union-find over faces */
+    piece *pieces;
+    uint32_t count;
+    float *planes; /* count x 4, where they are asked for */
+} judge;
+
+static void load_triangle(const judge *j, size_t place, v3 origin, v3 p[3]) {
+    size_t face = j->faces ? j->faces[place] : place;
+    for (size_t k = 0; k < 3; ++k)
+        p[k] = v3_sub(v3_load(j->mesh->positions + 3 * (size_t)j->mesh->triangles[3 * face + k]), origin);
+}
+
+static v3 area_vector(const v3 p[3]) {
+    return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
+}
+
+/* Sums over the surface of a piece; covariance about the centroid, which is returned (the first corner of a
+ * piece without area). */
+static v3 sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], double moment[6]) {
+    const size_t first = out->first, end = first + out->count;
+    v3 origin = {0, 0, 0}, center = {0, 0, 0}, p[3];
+    load_triangle(j, first, origin, p);
+    origin = p[0];
+    for (size_t place = first; place < end; ++place) {
+        load_triangle(j, place, origin, p);
+        v3 a = area_vector(p);
+        double area = v3_norm(a);
+        if (!(area > 0)) continue;
+        out->area += area;
+        *s = v3_add(*s, a);
+        center = v3_mad(center, area / 3, v3_add(v3_add(p[0], p[1]), p[2]));
+        sym3_add_outer(moment, 1 / area, a);
+    }
+    if (!(out->area > 0)) return origin;
+    origin = v3_mad(origin, 1 / out->area, center);
+    for (size_t place = first; place < end; ++place) {
+        load_triangle(j, place, origin, p);
+        double area = v3_norm(area_vector(p));
+        for (int k = 0; k < 3; ++k) sym3_add_outer(covariance, area / 12, p[k]);
+        sym3_add_outer(covariance, area / 12, v3_add(v3_add(p[0], p[1]), p[2]));
+    }
+    return origin;
+}
+
+/* The least-squares plane of a piece's surface, its normal along S. */
+static void judge_plane(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const judge *j = user;
+    for (size_t i = begin; i < end; ++i) {
+        float *plane = j->planes + 4 * i;
+        piece sums = j->pieces[i];
+        memset(plane, 0, 4 * sizeof *plane);
+        if (sums.count == 0) continue;
+        double covariance[6] = {0}, moment[6] = {0}, values[3];
+        v3 s = {0, 0, 0}, axes[3], center = sum_surface(j, &sums, &s, covariance, moment);
+        fct_eigen3(covariance, values, axes);
+        v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
+        v3_store(plane, n);
+        plane[3] = (float)fmax(fmin(-v3_dot(n, center), (double)FLT_MAX), -(double)FLT_MAX);
+    }
+}
+
+/* The least surface area of a box about the piece with one axis along axes[0]. */
+static double fit_box(const judge *j, const piece *range, const v3 axes[3]) {
+    double low[2 * TURNS + 1], high[2 * TURNS + 1], best = INFINITY;
+    v3 along[2 * TURNS + 1], p[3];
+    for (int t = 0; t < TURNS; ++t) {
+        double c = cos(pi * t / (2 * TURNS)), s = sin(pi * t / (2 * TURNS));
+        along[2 * t] = v3_mad(v3_scale(axes[2], c), s, axes[1]);
+        along[2 * t + 1] = v3_mad(v3_scale(axes[1], c), -s, axes[2]);
+    }
+    along[2 * TURNS] = axes[0];
+    for (int i = 0; i <= 2 * TURNS; ++i) low[i] = INFINITY, high[i] = -INFINITY;
+    for (size_t place = range->first; place < (size_t)range->first + range->count; ++place) {
+        load_triangle(j, place, (v3){0, 0, 0}, p);
+        for (int k = 0; k < 3; ++k)
+            for (int i = 0; i <= 2 * TURNS; ++i) {
+                double x = v3_dot(p[k], along[i]);
+                low[i] = x < low[i] ? x : low[i], high[i] = x > high[i] ? x : high[i];
+            }
+    }
+    double height = high[2 * TURNS] - low[2 * TURNS];
+    for (int t = 0; t < TURNS; ++t) {
+        double x = high[2 * t] - low[2 * t], y = high[2 * t + 1] - low[2 * t + 1];
+        best = fmin(best, 2 * (x * y + height * (x + y)));
+    }
+    return best;
+}
+
+static void judge_piece(const judge *j, uint32_t i) {
+    piece *out = &j->pieces[i];
+    if (out->count == 0) return;
+    double covariance[6] = {0}, moment[6] = {0}, values[3];
+    v3 s = {0, 0, 0}, axes[3];
+    sum_surface(j, out, &s, covariance, moment);
+    fct_eigen3(covariance, values, axes);
+    v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
+    out->fit = fmax(values[0], 0);
+    out->direction = fmax(sym3_form(moment, n, n) - 2 * v3_dot(n, s) + out->area, 0);
+    out->deviation = 2 * fmax(out->area - v3_norm(s), 0);
+    if (!j->tree) {
+        out->box_area = fit_box(j, out, axes);
+        return;
+    }
+    fct_cluster cluster;
+    fct_tree_cluster(j->tree, j->nodes[i], &cluster);
+    const float *h = cluster.box_half;
+    out->box_area =
+        8 * ((double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0]);
+}
+
+static void judge_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    for (size_t i = begin; i < end; ++i) judge_piece(user, (uint32_t)i);
+}
+
+static uint32_t find(uint32_t *parents, uint32_t i) {
+    while (parents[i] != i) {
+        parents[i] = parents[parents[i]];
+        i = parents[i];
+    }
+    return i;
+}
+
+/* Borders of the clusters, and whether the faces of each hang together. */
+static bool walk_dual(const judge *j, const fct_dual *dual) {
+    uint32_t joined = 0, filled = 0;
+    for (uint32_t i = 0; i < j->count; ++i) filled += j->pieces[i].count > 0;
+    for (uint32_t f = 0; f < dual->face_count; ++f) {
+        j->pieces[j->labels[f]].perimeter += (double)dual->perimeters[f];
+        j->parents[f] = f;
+    }
+    for (uint32_t e = 0; e < dual->edge_count; ++e) {
+        uint32_t a = dual->edges[2 * (size_t)e], b = dual->edges[2 * (size_t)e + 1];
+        if (j->labels[a] != j->labels[b]) continue;
+        j->pieces[j->labels[a]].perimeter -= 2 * (double)dual->lengths[e];
+        a = find(j->parents, a), b = find(j->parents, b);
+        if (a == b) continue;
+        ++joined;
+        if (a < b)
+            j->parents[b] = a;
+        else
+            j->parents[a] = b;
+    }
+    return joined == dual->face_count - filled;
+}
+
+static double squared_diagonal(const fct_mesh *mesh) {
+    v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * (size_t)mesh->face_count; ++i) {
+        v3 p = v3_load(mesh->positions + 3 * (size_t)mesh->triangles[i]);
+        lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
+        upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
+    }
+    double squared = v3_norm2(v3_sub(upper, lower));
+    return squared > 0 ? squared : 1;
+}
+
+static fct_partition_quality mean_of(const judge *j, bool connected) {
+    double area = 0, unit = squared_diagonal(j->mesh);
+    fct_partition_quality q = {.connected = connected};
+    for (uint32_t i = 0; i < j->count; ++i) {
+        const piece *p = &j->pieces[i];
+        area += p->area;
+        q.mean_fit += p->fit / unit;
+        q.mean_direction += p->direction;
+        q.mean_normal_deviation += p->deviation;
+        q.mean_irregularity += fmax(p->perimeter, 0) * fmax(p->perimeter, 0) / (4 * pi);
+        q.box_area += p->box_area / unit;
+    }
+    if (!(area > 0)) return (fct_partition_quality){.box_area = q.box_area, .connected = connected};
+    q.mean_fit /= area;
+    q.mean_direction /= area;
+    q.mean_irregularity /= area; /* area times perimeter^2 / (4 pi area) */
+    q.mean_normal_deviation /= area;
+    return q;
+}
+
+/* The judge is complete but for parents. */
+static fct_result measure(const fct_env *env, judge *j, fct_partition_quality *out) {
+    fct_dual dual = {0};
+    j->parents = fct_allocate(env, j->mesh->face_count, sizeof *j->parents);
+    fct_result result;
+    if (!j->parents)
+        result = fct_fail_memory(env, "measuring a partition");
+    else
+        result = fct_dual_build(env, j->mesh, &dual);
+    if (result == FCT_OK) {
+        fct_parallel_for(env, j->count, 64, judge_chunk, j);
+        *out = mean_of(j, walk_dual(j, &dual));
+    }
+    fct_dual_release(env, &dual);
+    fct_release(env, j->parents);
+    return result;
+}
+
+fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
+                            fct_partition_quality *out) {
+    const fct_tree_view *view = &tree->view;
+    fct_mesh mesh = {.vertex_count = view->vertex_count,
+                     .face_count = view->face_count,
+                     .positions = (float *)view->positions,
+                     .triangles = (uint32_t *)view->triangles};
+    judge j = {.mesh = &mesh, .tree = tree, .nodes = nodes, .count = count};
+    fct_result result = fct_tree_check(env, tree);
+    if (result != FCT_OK) return result;
+    uint32_t *labels = fct_allocate(env, view->face_count, sizeof *labels);
+    j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
+    if (labels && j.pieces) {
+        for (uint32_t i = 0; i < count; ++i) {
+            bool leaf = nodes[i] >= view->node_count;
+            piece *p = &j.pieces[i];
+            p->first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
+            p->count = leaf ? 1 : view->clusters[nodes[i]].count;
+            for (uint32_t place = p->first; place < p->first + p->count; ++place) labels[place] = i;
+        }
+        j.labels = labels;
+        result = measure(env, &j, out);
+    } else {
+        result = fct_fail_memory(env, "measuring a partition");
+    }
+    fct_release(env, labels);
+    fct_release(env, j.pieces);
+    return result;
+}
+
+fct_result fct_labels_check(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                            uint32_t count) {
+    fct_result result = fct_mesh_validate(env, mesh);
+    for (uint32_t f = 0; result == FCT_OK && f < mesh->face_count; ++f)
+        if (labels[f] >= count)
+            result = fct_fail(env, FCT_ERROR_DATA, "face %u: label %u is out of range, of %u clusters", f,
+                              labels[f], count);
+    return result;
+}
+
+/* Groups the faces by label. The judge has mesh, labels and count. Errors: MEMORY. */
+static fct_result group_faces(const fct_env *env, judge *j) {
+    j->faces = fct_allocate(env, j->mesh->face_count, sizeof *j->faces);
+    j->pieces = fct_allocate_zero(env, j->count, sizeof *j->pieces);
+    if (!j->faces || !j->pieces) return fct_fail_memory(env, "measuring a partition");
+    uint32_t end = 0;
+    for (uint32_t f = 0; f < j->mesh->face_count; ++f) ++j->pieces[j->labels[f]].count;
+    for (uint32_t i = 0; i < j->count; ++i) {
+        j->pieces[i].first = end;
+        end += j->pieces[i].count;
+        j->pieces[i].count = 0;
+    }
+    for (uint32_t f = 0; f < j->mesh->face_count; ++f) {
+        piece *p = &j->pieces[j->labels[f]];
+        j->faces[p->first + p->count++] = f;
+    }
+    return FCT_OK;
+}
+
+fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
+                              uint32_t count, fct_partition_quality *out) {
+    fct_result result = fct_labels_check(env, mesh, labels, count);
+    if (result != FCT_OK) return result;
+    judge j = {.mesh = mesh, .labels = labels, .count = count};
+    result = group_faces(env, &j);
+    if (result == FCT_OK) result = measure(env, &j, out);
+    fct_release(env, j.faces);
+    fct_release(env, j.pieces);
+    return result;
+}
+
+fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels, uint32_t count,
+                             float *planes) {
+    fct_result result = fct_labels_check(env, mesh, labels, count);
+    if (result != FCT_OK) return result;
+    judge j = {.mesh = mesh, .labels = labels, .count = count, .planes = planes};
+    result = group_faces(env, &j);
+    if (result == FCT_OK) fct_parallel_for(env, count, 64, judge_plane, &j);
+    fct_release(env, j.faces);
+    fct_release(env, j.pieces);
+    return result;
+}

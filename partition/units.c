@@ -1,0 +1,164 @@
+/* partition/units.c: graphs of faces and of runs of faces, see units.h.
+ *
+ * Rows of faces come from the dual graph's edges by counting, rows of runs from the rows of their faces with
+ * one slot a unit that says where in the row it is. O(F), no sort.
+ */
+#include "partition/units.h"
+
+#include <string.h>
+
+#include "base/env.h"
+
+void fct_units_release(const fct_env *env, fct_units *units) {
+    fct_dual_release(env, &units->dual);
+    fct_release(env, units->first);
+    fct_release(env, units->neighbours);
+    fct_release(env, units->face_lengths);
+    fct_release(env, units->lengths);
+    fct_release(env, units->perimeters);
+    fct_release(env, units->vectors);
+    fct_release(env, units->materials);
+    *units = (fct_units){0};
+}
+
+/* Turns counts into where rows begin. */
+static void sum_up(uint32_t *first, uint32_t count) {
+    uint32_t end = 0;
+    for (uint32_t i = 0; i <= count; ++i) {
+        uint32_t row = i < count ? first[i] : 0;
+        first[i] = end;
+        end += row;
+    }
+}
+
+/* Rows move up by one while they are filled: first[i + 1] is where row i is filled next, and ends where row
+ * i + 1 begins. */
+static void list_faces(fct_units *units) {
+    const fct_dual *dual = &units->dual;
+    uint32_t *next = units->first + 1;
+    memset(units->first, 0, ((size_t)units->count + 2) * sizeof *units->first);
+    for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) ++next[dual->edges[e]];
+    sum_up(next, units->count);
+    for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) {
+        uint32_t place = next[dual->edges[e]]++;
+        units->neighbours[place] = dual->edges[e ^ 1];
+        units->face_lengths[place] = dual->lengths[e / 2];
+    }
+}
+
+/* Faces of the dual graph become numbers. */
+static fct_result renumber(const fct_env *env, const uint32_t *numbers, fct_dual *dual) {
+    float *perimeters = fct_allocate(env, dual->face_count, sizeof *perimeters);
+    if (!perimeters) return fct_fail_memory(env, "refining a partition");
+    for (uint32_t f = 0; f < dual->face_count; ++f) perimeters[numbers[f]] = dual->perimeters[f];
+    for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) dual->edges[e] = numbers[dual->edges[e]];
+    fct_release(env, dual->perimeters);
+    dual->perimeters = perimeters;
+    return FCT_OK;
+}
+
+fct_result fct_units_of_faces(const fct_env *env, const fct_mesh *mesh, const uint32_t *numbers,
+                              const fct_mesh *numbered, fct_units *out) {
+    *out = (fct_units){.count = mesh->face_count, .mesh = numbers ? numbered : mesh};
+    out->of_faces = out->mesh->materials;
+    fct_result result = fct_dual_build(env, mesh, &out->dual);
+    if (result == FCT_OK && numbers) result = renumber(env, numbers, &out->dual);
+    if (result != FCT_OK) goto failed;
+    size_t ends = 2 * (size_t)out->dual.edge_count;
+    if (ends > UINT32_MAX) {
+        result = fct_fail(env, FCT_ERROR_DATA,
+                          "%zu sides of faces have neighbours, at most %u can be refined", ends, UINT32_MAX);
+        goto failed;
+    }
+    out->first = fct_allocate(env, (size_t)out->count + 2, sizeof *out->first);
+    out->neighbours = fct_allocate(env, ends, sizeof *out->neighbours);
+    out->face_lengths = fct_allocate(env, ends, sizeof *out->face_lengths);
+    if (!out->first || !out->neighbours || !out->face_lengths) {
+        result = fct_fail_memory(env, "refining a partition");
+        goto failed;
+    }
+    list_faces(out);
+    fct_release(env, out->dual.edges);
+    fct_release(env, out->dual.lengths);
+    out->dual.edges = NULL, out->dual.lengths = NULL;
+    return FCT_OK;
+failed:
+    fct_units_release(env, out);
+    return result;
+}
+
+static uint32_t root_of(uint32_t *parents, uint32_t i) {
+    while (parents[i] != i) i = parents[i] = parents[parents[i]];
+    return i;
+}
+
+/* Sums over the faces of each unit, and the units that never move. */
+static void sum_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *parents, uint32_t *pieces,
+                     fct_units *out) {
+    memset(out->vectors, 0, (size_t)out->count * sizeof *out->vectors);
+    memset(pieces, 0, (size_t)out->count * sizeof *pieces);
+    for (uint32_t u = 0; u < out->count; ++u) out->perimeters[u] = 0;
+    for (uint32_t f = 0; f < faces->count; ++f) {
+        uint32_t u = unit_of[f], material = faces->of_faces ? faces->of_faces[f] : 0;
+        bool begins = f == 0 || unit_of[f - 1] != u;
+        out->vectors[u] = v3_add(out->vectors[u], fct_unit_vector(faces, f));
+        out->perimeters[u] += fct_unit_perimeter(faces, f);
+        out->materials[u] = begins || out->materials[u] == material ? material : FCT_NONE;
+        parents[f] = f;
+        ++pieces[u];
+        for (uint32_t i = faces->first[f]; i < faces->first[f + 1]; ++i) {
+            uint32_t other = faces->neighbours[i];
+            if (unit_of[other] != u) continue;
+            out->perimeters[u] -= fct_unit_length(faces, i);
+            if (other > f) continue;
+            uint32_t a = root_of(parents, f), b = root_of(parents, other);
+            if (a == b) continue;
+            parents[a] = b;
+            --pieces[u];
+        }
+    }
+    for (uint32_t u = 0; u < out->count; ++u)
+        if (pieces[u] > 1) out->materials[u] = FCT_NONE;
+}
+
+/* Rows of the units; without arrays for them it only says where they begin. slots: a number a unit. */
+static void list_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *slots, fct_units *out) {
+    uint32_t end = 0, row = 0;
+    for (uint32_t u = 0; u < out->count; ++u) slots[u] = FCT_NONE;
+    for (uint32_t f = 0; f < faces->count; ++f) {
+        uint32_t u = unit_of[f];
+        if (f == 0 || unit_of[f - 1] != u) out->first[u] = row = end;
+        for (uint32_t i = faces->first[f]; i < faces->first[f + 1]; ++i) {
+            uint32_t other = unit_of[faces->neighbours[i]];
+            if (other == u) continue;
+            if (slots[other] == FCT_NONE || slots[other] < row) {
+                slots[other] = end;
+                if (out->neighbours) out->neighbours[end] = other, out->lengths[end] = 0;
+                ++end;
+            }
+            if (out->lengths) out->lengths[slots[other]] += fct_unit_length(faces, i);
+        }
+    }
+    out->first[out->count] = end;
+}
+
+fct_result fct_units_of_runs(const fct_env *env, const fct_units *faces, const uint32_t *unit_of,
+                             uint32_t count, uint32_t *scratch, fct_units *out) {
+    *out = (fct_units){.count = count};
+    out->first = fct_allocate(env, (size_t)count + 1, sizeof *out->first);
+    out->vectors = fct_allocate(env, count, sizeof *out->vectors);
+    out->perimeters = fct_allocate(env, count, sizeof *out->perimeters);
+    out->materials = fct_allocate(env, count, sizeof *out->materials);
+    if (!out->first || !out->vectors || !out->perimeters || !out->materials) goto failed;
+    sum_runs(faces, unit_of, scratch, scratch + faces->count, out);
+    list_runs(faces, unit_of, scratch, out);
+    size_t ends = out->first[count];
+    out->lengths = fct_allocate(env, ends, sizeof *out->lengths);
+    out->neighbours = fct_allocate(env, ends, sizeof *out->neighbours);
+    if (!out->lengths || !out->neighbours) goto failed;
+    list_runs(faces, unit_of, scratch, out);
+    return FCT_OK;
+failed:
+    fct_units_release(env, out);
+    return fct_fail_memory(env, "refining a partition");
+}

@@ -1,0 +1,280 @@
+/* radiosity/light/lamp.c: see lamp.h.
+ *
+ * A receiver's lamps come in two kinds. Each that may bring more than MAJOR_SHARE of the light has its own
+ * cut and its own rays. The others bring their exact light too, but share one set of rays, spread over them
+ * by systematic sampling, and one visible fraction a channel. A visible fraction is sum(G V) / sum(G) over
+ * points drawn in proportion to the light, so that it is 1 or 0 exactly where nothing or all is hidden.
+ */
+#include "radiosity/light/lamp.h"
+
+#include "base/env.h"
+#include "radiosity/light/lamp_cut.h"
+#include "radiosity/sample.h"
+#include "scene/transform.h"
+
+#define MAJOR_SHARE .025
+#define MAX_RAYS    64
+#define LARGE_AREA  .25
+#define FLAT_ENOUGH .9 /* |S| / A: a nearly flat lamp does not shine on itself */
+
+struct fct_lamps {
+    const fct_env *env;
+    uint32_t count, instance_count;
+    fct_lamp *lamps;
+    bool *sampled; /* per instance */
+};
+
+/* What one call carries along. */
+typedef struct query {
+    const fct_lamps *lamps;
+    const fct_scene *scene;
+    const double *point, *normal;
+    float origin[3];
+    uint64_t seed;
+    uint32_t base_rays;
+    bool fixed;
+    double total; /* of the lamps' estimates times strength */
+    double scale; /* the same, with what is known better in place of estimates */
+    uint64_t rays;
+} query;
+
+static bool visible(query *q, const fct_lamp *lamp, v3 y) {
+    const double *m = lamp->to_world, p[3] = {y.x, y.y, y.z};
+    fct_ray ray = {.t_min = 0};
+    double distance2 = 0, largest = 0;
+    for (int k = 0; k < 3; ++k) {
+        double world = m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3];
+        double d = world - q->origin[k];
+        ray.origin[k] = q->origin[k], ray.direction[k] = (float)d;
+        distance2 += d * d;
+        largest = fmax(largest, fmax(fabs(world), fabs(q->origin[k])));
+    }
+    /* Short of the lamp itself by more than what rounding moves it. */
+    ray.t_max = (float)(1 - 1e-4 - 1e-6 * largest / sqrt(distance2));
+    ++q->rays;
+    return !(ray.t_max > 0) || !fct_scene_any_hit(q->scene, &ray, NULL);
+}
+
+/* The visible fraction of a cut whose light is `power` (strength included). */
+static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receiver *rec, const fct_cut *cut,
+                               double power) {
+    uint64_t seed = fct_hash2(q->seed, lamp->instance);
+    double all = 0, seen = 0;
+    uint32_t sent = 0;
+    /* a lamp that brings much of the light is not judged by four rays */
+    uint32_t first = !q->fixed && power > .2 * q->total ? 2 * q->base_rays : q->base_rays;
+    for (uint32_t goal = first; sent < goal;) {
+        for (; sent < goal; ++sent) {
+            double u[2];
+            fct_plane_point(sent, seed, u);
+            fct_lamp_point point = fct_cut_point(lamp, rec, cut, u[0], u[1]);
+            if (point.weight <= 0) continue;
+            all += point.weight;
+            if (visible(q, lamp, point.y)) seen += point.weight;
+        }
+        bool mixed = all <= 0 || (seen > 0 && seen < all);
+        if (!mixed || sent >= MAX_RAYS || q->fixed) break;
+        /* As though one more ray had been seen by half: the spread of few rays is not to be trusted. */
+        double fraction = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
+        double error = sqrt(fraction * (1 - fraction) / sent) * power;
+        if (sent < 16)
+            goal = 16;
+        else if (all <= 0 || error > .02 * q->scale)
+            goal = MAX_RAYS;
+    }
+    return all > 0 ? seen / all : 0;
+}
+
+static fct_receiver receiver(const query *q, const fct_lamp *lamp) {
+    return fct_lamp_receiver(lamp, q->point, q->normal);
+}
+
+static double estimate(const query *q, const fct_lamp *lamp) {
+    fct_receiver rec = receiver(q, lamp);
+    return fct_lamp_estimate(lamp, &rec) * lamp->strength;
+}
+
+/* Sends about `count` rays to the minor lamps, whose estimates sum to `sum`; adds weights by channel. Returns
+ * whether some arrive and some do not. */
+static bool sample_minor(query *q, double sum, uint32_t count, double all[3], double seen[3], fct_cut *cut) {
+    uint64_t seed = fct_hash2(q->seed, FCT_NONE);
+    double step = sum / count, next = step * fct_uniform(fct_hash2(seed, count)), below = 0;
+    bool hit = false, miss = false;
+    uint32_t number = 0;
+    for (int k = 0; k < 3; ++k) all[k] = seen[k] = 0;
+    for (uint32_t i = 0; i < q->lamps->count; ++i) {
+        const fct_lamp *lamp = q->lamps->lamps + i;
+        double share = estimate(q, lamp);
+        if (share > MAJOR_SHARE * q->total) continue;
+        bool ready = false;
+        fct_receiver rec = receiver(q, lamp);
+        for (below += share; next < below; next += step) {
+            double u[2];
+            if (!ready) fct_lamp_cut(lamp, &rec, cut);
+            ready = true;
+            fct_plane_point(number++, seed, u);
+            fct_lamp_point point = fct_cut_point(lamp, &rec, cut, u[0], u[1]);
+            if (point.weight <= 0) continue;
+            bool free = visible(q, lamp, point.y);
+            for (int k = 0; k < 3; ++k) {
+                double weight = point.weight * lamp->emission[k] / share;
+                all[k] += weight;
+                if (free) seen[k] += weight;
+            }
+            hit |= !free, miss |= free;
+        }
+    }
+    return hit && miss;
+}
+
+static void add_minor(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
+    double all[3], seen[3];
+    bool mixed = sample_minor(q, sum, q->base_rays, all, seen, cut);
+    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < 16 && !q->fixed)
+        sample_minor(q, sum, 16, all, seen, cut);
+    double grey = all[0] + all[1] + all[2];
+    grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
+    for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * (all[k] > 0 ? seen[k] / all[k] : grey);
+}
+
+/* Returns the light that would arrive, over the channels, if all were visible. */
+static double gather(query *q, double irradiance[3]) {
+    double minor = 0, open = 0, minor_light[3] = {0, 0, 0};
+    fct_cut cut;
+    for (int k = 0; k < 3; ++k) irradiance[k] = 0;
+    for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate(q, q->lamps->lamps + i);
+    q->scale = q->total;
+    for (uint32_t i = 0; i < q->lamps->count; ++i) {
+        const fct_lamp *lamp = q->lamps->lamps + i;
+        fct_receiver rec = receiver(q, lamp);
+        double share = fct_lamp_estimate(lamp, &rec) * lamp->strength;
+        if (share <= 0) continue;
+        fct_lamp_cut(lamp, &rec, &cut);
+        bool major = share > MAJOR_SHARE * q->total;
+        if (!major) minor += share;
+        double light = cut.light < 1 ? cut.light : 1;
+        q->scale += light * lamp->strength - share;
+        if (light <= 0) continue;
+        open += light * lamp->strength;
+        if (q->base_rays && major) light *= visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);
+        double *to = q->base_rays && !major ? minor_light : irradiance;
+        for (int k = 0; k < 3; ++k) to[k] += light * lamp->emission[k];
+    }
+    if (minor_light[0] + minor_light[1] + minor_light[2] > 0)
+        add_minor(q, minor_light, minor, irradiance, &cut);
+    return open;
+}
+
+void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
+                          double irradiance[3]) {
+    query q = {.lamps = lamps, .point = point, .normal = normal};
+    gather(&q, irradiance);
+}
+
+double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
+                        const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
+                        double irradiance[3], uint64_t *rays) {
+    query q = {.lamps = lamps,
+               .scene = scene,
+               .point = point,
+               .normal = normal,
+               .seed = item_seed,
+               .base_rays = base_rays & ~FCT_LAMPS_FIXED,
+               .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
+    for (int k = 0; k < 3; ++k) q.origin[k] = (float)(point[k] + offset * normal[k]);
+    double open = gather(&q, irradiance);
+    if (rays) *rays += q.rays;
+    return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
+}
+
+uint32_t fct_lamps_count(const fct_lamps *lamps) {
+    return lamps->count;
+}
+
+bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance) {
+    return instance < lamps->instance_count && lamps->sampled[instance];
+}
+
+/* World area of an instance, and the length of its area vector; face by face only under a transform that is
+ * no similarity. */
+static double instance_area(const fct_scene_view *view, uint32_t instance, double *vector) {
+    const fct_instance *placed = view->instances + instance;
+    const fct_tree *tree = view->models[placed->model].tree;
+    fct_tree_view model = fct_tree_get(tree);
+    double area = 0;
+    v3 sum = {0, 0, 0};
+    if (placed->uniform_scale > 0) {
+        for (uint32_t i = 0; i < model.root_count; ++i) {
+            fct_cluster c;
+            fct_tree_cluster(tree, model.roots[i], &c);
+            area += c.area;
+            sum = v3_add(sum, v3_load(c.area_vector));
+        }
+        double scale2 = (double)placed->uniform_scale * placed->uniform_scale;
+        *vector = scale2 * v3_norm(sum);
+        return area * scale2;
+    }
+    for (size_t place = 0; place < model.face_count; ++place) {
+        const uint32_t *t = model.triangles + 3 * place;
+        v3 a = v3_load(model.positions + 3 * (size_t)t[0]);
+        v3 e1 = v3_sub(v3_load(model.positions + 3 * (size_t)t[1]), a);
+        v3 e2 = v3_sub(v3_load(model.positions + 3 * (size_t)t[2]), a);
+        v3 s = v3_scale(
+            v3_cross(fct_transform_vector(placed->to_world, e1), fct_transform_vector(placed->to_world, e2)),
+            .5);
+        area += v3_norm(s);
+        sum = v3_add(sum, s);
+    }
+    *vector = v3_norm(sum);
+    return area;
+}
+
+static bool emits(const fct_scene_view *view, uint32_t instance) {
+    const float *e = view->materials[view->instances[instance].material].emission;
+    return e[0] > 0 || e[1] > 0 || e[2] > 0;
+}
+
+fct_result fct_lamps_create(const fct_env *env, const fct_scene *scene, fct_lamps **out) {
+    fct_scene_view view = fct_scene_get(scene);
+    fct_result result = FCT_OK;
+    double total = 0;
+    *out = NULL;
+    fct_lamps *lamps = fct_allocate_zero(env, 1, sizeof *lamps);
+    double *areas = fct_allocate(env, view.instance_count, sizeof *areas);
+    double *vectors = fct_allocate(env, view.instance_count, sizeof *vectors);
+    if (lamps) lamps->env = env;
+    if (!lamps || !areas || !vectors) {
+        result = fct_fail_memory(env, "lamps");
+        goto done;
+    }
+    lamps->instance_count = view.instance_count;
+    lamps->sampled = fct_allocate_zero(env, view.instance_count, sizeof *lamps->sampled);
+    lamps->lamps = fct_allocate(env, view.instance_count, sizeof *lamps->lamps);
+    if (!lamps->sampled || !lamps->lamps) {
+        result = fct_fail_memory(env, "lamps");
+        goto done;
+    }
+    for (uint32_t i = 0; i < view.instance_count; ++i)
+        total += areas[i] = instance_area(&view, i, &vectors[i]);
+    for (uint32_t i = 0; i < view.instance_count && result == FCT_OK; ++i) {
+        if (!emits(&view, i) || !(areas[i] > 0)) continue;
+        if (areas[i] > LARGE_AREA * total && vectors[i] < FLAT_ENOUGH * areas[i]) continue;
+        result = fct_lamp_init(env, &view, i, lamps->lamps + lamps->count);
+        if (result == FCT_OK) lamps->sampled[i] = true, ++lamps->count;
+    }
+done:
+    fct_release(env, areas);
+    fct_release(env, vectors);
+    if (result != FCT_OK) fct_lamps_destroy(lamps);
+    if (result == FCT_OK) *out = lamps;
+    return result;
+}
+
+void fct_lamps_destroy(fct_lamps *lamps) {
+    if (!lamps) return;
+    const fct_env *env = lamps->env;
+    for (uint32_t i = 0; i < lamps->count; ++i) fct_lamp_release(env, lamps->lamps + i);
+    fct_release(env, lamps->lamps);
+    fct_release(env, lamps->sampled);
+    fct_release(env, lamps);
+}

@@ -1,0 +1,518 @@
+/* radiosity/light/lamp_cut.c: see lamp_cut.h.
+ *
+ * A node that faces the receiver wholly and lies wholly above its horizon sends n.w (-w.S) / (pi r^2) up to a
+ * relative error of about rms^2 / r^2 (1 / cos + 1 / cos'), S exact for parallel directions; any other node
+ * is known only between bounds (Cauchy-Schwarz on the moments: sum A |n.w| <= sqrt(A w.M w)). Nodes are
+ * opened until their error is small beside their own light or beside the lamp's. A lamp as a whole, seen from
+ * afar, needs no cut: its projected area over all directions is tabulated on a cube, where it is piecewise
+ * linear with kinks at directions in which faces turn away.
+ */
+#include "radiosity/light/lamp_cut.h"
+
+#include "base/parallel.h"
+#include "radiosity/light/polygon.h"
+#include "scene/transform.h"
+
+#include <string.h>
+
+#define RELATIVE_ERROR .02
+#define FAR_ERROR      .02
+#define BEND_ERROR     .2
+#define BOUND_ERROR    .35 /* of the distance between bounds */
+#define PLATE_VARIANCE .29 /* of the squared half side: 1/3 for a rectangle, 1/4 for an ellipse */
+#define SHARE_ERROR    7e-4
+#define STACK_SIZE     256
+#define TABLE_CLUSTERS 2048
+#define MAX_PART       (1u << 12) /* sub-triangles down to 4^-6 */
+
+/* What a node sends: an estimate, an upper bound of it, and the error to be expected. */
+typedef struct outlook {
+    double light, upper, error;
+    bool whole; /* the node faces the receiver and lies above its horizon wholly */
+} outlook;
+
+static v3 direct_vector(const double m[12], v3 p) {
+    return v3_make(m[0] * p.x + m[1] * p.y + m[2] * p.z, m[4] * p.x + m[5] * p.y + m[6] * p.z,
+                   m[8] * p.x + m[9] * p.y + m[10] * p.z);
+}
+
+static void triangle_corners(const fct_tree_view *view, uint32_t place, v3 out[3]) {
+    const uint32_t *t = view->triangles + 3 * (size_t)place;
+    for (int k = 0; k < 3; ++k) out[k] = v3_load(view->positions + 3 * (size_t)t[k]);
+}
+
+/* Shrinks the corners to the quarter triangles that the digits of `part` name, the leading 1 aside. */
+static void part_corners(uint32_t part, v3 p[3]) {
+    int shift = 0;
+    while (part >> (shift + 2)) shift += 2;
+    for (shift -= 2; shift >= 0; shift -= 2) {
+        v3 m[3];
+        for (int k = 0; k < 3; ++k) m[k] = v3_scale(v3_add(p[k], p[k == 2 ? 0 : k + 1]), .5);
+        uint32_t digit = part >> shift & 3;
+        if (digit == 3) {
+            memcpy(p, m, sizeof m);
+            continue;
+        }
+        v3 q[3] = {digit == 0   ? p[0]
+                   : digit == 1 ? m[0]
+                                : m[2],
+                   digit == 0   ? m[0]
+                   : digit == 1 ? p[1]
+                                : m[1],
+                   digit == 0   ? m[2]
+                   : digit == 1 ? m[1]
+                                : p[2]};
+        memcpy(p, q, sizeof q);
+    }
+}
+
+/* Which side of the surface the receiver sees: 1 front, -1 back, 0 both or unknown. `spread`: sine of the
+ * angle within which directions to the node vary; `w` towards the node. */
+static int cluster_side(const fct_cluster *c, v3 w, double spread) {
+    v3 s = v3_load(c->area_vector);
+    double length = v3_norm(s);
+    if (!(c->cone_angle < 1.6) || length == 0 || spread > .9) return 0;
+    /* sin(margin) <= margin: a little wide, and no arc cosine */
+    double cosine = -v3_dot(s, w) / length, margin = c->cone_angle + 1.25 * spread;
+    return cosine > margin ? 1 : cosine < -margin ? -1 : 0;
+}
+
+/* The mean of max(0, c) for cosines spread evenly over c +- s. */
+static double clipped_mean(double c, double s) {
+    return c >= s ? c : c <= -s ? 0 : (c + s) * (c + s) / (4 * s);
+}
+
+static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
+    v3 middle = v3_sub(v3_load(c->box_center), rec->x), d = v3_sub(v3_load(c->centroid), rec->x);
+    double half2 = v3_norm2(v3_load(c->box_half)), shift2 = v3_norm2(v3_sub(d, middle));
+    double radius = sqrt(half2) + sqrt(shift2), r2 = v3_norm2(d), height = v3_dot(d, rec->n);
+    if (height <= -radius) return (outlook){0};
+    double r = sqrt(r2), floor2 = r2 > radius * radius ? r2 : radius * radius;
+    double spread = radius < r ? radius / r : 1, cosx = r > 0 ? height / r : 0;
+    v3 w = r > 0 ? v3_scale(d, 1 / r) : rec->n;
+    int side = cluster_side(c, w, spread);
+    if (side < 0 && !lamp->two_sided) return (outlook){0};
+    double toward = -v3_dot(v3_load(c->area_vector), w), kernel = 1 / (FCT_PI * floor2);
+    double cross =
+        sqrt((double)c->area * fmax(0, sym3_form((double[6]){c->moment[0], c->moment[1], c->moment[2],
+                                                             c->moment[3], c->moment[4], c->moment[5]},
+                                                 w, w)));
+    double upper = lamp->two_sided ? cross : .5 * (cross + toward);
+    double lower = lamp->two_sided ? fabs(toward) : fmax(0, toward);
+    if (upper < lower) upper = lower;
+    double top = fmin(1, cosx + spread) * kernel, bottom = fmax(0, cosx - spread) * kernel;
+    /* Directions turn by up to asin(spread) over the node, and what is edge-on here faces x there. */
+    double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
+    if (side && cosx >= spread && spread < .5) {
+        double light = fabs(toward) * cosx * kernel, cosy = fmax(.05, fabs(toward) / c->area);
+        double rms = sqrt(half2 / 3 + shift2) / r, bend = fmin(c->cone_angle, 1);
+        double error = rms * rms * (1 / fmax(.05, cosx) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
+        return (outlook){light, widest * top, light * error, true};
+    }
+    double light = (.5 * (lower + upper)) * clipped_mean(cosx, spread) * kernel;
+    return (outlook){light, widest * top, BOUND_ERROR * (widest * top - (side ? lower * bottom : 0)), false};
+}
+
+/* The mean of (n.y) (s.y) / |y|^4 over a surface about y = d over its value at d, to second order, less 1.
+ * The covariance is given as three axes: sum_k axis_k axis_k^T. */
+static double kernel_correction(v3 d, v3 n, v3 s, const v3 axes[3]) {
+    double a = v3_dot(n, d), b = v3_dot(s, d), r2 = v3_norm2(d), sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        double na = v3_dot(n, axes[k]), sa = v3_dot(s, axes[k]), da = v3_dot(d, axes[k]) / r2;
+        sum += na * sa / (a * b) - 4 * da * (sa / b + na / a) - 2 * v3_norm2(axes[k]) / r2 + 12 * da * da;
+    }
+    return sum;
+}
+
+/* The same for a cluster taken as a flat plate that fills its box. */
+static double cluster_correction(const fct_receiver *rec, const fct_cluster *c) {
+    fct_box box;
+    v3 axes[3];
+    fct_cluster_box(c, &box);
+    for (int k = 0; k < 3; ++k) axes[k] = v3_scale(v3_load(box.axes[k]), box.half[k] * sqrt(PLATE_VARIANCE));
+    return kernel_correction(v3_sub(v3_load(c->centroid), rec->x), rec->n, v3_load(c->area_vector), axes);
+}
+
+/* A triangle: exact, or the far formula. Corners relative to x. */
+static double triangle_light(const fct_lamp *lamp, const fct_receiver *rec, const v3 p[3], bool *near) {
+    v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), e = v3_sub(p[2], p[1]);
+    double length = v3_norm(cross), height = -v3_dot(cross, p[0]);
+    *near = false;
+    if (length == 0 || fabs(height) <= rec->slack * length || (height < 0 && !lamp->two_sided)) return 0;
+    v3 d = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
+    double size2 = v3_norm2(v3_sub(p[1], p[0])) + v3_norm2(v3_sub(p[2], p[0])) + v3_norm2(e),
+           r2 = v3_norm2(d);
+    double r = sqrt(r2), cosx = v3_dot(d, rec->n) / r, cosy = fabs(height) / (length * r);
+    double low = fmin(v3_dot(p[0], rec->n), fmin(v3_dot(p[1], rec->n), v3_dot(p[2], rec->n)));
+    if (low > 0 && size2 / 36 * (cosx + cosy) < RELATIVE_ERROR * r2 * cosx * cosy) {
+        v3 axes[3] = {v3_scale(v3_sub(p[1], p[0]), 1. / 6), v3_scale(v3_sub(p[2], p[0]), 1. / 6),
+                      v3_scale(e, 1. / 6)};
+        return .5 * length * cosx * cosy / (FCT_PI * r2) * (1 + kernel_correction(d, rec->n, cross, axes));
+    }
+    *near = size2 > r2;
+    return fct_triangle_irradiance(p, rec->n);
+}
+
+static bool cut_add(fct_cut *cut, uint32_t node, uint32_t part, double light) {
+    cut->light += light;
+    if (cut->count < FCT_CUT_SIZE) {
+        if (light > 0) cut->items[cut->count++] = (fct_cut_item){node, part, light};
+        return true;
+    }
+    cut->items[FCT_CUT_SIZE - 1].light += light;
+    return false;
+}
+
+/* Adds a leaf, in quarters where it is large beside its distance and bright. */
+static bool cut_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double reference,
+                     fct_cut *cut) {
+    uint32_t parts[32], count = 1;
+    bool fits = true;
+    parts[0] = 1;
+    v3 whole[3];
+    triangle_corners(&lamp->view, node - lamp->view.node_count, whole);
+    for (int k = 0; k < 3; ++k) whole[k] = v3_sub(whole[k], rec->x);
+    while (count) {
+        uint32_t part = parts[--count];
+        v3 p[3] = {whole[0], whole[1], whole[2]};
+        bool near;
+        part_corners(part, p);
+        double light = triangle_light(lamp, rec, p, &near);
+        if (near && part < MAX_PART && light > .05 * reference && cut->count + 32 < FCT_CUT_SIZE)
+            for (uint32_t digit = 4; digit-- > 0;) parts[count++] = part << 2 | digit;
+        else
+            fits = cut_add(cut, node, part, light) && fits;
+    }
+    return fits;
+}
+
+/* Cuts the trees below `node` so that errors stay below `share`; false when there were too many nodes. */
+static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
+                     double reference, fct_cut *cut) {
+    uint32_t stack[STACK_SIZE], depth = 1;
+    bool fits = true;
+    stack[0] = node;
+    while (depth) {
+        node = stack[--depth];
+        if (node >= lamp->view.node_count) {
+            fits = cut_leaf(lamp, rec, node, reference, cut) && fits;
+            continue;
+        }
+        const fct_cluster *c = lamp->view.clusters + node;
+        outlook o = cluster_outlook(lamp, rec, c);
+        if (o.upper <= 0) continue;
+        bool full = depth + 2 > STACK_SIZE || cut->count + depth + 1 > FCT_CUT_SIZE;
+        if (full || o.error <= share || o.error <= RELATIVE_ERROR * o.light) {
+            if (o.whole) o.light *= 1 + fmin(fmax(cluster_correction(rec, c), -.1), .1);
+            fits = cut_add(cut, node, 1, o.light) && !full && fits;
+        } else {
+            stack[depth++] = c->child[1];
+            stack[depth++] = c->child[0];
+        }
+    }
+    return fits;
+}
+
+static double table_light(const double *table, v3 w) {
+    double a[3] = {w.x, w.y, w.z};
+    int axis = fabs(a[0]) >= fabs(a[1])   ? (fabs(a[0]) >= fabs(a[2]) ? 0 : 2)
+               : fabs(a[1]) >= fabs(a[2]) ? 1
+                                          : 2;
+    double s = 1 / fabs(a[axis]);
+    double u = (a[(axis + 1) % 3] * s + 1) * (FCT_LAMP_CELLS / 2.),
+           v = (a[(axis + 2) % 3] * s + 1) * (FCT_LAMP_CELLS / 2.);
+    int i = (int)u < FCT_LAMP_CELLS ? (int)u : FCT_LAMP_CELLS - 1;
+    int j = (int)v < FCT_LAMP_CELLS ? (int)v : FCT_LAMP_CELLS - 1;
+    const double *t =
+        table + ((2 * axis + (a[axis] < 0)) * (FCT_LAMP_CELLS + 1) + j) * (FCT_LAMP_CELLS + 1) + i;
+    double x = u - i, y = v - j;
+    return ((t[0] * (1 - x) + t[1] * x) * (1 - y) +
+            (t[FCT_LAMP_CELLS + 1] * (1 - x) + t[FCT_LAMP_CELLS + 2] * x) * y) /
+           s;
+}
+
+/* The whole lamp from afar; false where it is too near or cut by the horizon. */
+static bool far_light(const fct_lamp *lamp, const fct_receiver *rec, double *light) {
+    v3 d = v3_sub(lamp->center, rec->x);
+    double r2 = v3_norm2(d), height = v3_dot(d, rec->n);
+    *light = 0;
+    if (height <= -lamp->radius) return true;
+    if (!lamp->table || height < lamp->radius) return false;
+    double r = sqrt(r2), cosx = height / r;
+    if (lamp->rms2 * (1 + 1 / cosx) > FAR_ERROR * r2) return false;
+    *light = table_light(lamp->table, v3_scale(d, -1 / r)) * cosx / (FCT_PI * r2);
+    return true;
+}
+
+double fct_lamp_estimate(const fct_lamp *lamp, const fct_receiver *rec) {
+    v3 d = v3_sub(lamp->center, rec->x);
+    double r2 = v3_norm2(d), height = v3_dot(d, rec->n), radius = lamp->radius;
+    if (height <= -radius) return 0;
+    double toward = -v3_dot(lamp->vector, d);
+    /* A plane's front lights one side of it alone, whatever the distance. */
+    if (!lamp->table && !lamp->two_sided && toward <= -2e-3 * radius * lamp->area) return 0;
+    if (r2 < .25 * radius * radius) return 1;
+    /* As of a disk of the projected area that faces the receiver: A / (A + pi r^2). */
+    double r = sqrt(r2), cosx = fmin(1, (height + radius) / r);
+    double area = lamp->table ? table_light(lamp->table, v3_scale(d, -1 / r)) : fabs(toward) / r;
+    area += .1 * lamp->area * fmin(1, radius / r);
+    return area * cosx / (area + FCT_PI * r2);
+}
+
+void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
+    const fct_tree_view *view = &lamp->view;
+    double light, reference = fct_lamp_estimate(lamp, rec), share = SHARE_ERROR;
+    cut->count = 0, cut->light = 0;
+    if (view->root_count == 1 && far_light(lamp, rec, &light)) {
+        if (light > 0) cut_add(cut, view->roots[0], 1, light);
+        return;
+    }
+    for (int round = 0; round < 8 && reference > 0; ++round) {
+        bool fits = true;
+        cut->count = 0, cut->light = 0;
+        for (uint32_t i = 0; i < view->root_count; ++i)
+            fits = cut_tree(lamp, rec, view->roots[i], share * reference, reference, cut) && fits;
+        if (!fits) share *= 4;
+        if (fits && cut->light >= .3 * reference) break;
+        if (fits) reference = cut->light < .2 * reference ? .2 * reference : cut->light;
+    }
+}
+
+/* A cluster's projected area, its area vector's or at least a tenth of it all, times the most that its place
+ * lets through. */
+static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
+    v3 d = v3_sub(v3_load(c->centroid), rec->x), half = v3_load(c->box_half);
+    double radius = half.x + half.y + half.z, r2 = v3_norm2(d) + radius * radius;
+    double top = v3_dot(d, rec->n) + radius;
+    if (top <= 0) return 0;
+    double r = sqrt(r2), toward = -v3_dot(v3_load(c->area_vector), d);
+    double seen = lamp->two_sided ? fabs(toward) : fmax(toward, 0);
+    return (seen + .1 * c->area * r) * fmin(top, r) / (r2 * r2);
+}
+
+/* How much of the light below an inner node comes through one of its children, roughly; positive unless
+ * nothing does. */
+static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node) {
+    if (node < lamp->view.node_count) return cluster_weight(lamp, rec, lamp->view.clusters + node);
+    v3 p[3];
+    triangle_corners(&lamp->view, node - lamp->view.node_count, p);
+    for (int k = 0; k < 3; ++k) p[k] = v3_sub(p[k], rec->x);
+    v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+    double length = v3_norm(cross), height = -v3_dot(cross, p[0]);
+    if (length == 0 || (height <= 0 && !lamp->two_sided)) return 0;
+    v3 d = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
+    double size2 = .5 * length, r2 = v3_norm2(d) + size2, top = -INFINITY;
+    for (int k = 0; k < 3; ++k) top = fmax(top, v3_dot(p[k], rec->n));
+    return top > 0 ? .5 * fabs(height) * (top + .1 * sqrt(size2)) / (FCT_PI * r2 * r2) : 0;
+}
+
+/* Goes down to a leaf by the children's weights, reusing *u; *chance is multiplied by the probability.
+ * FCT_NONE where nothing is to be had. */
+static uint32_t descend(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double *u,
+                        double *chance) {
+    while (node < lamp->view.node_count) {
+        const uint32_t *child = lamp->view.clusters[node].child;
+        double left = node_weight(lamp, rec, child[0]), right = node_weight(lamp, rec, child[1]);
+        if (!(left + right > 0)) return FCT_NONE;
+        double p = left / (left + right);
+        if (*u < p) {
+            node = child[0], *u /= p, *chance *= p;
+        } else {
+            node = child[1], *u = (*u - p) / (1 - p), *chance *= 1 - p;
+        }
+        if (*u >= 1) *u = 0x1.fffffffffffffp-1;
+    }
+    return node;
+}
+
+static uint32_t choose_item(const fct_cut *cut, double *u, double *chance) {
+    double target = *u * cut->light, sum = 0;
+    uint32_t i = 0;
+    while (i + 1 < cut->count && sum + cut->items[i].light <= target) sum += cut->items[i++].light;
+    *u = (target - sum) / cut->items[i].light;
+    if (*u >= 1) *u = 0x1.fffffffffffffp-1;
+    *chance = cut->items[i].light / cut->light;
+    return i;
+}
+
+fct_lamp_point fct_cut_point(const fct_lamp *lamp, const fct_receiver *rec, const fct_cut *cut, double u,
+                             double v) {
+    fct_lamp_point out = {.place = FCT_NONE};
+    if (cut->count == 0) return out;
+    double chance;
+    uint32_t i = choose_item(cut, &u, &chance);
+    uint32_t leaf = descend(lamp, rec, cut->items[i].node, &u, &chance);
+    if (leaf == FCT_NONE) return out;
+    out.place = leaf - lamp->view.node_count;
+    v3 p[3];
+    triangle_corners(&lamp->view, out.place, p);
+    part_corners(cut->items[i].part, p);
+    /* u has been spent on the choice of the triangle: v, fresh, runs along the triangle, from the corner
+     * across its shortest side. */
+    double b[2], sides[3];
+    for (int k = 0; k < 3; ++k) sides[k] = v3_norm2(v3_sub(p[(k + 2) % 3], p[(k + 1) % 3]));
+    int tip = sides[0] <= sides[1] && sides[0] <= sides[2] ? 0 : sides[1] <= sides[2] ? 1 : 2;
+    v3 e1 = v3_sub(p[(tip + 1) % 3], p[tip]), e2 = v3_sub(p[(tip + 2) % 3], p[tip]), cross = v3_cross(e1, e2);
+    fct_triangle_point(v, u, b);
+    out.y = v3_mad(v3_mad(p[tip], b[0], e1), b[1], e2);
+    v3 d = v3_sub(out.y, rec->x);
+    double r2 = v3_norm2(d), height = v3_dot(d, rec->n), toward = -v3_dot(cross, d);
+    if (lamp->two_sided) toward = fabs(toward);
+    if (height > 0 && toward > rec->slack * v3_norm(cross))
+        out.weight = .5 * toward * height / (FCT_PI * r2 * r2 * chance);
+    return out;
+}
+
+fct_receiver fct_lamp_receiver(const fct_lamp *lamp, const double point[3], const double normal[3]) {
+    v3 x = v3_make(point[0], point[1], point[2]);
+    fct_receiver rec = {.slack = lamp->rounding};
+    double largest = fmax(fabs(x.x), fmax(fabs(x.y), fabs(x.z)));
+    rec.slack += 4e-7 * largest / lamp->scale;
+    const double *m = lamp->to_model;
+    rec.x = v3_add(direct_vector(m, x), v3_make(m[3], m[7], m[11]));
+    rec.n = v3_unit(direct_vector(m, v3_make(normal[0], normal[1], normal[2])));
+    return rec;
+}
+
+/* What the table needs of a cluster. */
+typedef struct facet {
+    v3 vector;
+    double area, moment[6];
+} facet;
+
+typedef struct table_work {
+    const fct_lamp *lamp;
+    const facet *facets;
+    uint32_t count;
+} table_work;
+
+/* Projected area of the lamp's clusters in one direction of the cube. */
+static void table_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const table_work *work = user;
+    const int side = FCT_LAMP_CELLS + 1;
+    for (size_t k = begin; k < end; ++k) {
+        int face = (int)k / (side * side), j = (int)k / side % side, i = (int)k % side, axis = face / 2;
+        double d[3], sum = 0;
+        d[axis] = face & 1 ? -1 : 1;
+        d[(axis + 1) % 3] = 2. * i / FCT_LAMP_CELLS - 1;
+        d[(axis + 2) % 3] = 2. * j / FCT_LAMP_CELLS - 1;
+        v3 w = v3_make(d[0], d[1], d[2]);
+        for (uint32_t n = 0; n < work->count; ++n) {
+            const facet *f = work->facets + n;
+            double toward = v3_dot(f->vector, w), cross = sqrt(fmax(0, sym3_form(f->moment, w, w)) * f->area);
+            double upper = work->lamp->two_sided ? cross : fmax(0, .5 * (cross + toward));
+            double lower = work->lamp->two_sided ? fabs(toward) : fmax(0, toward);
+            sum += .5 * (lower + upper);
+        }
+        work->lamp->table[k] = sum;
+    }
+}
+
+static fct_result make_table(const fct_env *env, fct_lamp *lamp) {
+    fct_result result = FCT_OK;
+    uint32_t count = lamp->view.face_count < TABLE_CLUSTERS ? lamp->view.face_count : TABLE_CLUSTERS;
+    if (count < lamp->view.root_count) count = lamp->view.root_count;
+    uint32_t *nodes = fct_allocate(env, count, sizeof *nodes);
+    facet *facets = fct_allocate(env, count, sizeof *facets);
+    lamp->table = fct_allocate(env, FCT_LAMP_TABLE, sizeof *lamp->table);
+    if (!nodes || !facets || !lamp->table) {
+        result = fct_fail_memory(env, "a lamp's projected areas");
+        goto done;
+    }
+    table_work work = {.lamp = lamp, .facets = facets};
+    result = fct_tree_partition(env, lamp->tree, count, nodes, &work.count);
+    if (result != FCT_OK) goto done;
+    for (uint32_t i = 0; i < work.count; ++i) {
+        fct_cluster c;
+        fct_tree_cluster(lamp->tree, nodes[i], &c);
+        facets[i] = (facet){.vector = v3_load(c.area_vector), .area = c.area};
+        for (int k = 0; k < 6; ++k) facets[i].moment[k] = c.moment[k];
+    }
+    fct_parallel_for(env, FCT_LAMP_TABLE, 8, table_body, &work);
+done:
+    fct_release(env, nodes);
+    fct_release(env, facets);
+    return result;
+}
+
+/* Sums over the roots. */
+static void measure(fct_lamp *lamp) {
+    double area = 0, largest = 0;
+    v3 center = {0, 0, 0}, vector = {0, 0, 0};
+    fct_cluster c;
+    for (uint32_t i = 0; i < lamp->view.root_count; ++i) {
+        fct_tree_cluster(lamp->tree, lamp->view.roots[i], &c);
+        area += c.area;
+        center = v3_mad(center, c.area, v3_load(c.centroid));
+        vector = v3_add(vector, v3_load(c.area_vector));
+    }
+    lamp->area = area;
+    lamp->vector = vector;
+    lamp->center = area > 0 ? v3_scale(center, 1 / area) : center;
+    for (uint32_t i = 0; i < lamp->view.root_count; ++i) {
+        fct_tree_cluster(lamp->tree, lamp->view.roots[i], &c);
+        v3 middle = v3_load(c.box_center);
+        double half2 = v3_norm2(v3_load(c.box_half)), away2 = v3_norm2(v3_sub(middle, lamp->center));
+        lamp->radius = fmax(lamp->radius, sqrt(half2) + sqrt(away2));
+        lamp->rms2 += area > 0 ? c.area / area * (half2 / 3 + away2) : 0;
+        largest = fmax(largest, v3_norm(middle) + sqrt(half2));
+    }
+    lamp->rounding = 4e-7 * largest;
+    const double *t = lamp->to_world;
+    lamp->rounding += 4e-7 * fmax(fabs(t[3]), fmax(fabs(t[7]), fabs(t[11]))) / lamp->scale;
+}
+
+/* A tree of the lamp as it stands in the world. */
+static fct_result make_own_tree(const fct_env *env, const fct_instance *placed, fct_lamp *lamp) {
+    fct_mesh mesh;
+    fct_result result = fct_tree_mesh(env, lamp->tree, &mesh);
+    if (result != FCT_OK) return result;
+    for (size_t v = 0; v < mesh.vertex_count; ++v) {
+        float *p = mesh.positions + 3 * v;
+        v3_store(p, fct_transform_point(placed->to_world, v3_load(p)));
+    }
+    for (size_t f = 0; placed->mirrored && f < mesh.face_count; ++f) {
+        uint32_t *t = mesh.triangles + 3 * f, swap = t[1];
+        t[1] = t[2], t[2] = swap;
+    }
+    fct_tree_def def = fct_tree_def_default();
+    result = fct_tree_build(env, &mesh, &def, NULL, &lamp->own);
+    fct_mesh_release(env, &mesh);
+    lamp->tree = lamp->own;
+    return result;
+}
+
+fct_result fct_lamp_init(const fct_env *env, const fct_scene_view *scene, uint32_t instance, fct_lamp *out) {
+    const fct_instance *placed = scene->instances + instance;
+    const fct_material *material = scene->materials + placed->material;
+    fct_result result = FCT_OK;
+    *out = (fct_lamp){.instance = instance,
+                      .two_sided = material->two_sided,
+                      .tree = scene->models[placed->model].tree,
+                      .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                      .to_model = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                      .scale = 1};
+    for (int k = 0; k < 3; ++k) out->strength += out->emission[k] = material->emission[k];
+    if (placed->uniform_scale > 0) {
+        fct_instance unused;
+        for (int k = 0; k < 12; ++k) out->to_world[k] = placed->to_world[k];
+        fct_transform_set(placed->to_world, &unused, out->to_model);
+        out->scale = placed->uniform_scale;
+    } else {
+        result = make_own_tree(env, placed, out);
+    }
+    if (result != FCT_OK) return result;
+    out->view = fct_tree_get(out->tree);
+    measure(out);
+    bool planar = v3_norm(out->vector) > (1 - 1e-6) * out->area;
+    if (!planar && out->area > 0) result = make_table(env, out);
+    if (result != FCT_OK) fct_lamp_release(env, out);
+    return result;
+}
+
+void fct_lamp_release(const fct_env *env, fct_lamp *lamp) {
+    fct_tree_destroy(lamp->own);
+    fct_release(env, lamp->table);
+    *lamp = (fct_lamp){0};
+}

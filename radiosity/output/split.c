@@ -1,0 +1,185 @@
+/* radiosity/output/split.c: see split.h. Hash tables with linear probing; their layout depends on ids and
+ * positions alone, and nothing depends on their layout. */
+#include "radiosity/output/split.h"
+
+#include "base/math/vec.h"
+#include "radiosity/sample.h"
+
+#include <string.h>
+
+#define NO_EDGE UINT64_MAX
+
+static size_t table_size(size_t count) {
+    size_t size = 16;
+    while (size < 2 * count) size *= 2;
+    return size;
+}
+
+fct_result fct_edge_table_init(const fct_env *env, size_t count, fct_edge_table *out) {
+    size_t size = table_size(count);
+    out->mask = size - 1;
+    out->keys = fct_allocate(env, size, sizeof *out->keys);
+    out->values = fct_allocate(env, size, sizeof *out->values);
+    if (!out->keys || !out->values) {
+        fct_edge_table_release(env, out);
+        return fct_fail_memory(env, "a table of edges");
+    }
+    memset(out->keys, 0xff, size * sizeof *out->keys);
+    return FCT_OK;
+}
+
+void fct_edge_table_release(const fct_env *env, fct_edge_table *table) {
+    fct_release(env, table->keys);
+    fct_release(env, table->values);
+    *table = (fct_edge_table){0};
+}
+
+static uint64_t edge_key(uint32_t a, uint32_t b) {
+    return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+}
+
+static size_t edge_slot(const fct_edge_table *table, uint64_t key) {
+    size_t slot = fct_hash(key) & table->mask;
+    while (table->keys[slot] != key && table->keys[slot] != NO_EDGE) slot = (slot + 1) & table->mask;
+    return slot;
+}
+
+uint32_t *fct_edge_table_insert(fct_edge_table *table, uint32_t a, uint32_t b, bool *fresh) {
+    uint64_t key = edge_key(a, b);
+    size_t slot = edge_slot(table, key);
+    *fresh = table->keys[slot] == NO_EDGE;
+    table->keys[slot] = key;
+    return table->values + slot;
+}
+
+const uint32_t *fct_edge_table_find(const fct_edge_table *table, uint32_t a, uint32_t b) {
+    uint64_t key = edge_key(a, b);
+    size_t slot = edge_slot(table, key);
+    return table->keys[slot] == key ? table->values + slot : NULL;
+}
+
+static double distance2(const float *positions, uint32_t a, uint32_t b) {
+    return v3_norm2(v3_sub(v3_load(positions + 3 * (size_t)a), v3_load(positions + 3 * (size_t)b)));
+}
+
+/* Whether the diagonal from corner a to the middle of bc is shorter than the one from c to the middle of ab.
+ */
+static bool first_diagonal(const float *positions, uint32_t a, uint32_t b, uint32_t c) {
+    /* Squared medians: (2 ab + 2 ca - bc) / 4 against (2 ca + 2 bc - ab) / 4. */
+    return distance2(positions, a, b) <= distance2(positions, b, c);
+}
+
+static uint32_t *emit(uint32_t *out, uint32_t a, uint32_t b, uint32_t c) {
+    out[0] = a, out[1] = b, out[2] = c;
+    return out + 3;
+}
+
+/* The parts of one triangle with corners t and new vertices m on its edges; returns how many. */
+static uint32_t split_face(const float *positions, const uint32_t t[3], const uint32_t m[3], unsigned mark,
+                           uint32_t *out) {
+    int edges = __builtin_popcount(mark), turn = 0;
+    if (edges == 0) return emit(out, t[0], t[1], t[2]), 1;
+    if (edges == 3) {
+        out = emit(out, t[0], m[0], m[2]);
+        out = emit(out, m[0], t[1], m[1]);
+        out = emit(out, m[2], m[1], t[2]);
+        return emit(out, m[0], m[1], m[2]), 4;
+    }
+    /* Turn it so that edge 0, or edges 0 and 1, are those that are split. */
+    unsigned wanted = edges == 1 ? 1 : 3;
+    while (((mark >> turn | mark << (3 - turn)) & 7) != wanted) ++turn;
+    uint32_t a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
+    uint32_t ab = m[turn], bc = m[(turn + 1) % 3];
+    if (edges == 1) {
+        out = emit(out, a, ab, c);
+        return emit(out, ab, b, c), 2;
+    }
+    out = emit(out, ab, b, bc);
+    if (first_diagonal(positions, a, b, c)) {
+        out = emit(out, a, ab, bc);
+        return emit(out, a, bc, c), 3;
+    }
+    out = emit(out, a, ab, c);
+    return emit(out, ab, bc, c), 3;
+}
+
+fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const float *positions,
+                           uint32_t face_count, const uint32_t *triangles, const uint8_t *marks,
+                           fct_split *out) {
+    size_t marked = 0;
+    fct_edge_table table = {0};
+    *out = (fct_split){0};
+    for (size_t f = 0; f < face_count; ++f) marked += (size_t)__builtin_popcount(marks[f] & 7u);
+    size_t faces = face_count + marked;
+    if (faces > FCT_SPLIT_MAX_FACES || vertex_count + marked > FCT_SPLIT_MAX_FACES)
+        return fct_fail(env, FCT_ERROR_MEMORY, "splitting %u triangles makes more than 2^31", face_count);
+    fct_result result = fct_edge_table_init(env, marked, &table);
+    if (result != FCT_OK) return result;
+    out->triangles = fct_allocate(env, faces, 3 * sizeof *out->triangles);
+    out->parents = fct_allocate(env, faces, sizeof *out->parents);
+    out->ends = fct_allocate(env, marked, 2 * sizeof *out->ends);
+    if (!out->triangles || !out->parents || !out->ends) {
+        result = fct_fail_memory(env, "split triangles");
+        goto done;
+    }
+    for (uint32_t f = 0; f < face_count; ++f) {
+        const uint32_t *t = triangles + 3 * (size_t)f;
+        uint32_t m[3] = {0, 0, 0};
+        for (int k = 0; k < 3; ++k) {
+            if (!(marks[f] >> k & 1)) continue;
+            bool fresh;
+            uint32_t a = t[k], b = t[k == 2 ? 0 : k + 1],
+                     *value = fct_edge_table_insert(&table, a, b, &fresh);
+            if (fresh) {
+                *value = out->vertex_count++;
+                out->ends[2 * (size_t)*value] = a, out->ends[2 * (size_t)*value + 1] = b;
+            }
+            m[k] = vertex_count + *value;
+        }
+        uint32_t parts =
+            split_face(positions, t, m, marks[f] & 7u, out->triangles + 3 * (size_t)out->face_count);
+        while (parts--) out->parents[out->face_count++] = f;
+    }
+done:
+    fct_edge_table_release(env, &table);
+    if (result != FCT_OK) fct_split_release(env, out);
+    return result;
+}
+
+void fct_split_release(const fct_env *env, fct_split *split) {
+    fct_release(env, split->triangles);
+    fct_release(env, split->parents);
+    fct_release(env, split->ends);
+    *split = (fct_split){0};
+}
+
+static uint64_t position_hash(const float *p, uint32_t bits[3]) {
+    for (int k = 0; k < 3; ++k) {
+        float value = p[k] == 0 ? 0 : p[k];
+        memcpy(bits + k, &value, sizeof value);
+    }
+    return fct_hash2((uint64_t)bits[0] << 32 | bits[1], bits[2]);
+}
+
+fct_result fct_weld(const fct_env *env, uint32_t vertex_count, const float *positions, uint32_t *first) {
+    size_t size = table_size(vertex_count), mask = size - 1;
+    uint32_t *slots = fct_allocate(env, size, sizeof *slots);
+    if (!slots) return fct_fail_memory(env, "a table of vertices");
+    memset(slots, 0xff, size * sizeof *slots);
+    for (uint32_t v = 0; v < vertex_count; ++v) {
+        const float *p = positions + 3 * (size_t)v;
+        uint32_t bits[3];
+        size_t slot = position_hash(p, bits) & mask;
+        for (;; slot = (slot + 1) & mask) {
+            if (slots[slot] == FCT_NONE) {
+                slots[slot] = v;
+                break;
+            }
+            const float *q = positions + 3 * (size_t)slots[slot];
+            if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) break;
+        }
+        first[v] = slots[slot];
+    }
+    fct_release(env, slots);
+    return FCT_OK;
+}

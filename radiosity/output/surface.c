@@ -1,0 +1,273 @@
+/* radiosity/output/surface.c: tessellation: which edges are too long, and rounds of splits until none is.
+ *
+ * Whether an edge is split depends on its end points and the scene alone, so both its faces, and coinciding
+ * edges of unwelded meshes, agree. Sizes are graded: on open ground up to max_edge, and near another instance
+ * as long as the distance to it, down to max_edge / 4: light changes fastest where surfaces meet. Nearness is
+ * judged by the oriented boxes of the other's tree, down to boxes small beside the distance.
+ */
+#include "radiosity/output/surface.h"
+
+#include "base/parallel.h"
+#include "radiosity/output/split.h"
+#include "radiosity/output/surface_vertex.h"
+#include "scene/transform.h"
+
+#include <string.h>
+
+#define DIAGONAL_EDGES 72
+#define GRADES         4
+#define STACK_SIZE     288
+#define SMALL_BOX      .35 /* of the distance asked about */
+#define GRAIN          1024
+
+/* Faces under way. */
+typedef struct cloth {
+    const fct_env *env;
+    const fct_scene *scene;
+    fct_scene_view view;
+    uint32_t instance;
+    double longest, shortest; /* edges */
+    double *shrinks;          /* per instance: world over model distance, at least */
+    uint32_t vertex_count, face_count;
+    float *positions;
+    uint32_t *triangles, *faces; /* faces: the model's */
+    uint8_t *marks;
+    uint8_t *settled; /* per face: an earlier round found nothing to split */
+} cloth;
+
+static double box_distance2(const fct_cluster *cluster, v3 p) {
+    fct_box box;
+    fct_cluster_box(cluster, &box);
+    v3 d = v3_sub(p, v3_load(box.center));
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        double out = fabs(v3_dot(d, v3_load(box.axes[k]))) - box.half[k];
+        if (out > 0) sum += out * out;
+    }
+    return sum;
+}
+
+/* Whether a tree comes within `distance` of p, both in model space, to about a third of the distance. */
+static bool tree_near(const fct_tree *tree, v3 p, double distance) {
+    fct_tree_view view = fct_tree_get(tree);
+    uint32_t stack[STACK_SIZE];
+    double d2 = distance * distance, small2 = SMALL_BOX * SMALL_BOX * d2;
+    for (uint32_t r = 0; r < view.root_count; ++r) {
+        uint32_t top = 1;
+        stack[0] = view.roots[r];
+        while (top) {
+            uint32_t node = stack[--top];
+            fct_cluster c;
+            fct_tree_cluster(tree, node, &c);
+            if (box_distance2(&c, p) > d2) continue;
+            if (node >= view.node_count || v3_norm2(v3_load(c.box_half)) < small2 || top + 2 > STACK_SIZE)
+                return true;
+            stack[top++] = c.child[1];
+            stack[top++] = c.child[0];
+        }
+    }
+    return false;
+}
+
+static bool bounds_near(const fct_bounds *bounds, const double p[3], double distance) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        double out = fmax(bounds->lower[k] - p[k], p[k] - bounds->upper[k]);
+        if (out > 0) sum += out * out;
+    }
+    return sum <= distance * distance;
+}
+
+/* Whether another instance comes within `distance` of the point. */
+static bool others_near(const cloth *c, v3 point, double distance) {
+    uint32_t stack[STACK_SIZE], top = 0;
+    const double p[3] = {point.x, point.y, point.z};
+    if (c->view.volume_count) stack[top++] = 0;
+    while (top) {
+        const fct_volume *volume = c->view.volumes + stack[--top];
+        if (volume->instance == c->instance || !bounds_near(&volume->bounds, p, distance)) continue;
+        if (volume->instance == FCT_NONE) {
+            if (top + 2 > STACK_SIZE) return true;
+            stack[top++] = volume->child[1];
+            stack[top++] = volume->child[0];
+            continue;
+        }
+        const fct_instance *other = c->view.instances + volume->instance;
+        v3 local = fct_transform_point(other->to_model, point);
+        double shrink = c->shrinks[volume->instance];
+        if (tree_near(c->view.models[other->model].tree, local, shrink > 0 ? distance / shrink : INFINITY))
+            return true;
+    }
+    return false;
+}
+
+static bool too_long(const cloth *c, uint32_t va, uint32_t vb) {
+    v3 a = v3_load(c->positions + 3 * (size_t)va), b = v3_load(c->positions + 3 * (size_t)vb);
+    double length = v3_norm(v3_sub(b, a));
+    if (!(length > c->shortest)) return false;
+    v3 middle = v3_scale(v3_add(a, b), .5);
+    float m[3];
+    v3_store(m, middle);
+    v3 rounded = v3_load(m);
+    if (v3_norm2(v3_sub(rounded, a)) == 0 || v3_norm2(v3_sub(rounded, b)) == 0) return false;
+    return length > c->longest || others_near(c, middle, length);
+}
+
+static void mark_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const cloth *c = user;
+    for (size_t f = begin; f < end; ++f) {
+        c->marks[f] = 0;
+        if (c->settled[f]) continue;
+        const uint32_t *t = c->triangles + 3 * f;
+        for (int k = 0; k < 3; ++k)
+            if (too_long(c, t[k], t[k == 2 ? 0 : k + 1])) c->marks[f] |= (uint8_t)(1 << k);
+        c->settled[f] = c->marks[f] == 0;
+    }
+}
+
+/* Extends positions by the middles of the ends. */
+static fct_result add_middles(const fct_env *env, const float *old, uint32_t old_count,
+                              const fct_split *split, float **out) {
+    float *positions = fct_allocate(env, (size_t)old_count + split->vertex_count, 3 * sizeof *positions);
+    if (!positions) return fct_fail_memory(env, "split triangles");
+    memcpy(positions, old, 3 * (size_t)old_count * sizeof *positions);
+    for (size_t i = 0; i < split->vertex_count; ++i) {
+        v3 a = v3_load(old + 3 * (size_t)split->ends[2 * i]),
+           b = v3_load(old + 3 * (size_t)split->ends[2 * i + 1]);
+        v3_store(positions + 3 * (old_count + i), v3_scale(v3_add(a, b), .5));
+    }
+    *out = positions;
+    return FCT_OK;
+}
+
+/* Replaces the cloth's faces by their parts. */
+static fct_result apply_split(cloth *c, fct_split *split) {
+    const fct_env *env = c->env;
+    float *positions = NULL;
+    uint32_t *faces = fct_allocate(env, split->face_count, sizeof *faces);
+    uint8_t *marks = fct_allocate(env, split->face_count, sizeof *marks);
+    uint8_t *settled = fct_allocate(env, split->face_count, sizeof *settled);
+    fct_result result = FCT_ERROR_MEMORY;
+    if (faces && marks && settled)
+        result = add_middles(env, c->positions, c->vertex_count, split, &positions);
+    else
+        fct_fail_memory(env, "split triangles");
+    if (result != FCT_OK) {
+        fct_release(env, faces), fct_release(env, marks), fct_release(env, settled);
+        return result;
+    }
+    for (size_t f = 0; f < split->face_count; ++f) {
+        faces[f] = c->faces[split->parents[f]];
+        settled[f] = c->settled[split->parents[f]];
+    }
+    fct_release(env, c->positions), fct_release(env, c->triangles), fct_release(env, c->faces);
+    fct_release(env, c->marks), fct_release(env, c->settled);
+    c->positions = positions, c->faces = faces, c->marks = marks, c->settled = settled;
+    c->triangles = split->triangles;
+    split->triangles = NULL;
+    c->face_count = split->face_count;
+    c->vertex_count += split->vertex_count;
+    return FCT_OK;
+}
+
+static fct_result tessellate(cloth *c) {
+    for (;;) {
+        fct_parallel_for(c->env, c->face_count, GRAIN, mark_body, c);
+        bool any = false;
+        for (size_t f = 0; f < c->face_count && !any; ++f) any = c->marks[f] != 0;
+        if (!any) return FCT_OK;
+        fct_split split;
+        fct_result result = fct_split_edges(c->env, c->vertex_count, c->positions, c->face_count,
+                                            c->triangles, c->marks, &split);
+        if (result == FCT_OK) result = apply_split(c, &split);
+        fct_split_release(c->env, &split);
+        if (result == FCT_OK) result = fct_progress(c->env, "surface", 0);
+        if (result != FCT_OK) return result;
+    }
+}
+
+/* The model in world space, in the order of its input. */
+static fct_result lay_out(cloth *c) {
+    const fct_instance *placed = c->view.instances + c->instance;
+    fct_mesh mesh;
+    fct_result result = fct_tree_mesh(c->env, c->view.models[placed->model].tree, &mesh);
+    if (result != FCT_OK) return result;
+    size_t vertices = mesh.vertex_count, faces = mesh.face_count;
+    c->positions = fct_allocate(c->env, vertices, 3 * sizeof *c->positions);
+    c->triangles = fct_allocate(c->env, faces, 3 * sizeof *c->triangles);
+    c->faces = fct_allocate(c->env, faces, sizeof *c->faces);
+    c->marks = fct_allocate(c->env, faces, sizeof *c->marks);
+    c->settled = fct_allocate_zero(c->env, faces, sizeof *c->settled);
+    c->shrinks = fct_allocate(c->env, c->view.instance_count, sizeof *c->shrinks);
+    if (!c->positions || !c->triangles || !c->faces || !c->marks || !c->settled || !c->shrinks) {
+        result = fct_fail_memory(c->env, "a surface");
+        goto done;
+    }
+    c->vertex_count = mesh.vertex_count, c->face_count = mesh.face_count;
+    for (size_t v = 0; v < 3 * vertices; v += 3)
+        v3_store(c->positions + v, fct_transform_point(placed->to_world, v3_load(mesh.positions + v)));
+    for (uint32_t f = 0; f < faces; ++f) {
+        const uint32_t *t = mesh.triangles + 3 * (size_t)f;
+        uint32_t *to = c->triangles + 3 * (size_t)f;
+        to[0] = t[0], to[1] = t[placed->mirrored ? 2 : 1], to[2] = t[placed->mirrored ? 1 : 2];
+        c->faces[f] = f;
+    }
+    for (uint32_t i = 0; i < c->view.instance_count; ++i)
+        c->shrinks[i] = fct_transform_shrink(c->view.instances + i);
+done:
+    fct_mesh_release(c->env, &mesh);
+    return result;
+}
+
+/* The numbers of the cloth's faces in the mesh as it was added and in the tree's order; then its vertices. */
+static fct_result finish(cloth *c, fct_surface *out) {
+    const fct_env *env = c->env;
+    const fct_model *model = c->view.models + c->view.instances[c->instance].model;
+    fct_tree_view tree = fct_tree_get(model->tree);
+    fct_result result = FCT_OK;
+    uint32_t *place_of = fct_allocate(env, tree.face_count, sizeof *place_of);
+    uint32_t *places = fct_allocate(env, c->face_count, sizeof *places);
+    if (!place_of || !places) {
+        result = fct_fail_memory(env, "a surface");
+        goto done;
+    }
+    for (uint32_t place = 0; place < tree.face_count; ++place) place_of[tree.face_ids[place]] = place;
+    for (size_t f = 0; f < c->face_count; ++f) {
+        places[f] = place_of[c->faces[f]];
+        if (model->source_faces) c->faces[f] = model->source_faces[c->faces[f]];
+    }
+    fct_corners mesh = {c->vertex_count, c->face_count, c->positions, c->triangles};
+    result = fct_surface_vertices(env, &mesh, c->faces, places, out);
+done:
+    fct_release(env, place_of);
+    fct_release(env, places);
+    return result;
+}
+
+double fct_surface_default_edge(const fct_scene *scene) {
+    fct_bounds b = fct_scene_get(scene).bounds;
+    return v3_norm(v3_sub(v3_load(b.upper), v3_load(b.lower))) / DIAGONAL_EDGES;
+}
+
+fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_t instance, double max_edge,
+                             fct_surface *out) {
+    double longest = max_edge > 0 ? max_edge : fct_surface_default_edge(scene);
+    cloth c = {.env = env,
+               .scene = scene,
+               .view = fct_scene_get(scene),
+               .instance = instance,
+               .longest = longest,
+               .shortest = longest / GRADES};
+    *out = (fct_surface){0};
+    fct_result result = lay_out(&c);
+    if (result == FCT_OK) result = tessellate(&c);
+    if (result == FCT_OK) result = finish(&c, out);
+    fct_release(env, c.positions);
+    fct_release(env, c.triangles);
+    fct_release(env, c.faces);
+    fct_release(env, c.marks);
+    fct_release(env, c.settled);
+    fct_release(env, c.shrinks);
+    return result;
+}

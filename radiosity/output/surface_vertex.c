@@ -1,0 +1,360 @@
+/* radiosity/output/surface_vertex.c: creases: the corners around each position fall into smooth groups, and a
+ * vertex is doubled for each group beyond its first.
+ *
+ * Two passes over the positions, each in parallel: the first sorts a position's corners by group and vertex
+ * and counts the vertices to be added, the second numbers and fills them. O(F log valence).
+ */
+#include "radiosity/output/surface_vertex.h"
+
+#include "base/parallel.h"
+#include "radiosity/output/split.h"
+
+#include <string.h>
+
+#define CREASE_COSINE .766 /* 40 degrees */
+#define GRAIN         4096
+
+/* What begins at a corner of the sorted list. */
+enum { BEGIN_VERTEX = 1, ADDED_VERTEX = 2, BEGIN_GROUP = 4, RIM_GROUP = 8 };
+
+typedef struct entry {
+    uint64_t key;
+    uint32_t value;
+} entry;
+
+typedef struct work {
+    const fct_corners *mesh;
+    uint32_t *first;   /* vertex -> lowest vertex at its position */
+    float *normals;    /* per face */
+    size_t *begin;     /* position (by lowest vertex) -> its corners in `corners`; vertex_count + 1 */
+    uint32_t *corners; /* 3 face_count */
+    uint8_t *flags;    /* likewise */
+    uint8_t *taken;    /* per vertex: its number is given away */
+    uint32_t *added;   /* per position: vertices added; then the first one's number */
+    size_t largest;    /* most corners at a position */
+    entry *entries;    /* per thread 2 x largest */
+    uint32_t *parents; /* per thread largest */
+    uint8_t *open;     /* per thread largest */
+    fct_surface *out;
+} work;
+
+static bool entry_less(const entry *a, const entry *b) {
+    return a->key < b->key || (a->key == b->key && a->value < b->value);
+}
+
+static void sift(entry *e, size_t root, size_t count) {
+    for (;;) {
+        size_t child = 2 * root + 1;
+        if (child >= count) return;
+        if (child + 1 < count && entry_less(e + child, e + child + 1)) ++child;
+        if (!entry_less(e + root, e + child)) return;
+        entry swap = e[root];
+        e[root] = e[child], e[child] = swap;
+        root = child;
+    }
+}
+
+/* Insertion for the few of a usual vertex, a heap for the many of a hub. */
+static void sort_entries(entry *e, size_t count) {
+    if (count <= 40) {
+        for (size_t i = 1; i < count; ++i) {
+            entry x = e[i];
+            size_t j = i;
+            for (; j > 0 && entry_less(&x, e + j - 1); --j) e[j] = e[j - 1];
+            e[j] = x;
+        }
+        return;
+    }
+    for (size_t i = count / 2; i-- > 0;) sift(e, i, count);
+    for (size_t i = count; i-- > 1;) {
+        entry swap = e[0];
+        e[0] = e[i], e[i] = swap;
+        sift(e, 0, i);
+    }
+}
+
+static uint32_t find(uint32_t *parents, uint32_t i) {
+    while (parents[i] != i) i = parents[i] = parents[parents[i]];
+    return i;
+}
+
+static void join(uint32_t *parents, uint32_t a, uint32_t b) {
+    a = find(parents, a), b = find(parents, b);
+    if (a < b) parents[b] = a;
+    if (b < a) parents[a] = b;
+}
+
+/* A degenerate face has no normal to differ in. */
+static bool smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
+    v3 a = v3_load(w->normals + corner_a / 3 * (size_t)3), b = v3_load(w->normals + corner_b / 3 * (size_t)3);
+    return v3_norm2(a) == 0 || v3_norm2(b) == 0 || v3_dot(a, b) > CREASE_COSINE;
+}
+
+/* Joins the corners around a position across smooth edges. open[i]: corner i has an edge that is not joined;
+ * for the lowest corner of a group: any of the group's has. */
+static void join_corners(const work *w, const uint32_t *corners, size_t count, entry *sides,
+                         uint32_t *parents, uint8_t *open) {
+    const uint32_t *t = w->mesh->triangles;
+    for (size_t i = 0; i < count; ++i) {
+        size_t face = corners[i] / 3 * (size_t)3;
+        uint32_t k = corners[i] % 3, slot = (uint32_t)i;
+        parents[i] = slot, open[i] = 2;
+        sides[2 * i] = (entry){w->first[t[face + (k + 1) % 3]], 2 * slot};
+        sides[2 * i + 1] = (entry){w->first[t[face + (k + 2) % 3]], 2 * slot + 1};
+    }
+    sort_entries(sides, 2 * count);
+    for (size_t i = 0, end; i < 2 * count; i = end) {
+        for (end = i + 1; end < 2 * count && sides[end].key == sides[i].key;) ++end;
+        uint32_t a = sides[i].value, b = sides[end - 1].value;
+        if (end - i != 2 || (a & 1) == (b & 1) || !smooth(w, corners[a / 2], corners[b / 2])) continue;
+        join(parents, a / 2, b / 2);
+        --open[a / 2], --open[b / 2];
+    }
+    for (size_t i = 0; i < count; ++i) {
+        parents[i] = find(parents, (uint32_t)i);
+        if (open[i]) open[parents[i]] = 1;
+    }
+}
+
+/* Writes what begins where among the corners of one group; a group without a direction in front of all its
+ * faces is taken apart. Returns how many vertices are to be added. */
+static uint32_t mark_group(const work *w, size_t begin, size_t end, bool rim) {
+    const uint32_t *t = w->mesh->triangles;
+    uint32_t added = 0;
+    v3 normal;
+    bool whole = fct_corner_normal(w->mesh, w->corners + begin, end - begin, &normal);
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t v = t[w->corners[i]];
+        uint8_t flag = 0;
+        if (i == begin || !whole) flag = (uint8_t)(BEGIN_GROUP | (rim || !whole ? RIM_GROUP : 0));
+        if (flag || v != t[w->corners[i - 1]]) {
+            flag |= BEGIN_VERTEX;
+            if (w->taken[v]) flag |= ADDED_VERTEX, ++added;
+            w->taken[v] = 1;
+        }
+        w->flags[i] = flag;
+    }
+    return added;
+}
+
+/* First pass: positions [begin, end). */
+static void group_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk;
+    const work *w = user;
+    entry *entries = w->entries + 2 * w->largest * thread;
+    uint32_t *parents = w->parents + w->largest * thread;
+    uint8_t *open = w->open + w->largest * thread;
+    for (size_t v = begin; v < end; ++v) {
+        size_t from = w->begin[v], count = w->begin[v + 1] - from;
+        uint32_t *corners = w->corners + from;
+        join_corners(w, corners, count, entries, parents, open);
+        for (size_t i = 0; i < count; ++i)
+            entries[i] = (entry){(uint64_t)parents[i] << 32 | w->mesh->triangles[corners[i]], corners[i]};
+        sort_entries(entries, count);
+        for (size_t i = 0; i < count; ++i) corners[i] = entries[i].value;
+        w->added[v] = 0;
+        for (size_t i = 0, next; i < count; i = next) {
+            uint64_t group = entries[i].key >> 32;
+            for (next = i + 1; next < count && entries[next].key >> 32 == group;) ++next;
+            w->added[v] += mark_group(w, from + i, from + next, open[group]);
+        }
+    }
+}
+
+static double corner_area(const fct_corners *mesh, uint32_t corner) {
+    const uint32_t *t = mesh->triangles + corner / 3 * (size_t)3;
+    v3 a = v3_load(mesh->positions + 3 * (size_t)t[0]);
+    v3 e1 = v3_sub(v3_load(mesh->positions + 3 * (size_t)t[1]), a);
+    v3 e2 = v3_sub(v3_load(mesh->positions + 3 * (size_t)t[2]), a);
+    return v3_norm(v3_cross(e1, e2)) / 6;
+}
+
+void fct_surface_place(fct_surface *surface, uint32_t v, const fct_foothold *at) {
+    v3_store(surface->normals + 3 * (size_t)v, at->normal);
+    v3_store(surface->sample_points + 3 * (size_t)v, at->sample);
+    surface->offsets[v] = (float)at->offset;
+    surface->places[v] = surface->face_places[at->face];
+    surface->flat[v] = at->flat;
+}
+
+/* Fills the vertices of one group, corners [begin, end); *next is the number for the next added one. */
+static void fill_group(const work *w, size_t begin, size_t end, uint32_t *next) {
+    const fct_corners *mesh = w->mesh;
+    v3 normal;
+    fct_corner_normal(mesh, w->corners + begin, end - begin, &normal);
+    bool rim = w->flags[begin] & RIM_GROUP;
+    fct_foothold at = fct_corner_foothold(mesh, w->corners + begin, end - begin, normal, rim);
+    uint32_t v = FCT_NONE;
+    double area = 0;
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t old = mesh->triangles[w->corners[i]];
+        if (w->flags[i] & BEGIN_VERTEX) {
+            v = w->flags[i] & ADDED_VERTEX ? (*next)++ : old;
+            memcpy(w->out->mesh.positions + 3 * (size_t)v, mesh->positions + 3 * (size_t)old,
+                   3 * sizeof(float));
+            fct_surface_place(w->out, v, &at);
+            area = 0;
+        }
+        area += corner_area(mesh, w->corners[i]);
+        w->out->areas[v] = (float)area;
+        w->out->mesh.triangles[w->corners[i]] = v;
+    }
+}
+
+/* Second pass: positions [begin, end). */
+static void fill_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const work *w = user;
+    for (size_t v = begin; v < end; ++v) {
+        uint32_t next = w->added[v];
+        for (size_t i = w->begin[v], group; i < w->begin[v + 1]; i = group) {
+            for (group = i + 1; group < w->begin[v + 1] && !(w->flags[group] & BEGIN_GROUP);) ++group;
+            fill_group(w, i, group, &next);
+        }
+    }
+}
+
+static void normal_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const work *w = user;
+    for (size_t f = begin; f < end; ++f) {
+        const uint32_t *t = w->mesh->triangles + 3 * f;
+        v3 a = v3_load(w->mesh->positions + 3 * (size_t)t[0]);
+        v3 e1 = v3_sub(v3_load(w->mesh->positions + 3 * (size_t)t[1]), a);
+        v3 e2 = v3_sub(v3_load(w->mesh->positions + 3 * (size_t)t[2]), a);
+        v3_store(w->normals + 3 * f, v3_unit(v3_cross(e1, e2)));
+    }
+}
+
+/* Lists the corners at each position, in order of face. */
+static void list_corners(work *w) {
+    const fct_corners *mesh = w->mesh;
+    size_t corners = 3 * (size_t)mesh->face_count;
+    memset(w->begin, 0, (mesh->vertex_count + (size_t)1) * sizeof *w->begin);
+    for (size_t c = 0; c < corners; ++c) ++w->begin[w->first[mesh->triangles[c]] + 1];
+    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        if (w->begin[v + 1] > w->largest) w->largest = w->begin[v + 1];
+        w->begin[v + 1] += w->begin[v];
+    }
+    /* Fill from the end, so that begin[v] moves down to where it belongs. */
+    for (size_t v = mesh->vertex_count; v > 0; --v) w->begin[v] = w->begin[v - 1];
+    for (size_t c = 0; c < corners; ++c)
+        w->corners[w->begin[w->first[mesh->triangles[c]] + 1]++] = (uint32_t)c;
+    w->begin[0] = 0;
+}
+
+static fct_result allocate_work(const fct_env *env, work *w) {
+    size_t vertices = w->mesh->vertex_count, faces = w->mesh->face_count;
+    w->first = fct_allocate(env, vertices, sizeof *w->first);
+    w->normals = fct_allocate(env, faces, 3 * sizeof *w->normals);
+    w->begin = fct_allocate(env, vertices + 1, sizeof *w->begin);
+    w->corners = fct_allocate(env, faces, 3 * sizeof *w->corners);
+    w->flags = fct_allocate(env, faces, 3 * sizeof *w->flags);
+    w->taken = fct_allocate_zero(env, vertices, sizeof *w->taken);
+    w->added = fct_allocate(env, vertices, sizeof *w->added);
+    if (!w->first || !w->normals || !w->begin || !w->corners || !w->flags || !w->taken || !w->added)
+        return fct_fail_memory(env, "the vertices of a surface");
+    return FCT_OK;
+}
+
+static fct_result allocate_scratch(const fct_env *env, work *w) {
+    size_t threads = fct_env_threads(env);
+    w->entries = fct_allocate(env, threads * w->largest, 2 * sizeof *w->entries);
+    w->parents = fct_allocate(env, threads * w->largest, sizeof *w->parents);
+    w->open = fct_allocate(env, threads * w->largest, sizeof *w->open);
+    if (!w->entries || !w->parents || !w->open) return fct_fail_memory(env, "the vertices of a surface");
+    return FCT_OK;
+}
+
+static void release_work(const fct_env *env, work *w) {
+    fct_release(env, w->first);
+    fct_release(env, w->normals);
+    fct_release(env, w->begin);
+    fct_release(env, w->corners);
+    fct_release(env, w->flags);
+    fct_release(env, w->taken);
+    fct_release(env, w->added);
+    fct_release(env, w->entries);
+    fct_release(env, w->parents);
+    fct_release(env, w->open);
+}
+
+fct_result fct_surface_allocate(const fct_env *env, uint32_t vertex_count, uint32_t face_count,
+                                fct_surface *out) {
+    *out = (fct_surface){0};
+    fct_result result =
+        fct_mesh_create(env, vertex_count, face_count, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, &out->mesh);
+    if (result != FCT_OK) return result;
+    size_t vertices = vertex_count;
+    out->normals = fct_allocate_zero(env, vertices, 3 * sizeof *out->normals);
+    out->sample_points = fct_allocate_zero(env, vertices, 3 * sizeof *out->sample_points);
+    out->offsets = fct_allocate_zero(env, vertices, sizeof *out->offsets);
+    out->areas = fct_allocate_zero(env, vertices, sizeof *out->areas);
+    out->places = fct_allocate(env, vertices, sizeof *out->places);
+    out->flat = fct_allocate_zero(env, vertices, sizeof *out->flat);
+    out->face_places = fct_allocate(env, face_count, sizeof *out->face_places);
+    if (!out->normals || !out->sample_points || !out->offsets || !out->areas || !out->places || !out->flat ||
+        !out->face_places) {
+        fct_surface_release(env, out);
+        return fct_fail_memory(env, "a surface");
+    }
+    memset(out->places, 0xff, vertices * sizeof *out->places);
+    return FCT_OK;
+}
+
+void fct_surface_release(const fct_env *env, fct_surface *surface) {
+    fct_mesh_release(env, &surface->mesh);
+    fct_release(env, surface->normals);
+    fct_release(env, surface->sample_points);
+    fct_release(env, surface->offsets);
+    fct_release(env, surface->areas);
+    fct_release(env, surface->places);
+    fct_release(env, surface->flat);
+    fct_release(env, surface->face_places);
+    *surface = (fct_surface){0};
+}
+
+/* Allocates *out for the vertices there are and those added, whose numbers follow in order of position. */
+static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_faces,
+                            const uint32_t *face_places) {
+    uint64_t total = w->mesh->vertex_count;
+    for (size_t v = 0; v < w->mesh->vertex_count; ++v) {
+        uint32_t added = w->added[v];
+        w->added[v] = (uint32_t)total;
+        total += added;
+    }
+    if (total > FCT_SPLIT_MAX_FACES)
+        return fct_fail(env, FCT_ERROR_MEMORY, "a surface has too many vertices");
+    fct_result result = fct_surface_allocate(env, (uint32_t)total, w->mesh->face_count, w->out);
+    if (result != FCT_OK) return result;
+    size_t faces = w->mesh->face_count, vertices = w->mesh->vertex_count;
+    memcpy(w->out->mesh.source_faces, source_faces, faces * sizeof *source_faces);
+    memcpy(w->out->face_places, face_places, faces * sizeof *face_places);
+    memcpy(w->out->mesh.positions, w->mesh->positions, 3 * vertices * sizeof(float));
+    memcpy(w->out->sample_points, w->mesh->positions, 3 * vertices * sizeof(float));
+    return FCT_OK;
+}
+
+fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, const uint32_t *source_faces,
+                                const uint32_t *face_places, fct_surface *out) {
+    *out = (fct_surface){0};
+    if (mesh->face_count > UINT32_MAX / 3)
+        return fct_fail(env, FCT_ERROR_MEMORY, "a surface of %u triangles has too many corners",
+                        mesh->face_count);
+    work w = {.mesh = mesh, .out = out};
+    fct_result result = allocate_work(env, &w);
+    if (result != FCT_OK) goto done;
+    result = fct_weld(env, mesh->vertex_count, mesh->positions, w.first);
+    if (result != FCT_OK) goto done;
+    fct_parallel_for(env, mesh->face_count, GRAIN, normal_body, &w);
+    list_corners(&w);
+    result = allocate_scratch(env, &w);
+    if (result != FCT_OK) goto done;
+    fct_parallel_for(env, mesh->vertex_count, GRAIN, group_body, &w);
+    result = make_room(env, &w, source_faces, face_places);
+    if (result != FCT_OK) goto done;
+    fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_body, &w);
+done:
+    release_work(env, &w);
+    return result;
+}

@@ -1,0 +1,240 @@
+/* tools/kit/main.c: one subcommand from its arguments to its exit code. argp reads the options and is kept
+ * silent, so that what it cannot parse is told in one line here. */
+#define _GNU_SOURCE
+#include "tools/kit/tool.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { KEY_JSON = 256, KEY_PROGRESS, KEY_THREADS, KEY_SEED, KEY_MAX_MEMORY, KEY_USAGE, KEY_MAN };
+
+static const struct argp_option common_options[] = {
+    {"output", 'o', "FILE", 0, "Write to FILE; - is standard output", 0},
+    {NULL, 0, NULL, 0, "Common to all commands:", -2},
+    {"json", KEY_JSON, NULL, 0, "Print one JSON object on standard output and nothing else there", -2},
+    {"progress", KEY_PROGRESS, NULL, 0, "Show progress on standard error even where that is no terminal", -2},
+    {"quiet", 'q', NULL, 0, "Say nothing but errors", -2},
+    {"threads", KEY_THREADS, "N", 0, "Use N threads (default: all cores); results do not depend on it", -2},
+    {"seed", KEY_SEED, "N", 0, "Seed of whatever is sampled (default 0)", -2},
+    {"max-memory", KEY_MAX_MEMORY, "SIZE", 0, "Stop with exit code 75 rather than use more; 500M, 2G", -2},
+    {"help", 'h', NULL, 0, "Print this help", -1},
+    {"usage", KEY_USAGE, NULL, OPTION_HIDDEN, NULL, -1},
+    {"man", KEY_MAN, NULL, OPTION_HIDDEN, NULL, -1},
+    {0}};
+
+typedef struct arguments {
+    tool *tool;
+    const tool_command *command;
+    void *options;
+    int action; /* 'h', KEY_USAGE, KEY_MAN, or 0 to run */
+    int next;   /* the word after the one that could not be parsed */
+} arguments;
+
+static bool takes_output(const tool_command *command) {
+    return command->output != TOOL_OUTPUT_UNUSED;
+}
+
+static error_t parse_positional(arguments *a, char *text, struct argp_state *state) {
+    if (a->tool->input_count >= a->command->inputs_max)
+        return tool_usage(state, "'%s' is one argument too many", text);
+    a->tool->inputs[a->tool->input_count++] = text;
+    return 0;
+}
+
+static error_t check_arguments(const arguments *a, struct argp_state *state) {
+    const tool *t = a->tool;
+    if (a->action) return 0;
+    if (t->input_count < a->command->inputs_min)
+        return tool_usage(state, "expected %s %s, found %d argument%s", a->command->name,
+                          a->command->synopsis, t->input_count, t->input_count == 1 ? "" : "s");
+    if (a->command->output == TOOL_OUTPUT_REQUIRED && !t->output)
+        return tool_usage(state, "expected -o FILE, found none");
+    if (t->json && t->output && !strcmp(t->output, "-"))
+        return tool_usage(state, "--json and -o - both want standard output");
+    return 0;
+}
+
+static error_t parse_common(int key, char *text, struct argp_state *state) {
+    arguments *a = state->input;
+    tool *t = a->tool;
+    size_t bytes;
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = a->options;
+        return 0;
+    case 'o':
+        if (!*text) return tool_usage(state, "-o: expected a file name, found nothing");
+        t->output = text;
+        return 0;
+    case 'q':
+        t->quiet = true;
+        return 0;
+    case KEY_JSON:
+        t->json = true;
+        return 0;
+    case KEY_PROGRESS:
+        t->progress = true;
+        return 0;
+    case KEY_THREADS:
+        return tool_parse_count32(state, "--threads", text, 1, 256, &t->threads);
+    case KEY_SEED:
+        return tool_parse_count(state, "--seed", text, 0, UINT64_MAX, &t->seed);
+    case KEY_MAX_MEMORY:
+        if (!tool_size(text, &bytes) || !bytes)
+            return tool_usage(state, "--max-memory: expected a size such as 500M, found '%s'", text);
+        t->max_memory = bytes;
+        return 0;
+    case 'h':
+    case KEY_USAGE:
+    case KEY_MAN:
+        if (!a->action) a->action = key;
+        return 0;
+    case ARGP_KEY_ARG:
+        return parse_positional(a, text, state);
+    case ARGP_KEY_END:
+        return check_arguments(a, state);
+    case ARGP_KEY_ERROR:
+        a->next = state->next;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* --- What argp could not parse --- */
+
+typedef struct lookup {
+    const struct argp_option *exact;
+    int prefixes;
+    const struct argp_option *prefix;
+} lookup;
+
+static void look_up(lookup *found, const struct argp_option *options, const char *name, size_t length) {
+    for (; options && (options->name || options->key || options->doc); ++options) {
+        if (!options->name || strncmp(options->name, name, length) != 0) continue;
+        if (!options->name[length]) found->exact = options;
+        found->prefix = options, ++found->prefixes;
+    }
+}
+
+/* Adds the visible long names to names; returns how many there are then. */
+static int long_names(const struct argp_option *options, const char **names, int count, int most) {
+    for (; options && (options->name || options->key || options->doc); ++options)
+        if (options->name && !(options->flags & OPTION_HIDDEN) && count + 1 < most)
+            names[count++] = options->name;
+    names[count] = NULL;
+    return count;
+}
+
+static void say_bad_long(const tool_command *command, const char *token) {
+    const char *name = token + 2, *equals = strchr(name, '=');
+    size_t length = equals ? (size_t)(equals - name) : strlen(name);
+    lookup found = {0};
+    look_up(&found, command->options, name, length);
+    look_up(&found, common_options, name, length);
+    const struct argp_option *option = found.exact ? found.exact : found.prefixes == 1 ? found.prefix : NULL;
+    if (option && equals) {
+        fprintf(stderr, "facetree %s: --%s takes no value\n", command->name, option->name);
+    } else if (option) {
+        fprintf(stderr, "facetree %s: --%s: expected a value (%s), found none\n", command->name, option->name,
+                option->arg ? option->arg : "");
+    } else if (found.prefixes > 1) {
+        fprintf(stderr, "facetree %s: '%.*s' could be several options\n", command->name, (int)length + 2,
+                token);
+    } else {
+        const char *names[64];
+        char word[64];
+        snprintf(word, sizeof word, "%.*s", (int)length, name);
+        long_names(common_options, names, long_names(command->options, names, 0, 64), 64);
+        const char *nearest = tool_nearest(word, names);
+        fprintf(stderr, "facetree %s: unknown option '%.*s'%s%s%s\n", command->name, (int)length + 2, token,
+                nearest ? "; did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "");
+    }
+}
+
+static bool has_letter(const struct argp_option *options, int letter) {
+    for (; options && (options->name || options->key || options->doc); ++options)
+        if (options->key == letter) return true;
+    return false;
+}
+
+static void say_bad_option(const tool_command *command, int next, int argc, char **argv) {
+    /* getopt has passed a long option, or a letter at its word's end; else it stands on the word. */
+    const char *token = next > 1 && next <= argc ? argv[next - 1] : "";
+    if (token[0] == '-' && token[1] == '-') {
+        say_bad_long(command, token);
+        return;
+    }
+    if (token[0] != '-' && next < argc) token = argv[next];
+    for (const char *c = token + (*token == '-'); *c; ++c) {
+        if (!has_letter(command->options, *c) && !has_letter(common_options, *c)) {
+            fprintf(stderr, "facetree %s: unknown option '-%c'\n", command->name, *c);
+            return;
+        }
+    }
+    fprintf(stderr, "facetree %s: %s: expected a value, found none\n", command->name, token);
+}
+
+/* --- Help --- */
+
+/* Summary, then the options, then the text, as argp lays them out. Returns memory to free, or NULL. */
+static char *help_text(const tool_command *command) {
+    const char *text = command->text ? command->text : "";
+    size_t size = strlen(command->summary) + strlen(text) + 4;
+    char *doc = malloc(size);
+    if (doc) snprintf(doc, size, "%s\n\v%s", command->summary, text);
+    if (doc) doc[0] = (char)toupper((unsigned char)doc[0]);
+    return doc;
+}
+
+static int act(const tool_command *command, const struct argp *argp, int action) {
+    char name[64];
+    snprintf(name, sizeof name, "facetree %s", command->name);
+    setenv("ARGP_HELP_FMT", "no-dup-args-note", 0);
+    if (action == KEY_MAN)
+        tool_print_man(command, common_options);
+    else
+        argp_help(argp, stdout,
+                  action == 'h' ? ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC : ARGP_HELP_USAGE,
+                  name);
+    return fflush(stdout) || ferror(stdout) ? TOOL_OUTPUT : TOOL_DONE;
+}
+
+static int run(tool *t, const tool_command *command, void *options) {
+    tool_env_open(t);
+    int code = TOOL_DONE;
+    if (t->output && !command->output_folder) code = tool_check_output(t, t->output);
+    if (code == TOOL_DONE) code = command->run(t, options);
+    if (fflush(stdout) || ferror(stdout))
+        code = tool_fail(t, TOOL_OUTPUT, "standard output cannot be written");
+    return tool_env_close(t, code);
+}
+
+int tool_main(const tool_command *command, int argc, char **argv, void *options) {
+    tool t = {.name = command->name, .start = tool_seconds()};
+    arguments a = {.tool = &t, .command = command, .options = options};
+    const struct argp own = {.options = command->options, .parser = command->parse};
+    const struct argp_child children[] = {{&own, 0, NULL, 0}, {0}};
+    char *doc = help_text(command);
+    t.inputs = malloc(((size_t)argc + 1) * sizeof *t.inputs);
+    int code = TOOL_MEMORY;
+    if (!doc || !t.inputs) {
+        fprintf(stderr, "facetree %s: out of memory\n", command->name);
+        goto done;
+    }
+    /* The option -o is shown where the command has it. */
+    const struct argp argp = {.options = takes_output(command) ? common_options : common_options + 1,
+                              .parser = parse_common,
+                              .args_doc = command->synopsis,
+                              .doc = doc,
+                              .children = children};
+    error_t error = argp_parse(&argp, argc, argv, ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &a);
+    if (error && error != ECANCELED) say_bad_option(command, a.next, argc, argv);
+    code = error ? TOOL_USAGE : a.action ? act(command, &argp, a.action) : run(&t, command, options);
+done:
+    free(doc);
+    free(t.inputs);
+    return code;
+}

@@ -1,0 +1,109 @@
+/* tools/kit/rows.c: rows of numbers in a text file: rays, points, probes. Every mistake is told with file,
+ * line, what was expected and what was found. Cost: one pass over the file's text. */
+#define _GNU_SOURCE
+#include "tools/kit/tool.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The word at `text`, cut for a message. */
+static const char *word_at(const char *text, char word[40]) {
+    size_t length = strcspn(text, " \t\r\n,;#");
+    if (length > 32)
+        snprintf(word, 40, "%.29s...", text);
+    else
+        snprintf(word, 40, "%.*s", (int)length, text);
+    return word;
+}
+
+typedef struct reader {
+    tool *t;
+    const char *path;
+    size_t line;
+    int least, columns;
+    const float *missing;
+} reader;
+
+/* Numbers of one line into `row`; *found is how many there are. */
+static int parse_line(const reader *r, const char *text, float *row, int *found) {
+    char word[40];
+    *found = 0;
+    for (;;) {
+        text += strspn(text, " \t\r\n\v\f");
+        if (!*text || *text == '#') break;
+        char *end;
+        float value = strtof(text, &end);
+        if (end == text || !strchr(" \t\r\n\v\f#", *end))
+            return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number, found '%s'", r->path, r->line,
+                             word_at(text, word));
+        bool must_be_finite = *found < r->least || isnan(value);
+        bool written_infinite = strncasecmp(text + strspn(text, "+-"), "inf", 3) == 0;
+        if (!isfinite(value) && (must_be_finite || !written_infinite))
+            return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a finite number, found '%s'", r->path,
+                             r->line, word_at(text, word));
+        if (*found == r->columns)
+            return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers at most, found more: '%s'",
+                             r->path, r->line, r->columns, word_at(text, word));
+        row[(*found)++] = value;
+        text = end;
+    }
+    if (*found && *found < r->least)
+        return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers, found %d", r->path, r->line, r->least,
+                         *found);
+    for (int i = *found; *found && i < r->columns; ++i) row[i] = r->missing[i - r->least];
+    return TOOL_DONE;
+}
+
+static int make_room(tool *t, tool_rows *rows, size_t *capacity, int columns) {
+    if (rows->count < *capacity) return TOOL_DONE;
+    size_t larger = *capacity ? *capacity + *capacity / 2 : 1024;
+    float *values = tool_allocate(t, larger, (size_t)columns * sizeof *values);
+    if (!values) return TOOL_MEMORY;
+    if (rows->values) memcpy(values, rows->values, rows->count * (size_t)columns * sizeof *values);
+    tool_release(t, rows->values);
+    rows->values = values;
+    *capacity = larger;
+    return TOOL_DONE;
+}
+
+static int read_rows(reader *r, FILE *file, tool_rows *rows) {
+    char *text = NULL;
+    size_t size = 0, capacity = 0;
+    int code = TOOL_DONE, found;
+    ssize_t length;
+    errno = 0;
+    while (code == TOOL_DONE && (length = getline(&text, &size, file)) >= 0) {
+        ++r->line;
+        if (memchr(text, 0, (size_t)length)) {
+            code = tool_fail(r->t, TOOL_DATA, "%s:%zu: expected text, found a zero byte", r->path, r->line);
+            break;
+        }
+        code = make_room(r->t, rows, &capacity, r->columns);
+        if (code == TOOL_DONE)
+            code = parse_line(r, text, rows->values + rows->count * (size_t)r->columns, &found);
+        if (code == TOOL_DONE && found) ++rows->count;
+    }
+    if (code == TOOL_DONE && (ferror(file) || !feof(file)))
+        code = tool_fail(r->t, TOOL_INPUT, "%s: cannot be read: %s", r->path, strerror(errno));
+    free(text);
+    return code;
+}
+
+int tool_rows_read(tool *t, const char *path, int least, int columns, const float *missing, tool_rows *rows) {
+    *rows = (tool_rows){0};
+    bool standard = !strcmp(path, "-");
+    FILE *file = standard ? stdin : fopen(path, "re");
+    if (!file) return tool_fail(t, TOOL_INPUT, "%s: cannot be read: %s", path, strerror(errno));
+    reader r = {t, standard ? "standard input" : path, 0, least, columns, missing};
+    int code = read_rows(&r, file, rows);
+    if (!standard) fclose(file);
+    if (code != TOOL_DONE) tool_rows_release(t, rows);
+    return code;
+}
+
+void tool_rows_release(tool *t, tool_rows *rows) {
+    tool_release(t, rows->values);
+    *rows = (tool_rows){0};
+}
