@@ -53,6 +53,36 @@ void fct_release(const fct_env *env, void *memory) {
     if (memory) (env->release ? env->release : default_release)(env->memory_user, memory);
 }
 
+/* memcpy, because the pointers in the table have the types of their elements. */
+static void set_pointer(const fct_array *array, void *memory) {
+    memcpy(array->pointer, &memory, sizeof memory);
+}
+
+void fct_release_all(const fct_env *env, const fct_array *arrays, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        void *memory;
+        memcpy(&memory, arrays[i].pointer, sizeof memory);
+        fct_release(env, memory);
+        set_pointer(arrays + i, NULL);
+    }
+}
+
+fct_result fct_allocate_all(const fct_env *env, const fct_array *arrays, size_t count, const char *what) {
+    bool complete = true;
+    for (size_t i = 0; i < count; ++i) {
+        const fct_array *a = arrays + i;
+        void *memory = NULL;
+        if (complete)
+            memory =
+                a->zero ? fct_allocate_zero(env, a->count, a->size) : fct_allocate(env, a->count, a->size);
+        complete = complete && memory;
+        set_pointer(a, memory);
+    }
+    if (complete) return FCT_OK;
+    fct_release_all(env, arrays, count);
+    return fct_fail_memory(env, what);
+}
+
 fct_result fct_grow(const fct_env *env, void **array, size_t *capacity, size_t needed, size_t size) {
     if (needed <= *capacity) return FCT_OK;
     size_t larger = *capacity + *capacity / 2 + 64;

@@ -11,6 +11,24 @@ void *fct_allocate_zero(const fct_env *env, size_t count, size_t size);
 /* NULL is allowed. */
 void fct_release(const fct_env *env, void *memory);
 
+/* One array of a group: where its pointer is stored, its length, and the size of an element. */
+typedef struct fct_array {
+    void *pointer; /* address of the pointer */
+    size_t count, size;
+    bool zero;
+} fct_array;
+#define FCT_ARRAY(pointer, count)                                                                            \
+    { &(pointer), (count), sizeof *(pointer), false }
+#define FCT_ARRAY_ZERO(pointer, count)                                                                       \
+    { &(pointer), (count), sizeof *(pointer), true }
+#define FCT_LENGTH(array) (sizeof(array) / sizeof *(array))
+
+/* Allocates all arrays of the table. On failure it releases them, sets every pointer to NULL and fails with
+ * fct_fail_memory(env, what). */
+fct_result fct_allocate_all(const fct_env *env, const fct_array *arrays, size_t count, const char *what);
+/* Releases all arrays of the table and sets every pointer to NULL. NULL pointers are allowed. */
+void fct_release_all(const fct_env *env, const fct_array *arrays, size_t count);
+
 /* Grows *array (capacity *capacity elements) to hold at least `needed`, by half at least; contents are kept.
  */
 fct_result fct_grow(const fct_env *env, void **array, size_t *capacity, size_t needed, size_t size);

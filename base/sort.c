@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/sift.h"
 
 enum { DIGITS = 256, GRAIN = 1 << 16, SMALL = 48 };
 
@@ -111,6 +112,40 @@ done:
     fct_release(env, p.places);
     fct_release(env, p.differing);
     return result;
+}
+
+typedef struct pairs {
+    uint64_t *keys;
+    uint32_t *values;
+} pairs;
+
+static bool less_pairs(const void *items, size_t i, size_t j) {
+    const pairs *p = items;
+    return p->keys[i] != p->keys[j] ? p->keys[i] < p->keys[j] : p->values[i] < p->values[j];
+}
+
+static void swap_pairs(void *items, size_t i, size_t j) {
+    const pairs *p = items;
+    uint64_t key = p->keys[i];
+    uint32_t value = p->values[i];
+    p->keys[i] = p->keys[j], p->values[i] = p->values[j];
+    p->keys[j] = key, p->values[j] = value;
+}
+
+void fct_sort_in_place(uint64_t *keys, uint32_t *values, size_t count) {
+    pairs p = {keys, values};
+    if (count > SMALL) {
+        fct_sift_sort(&p, count, less_pairs, swap_pairs);
+        return;
+    }
+    for (size_t i = 1; i < count; ++i) {
+        uint64_t key = keys[i];
+        uint32_t value = values[i];
+        size_t j = i;
+        for (; j > 0 && (keys[j - 1] > key || (keys[j - 1] == key && values[j - 1] > value)); --j)
+            keys[j] = keys[j - 1], values[j] = values[j - 1];
+        keys[j] = key, values[j] = value;
+    }
 }
 
 fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count) {

@@ -11,13 +11,8 @@ fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, 
 /* Sorts items by their upper 32 bits, equal ones in the order given. As fct_sort_pairs, 8 bytes an item. */
 fct_result fct_sort_items(const fct_env *env, uint64_t *items, size_t count);
 
-/* The order of floats as unsigned integers: a < b in value is key(a) < key(b); -0 sorts below +0. */
-static inline uint32_t fct_float_key(float value) {
-    union {
-        float f;
-        uint32_t u;
-    } bits = {value};
-    return bits.u & 0x80000000u ? ~bits.u : bits.u | 0x80000000u;
-}
+/* Sorts count pairs by (key, value) in place, without memory and on the calling thread. O(count log count).
+ */
+void fct_sort_in_place(uint64_t *keys, uint32_t *values, size_t count);
 
 #endif

@@ -62,6 +62,32 @@ static void growth_keeps_contents(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
+static void groups_are_allocated_whole_or_not_at_all(void **state) {
+    (void)state;
+    for (long fail_at = 0; fail_at <= 3; ++fail_at) {
+        recorder r = {.fail_at = fail_at};
+        fct_env env = recorder_env(&r);
+        double *numbers;
+        uint8_t *flags;
+        uint32_t(*pairs)[2];
+        const fct_array arrays[] = {FCT_ARRAY(numbers, 100), FCT_ARRAY_ZERO(flags, 1000),
+                                    FCT_ARRAY(pairs, 7)};
+        assert_int_equal(fct_allocate_all(&env, arrays, FCT_LENGTH(arrays), "a group"),
+                         fail_at ? FCT_ERROR_MEMORY : FCT_OK);
+        assert_int_equal(r.alive, fail_at ? 0 : 3);
+        if (fail_at) {
+            assert_true(!numbers && !flags && !pairs);
+            assert_string_equal(r.text, "out of memory for a group");
+        } else {
+            memset(numbers, 0xAB, 100 * sizeof *numbers); /* a sanitizer sees when it is short */
+            memset(pairs, 0xAB, 7 * sizeof *pairs);
+            for (int i = 0; i < 1000; ++i) assert_int_equal(flags[i], 0);
+        }
+        fct_release_all(&env, arrays, FCT_LENGTH(arrays));
+        assert_true(r.alive == 0 && !numbers && !flags && !pairs);
+    }
+}
+
 typedef struct heard {
     int count;
     fct_severity severity;
@@ -134,6 +160,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(sizes_that_do_not_fit_are_refused),
                                        cmocka_unit_test(memory_is_aligned_and_wide_enough),
                                        cmocka_unit_test(growth_keeps_contents),
+                                       cmocka_unit_test(groups_are_allocated_whole_or_not_at_all),
                                        cmocka_unit_test(failures_are_told_once),
                                        cmocka_unit_test(progress_may_cancel),
                                        cmocka_unit_test(threads_are_at_least_one)};
