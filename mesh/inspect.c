@@ -9,31 +9,12 @@
 #include <math.h>
 
 #include "base/env.h"
+#include "base/key.h"
 #include "base/math/vec.h"
 #include "base/parallel.h"
 #include "base/sort.h"
+#include "base/union_find.h"
 #include "facetree/mesh.h"
-
-static uint32_t find(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    return i;
-}
-
-/* The smaller id becomes the root. */
-static void join(uint32_t *parent, uint32_t a, uint32_t b) {
-    a = find(parent, a), b = find(parent, b);
-    if (a < b)
-        parent[b] = a;
-    else
-        parent[a] = b;
-}
-
-static void fill_identity(uint32_t *parent, size_t count) {
-    for (size_t i = 0; i < count; ++i) parent[i] = (uint32_t)i;
-}
 
 typedef struct sides {
     const fct_mesh *mesh;
@@ -47,7 +28,7 @@ static void fill_sides(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (size_t f = begin; f < end; ++f)
         for (uint32_t j = 0; j < 3; ++j) {
             uint32_t a = s->mesh->triangles[3 * f + j], b = s->mesh->triangles[3 * f + (j + 1) % 3];
-            s->keys[3 * f + j] = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+            s->keys[3 * f + j] = fct_pair_key(a, b);
             s->values[3 * f + j] = (uint32_t)(3 * f + j);
         }
 }
@@ -70,10 +51,10 @@ static void look_at_edge(const sides *s, size_t begin, size_t end, unions *u, fc
     for (size_t i = begin + 1; i < end; ++i) {
         uint32_t side = s->values[i], face = side / 3;
         bool along = t[side] == t[first];
-        join(u->corners, along ? first : side_end(first), side);
-        join(u->corners, along ? side_end(first) : first, side_end(side));
+        fct_sets_join(u->corners, along ? first : side_end(first), side);
+        fct_sets_join(u->corners, along ? side_end(first) : first, side_end(side));
         if (face == before) continue;
-        join(u->faces, before, face);
+        fct_sets_join(u->faces, before, face);
         same_direction += along;
         before = face;
         ++faces;
@@ -85,7 +66,7 @@ static void look_at_edge(const sides *s, size_t begin, size_t end, unions *u, fc
     ++report->boundary_edges;
     uint32_t a = t[first], b = t[side_end(first)];
     u->on_boundary[a] = u->on_boundary[b] = 1;
-    join(u->loops, a, b);
+    fct_sets_join(u->loops, a, b);
 }
 
 static void count_edges(const sides *s, unions *u, fct_mesh_report *report) {
@@ -97,7 +78,7 @@ static void count_edges(const sides *s, unions *u, fct_mesh_report *report) {
     }
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) report->components += u->faces[f] == f;
     for (uint32_t v = 0; v < s->mesh->vertex_count; ++v)
-        report->boundary_loops += u->on_boundary[v] && find(u->loops, v) == v;
+        report->boundary_loops += u->on_boundary[v] && fct_sets_find(u->loops, v) == v;
 }
 
 /* A vertex is manifold when all corners at it have been joined into one. `seen` is V of scratch. */
@@ -109,10 +90,10 @@ static void count_vertices(const fct_mesh *mesh, unions *u, uint32_t *seen, fct_
         /* Repeated corners of a degenerate face are one corner. */
         size_t face = c - c % 3;
         for (size_t d = face; d < c; ++d)
-            if (mesh->triangles[d] == mesh->triangles[c]) join(u->corners, (uint32_t)d, (uint32_t)c);
+            if (mesh->triangles[d] == mesh->triangles[c]) fct_sets_join(u->corners, (uint32_t)d, (uint32_t)c);
     }
     for (size_t c = 0; c < corners; ++c) {
-        uint32_t *place = seen + mesh->triangles[c], root = find(u->corners, (uint32_t)c);
+        uint32_t *place = seen + mesh->triangles[c], root = fct_sets_find(u->corners, (uint32_t)c);
         *place = *place == FCT_NONE || *place == root ? root : (uint32_t)MANY;
     }
     for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
@@ -194,9 +175,9 @@ fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fct_mesh_r
         goto done;
     }
     measure(mesh, &found);
-    fill_identity(u.corners, corners);
-    fill_identity(u.faces, mesh->face_count);
-    fill_identity(u.loops, vertices);
+    fct_sets_create(u.corners, corners);
+    fct_sets_create(u.faces, mesh->face_count);
+    fct_sets_create(u.loops, vertices);
     fct_parallel_for(env, mesh->face_count, 16384, fill_sides, &s);
     result = fct_sort_pairs(env, s.keys, s.values, corners);
     if (result == FCT_OK) result = fct_progress(env, "inspect", .5);
