@@ -7,7 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/key.h"
 #include "base/sort.h"
+#include "base/union_find.h"
 #include "cluster/large/large.h"
 #include "cluster/merge/work.h"
 
@@ -83,24 +85,18 @@ fct_result fct_large_join(const fct_env *env, const fct_metric *metric, const fc
 
 /* --- Edges --- */
 
-static uint32_t root_of(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) i = parents[i] = parents[parents[i]];
-    return i;
-}
-
 /* Adds up edges between the same tops; tops of clusters that were joined without an edge keep none. */
 static fct_result read_edges(upper *u, const fct_top_edge *from, uint32_t count, uint64_t *keys,
                              uint32_t *order, uint32_t *parents) {
     fct_work *work = &u->work;
     const fct_top *tops = u->large->all_tops;
     uint32_t listed = 0;
-    for (uint32_t i = 0; i < work->face_count; ++i) parents[i] = i;
+    fct_sets_create(parents, work->face_count);
     for (uint32_t e = 0; e < count; ++e) {
         uint32_t a = from[e].a, b = from[e].b;
-        uint32_t p = root_of(parents, a), q = root_of(parents, b);
-        parents[p > q ? p : q] = p < q ? p : q;
+        fct_sets_join(parents, a, b);
         if (tops[a].phase == 2 || tops[b].phase == 2) continue;
-        keys[listed] = (uint64_t)(a < b ? a : b) << 32 | (a < b ? b : a);
+        keys[listed] = fct_pair_key(a, b);
         order[listed++] = e;
     }
     uint32_t components = u->large->loose_joins;

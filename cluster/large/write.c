@@ -9,7 +9,9 @@
  */
 #include <string.h>
 
+#include "base/key.h"
 #include "base/parallel.h"
+#include "base/sift.h"
 #include "base/sort.h"
 #include "cluster/file/file.h"
 #include "cluster/large/large.h"
@@ -58,13 +60,6 @@ static uint32_t phase_at(const assembler *a, uint32_t list, uint32_t node) {
     return node < counts[2] ? 2 : node < counts[2] + counts[1] ? 1 : 0;
 }
 
-static float cost_of_key(uint32_t key) {
-    uint32_t bits = key & 0x80000000u ? key ^ 0x80000000u : ~key;
-    float cost;
-    memcpy(&cost, &bits, sizeof cost);
-    return cost;
-}
-
 /* The next head of a list, or key 0: none is left. */
 static head next_of(assembler *a, uint32_t list) {
     uint32_t node = a->cursors[list];
@@ -72,18 +67,14 @@ static head next_of(assembler *a, uint32_t list) {
     return (head){(uint64_t)(phase_at(a, list, node) + 1) << 32 | a->ranks[a->bases[list] + node], list};
 }
 
-static bool before(head x, head y) {
-    return x.key != y.key ? x.key > y.key : x.list > y.list;
+static bool less_heads(const void *heads, size_t i, size_t j) {
+    const head *x = (const head *)heads + i, *y = (const head *)heads + j;
+    return x->key != y->key ? x->key < y->key : x->list < y->list;
 }
 
-static void sift(head *heap, uint32_t count, uint32_t i) {
-    head moving = heap[i];
-    for (uint32_t child; (child = 2 * i + 1) < count; i = child) {
-        if (child + 1 < count && before(heap[child + 1], heap[child])) ++child;
-        if (!before(heap[child], moving)) break;
-        heap[i] = heap[child];
-    }
-    heap[i] = moving;
+static void swap_heads(void *heads, size_t i, size_t j) {
+    head *x = (head *)heads + i, *y = (head *)heads + j, moving = *x;
+    *x = *y, *y = moving;
 }
 
 /* Lower bounds of later phases: the highest cost of those before. */
@@ -92,7 +83,7 @@ static void find_floors(assembler *a) {
     for (uint32_t list = 0; list < a->list_count; ++list)
         for (uint32_t node = 0, size = list_size(a, list); node < size;) {
             uint32_t phase = phase_at(a, list, node), begin = node;
-            float cost = cost_of_key(a->ranks[a->bases[list] + node]);
+            float cost = fct_float_of_key(a->ranks[a->bases[list] + node]);
             for (uint32_t p = phase + 1; p < 3; ++p)
                 if (cost > a->floors[p]) a->floors[p] = cost;
             const fct_large *l = a->large;
@@ -110,14 +101,14 @@ static fct_result merge_lists(assembler *a, head *heap) {
     const fct_tree_def *def = a->large->def;
     uint32_t count = a->list_count, wanted = def->root_count > 1 ? def->root_count : 1;
     for (uint32_t i = 0; i < count; ++i) heap[i] = next_of(a, i);
-    for (uint32_t i = count / 2; i-- > 0;) sift(heap, count, i);
+    fct_sift_all(heap, count, less_heads, swap_heads);
     for (uint32_t number = 0; heap[0].key != 0; ++number) {
         uint32_t list = heap[0].list, phase = (uint32_t)(heap[0].key >> 32) - 1;
-        double cost = (double)final_cost(a, phase, cost_of_key((uint32_t)heap[0].key));
+        double cost = (double)final_cost(a, phase, fct_float_of_key((uint32_t)heap[0].key));
         if (a->dropped == number && (number + 1 < wanted || cost > def->max_cost)) ++a->dropped;
         a->ranks[a->bases[list] + a->cursors[list]++] = number;
         heap[0] = next_of(a, list);
-        sift(heap, count, 0);
+        fct_sift_down(heap, 0, count, less_heads, swap_heads);
         if (number % (1 << 20) == 0) {
             fct_result result =
                 fct_progress(a->large->env, "order", number / (a->large->info.face_count + 1.0));

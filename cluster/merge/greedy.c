@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/heap.h"
+#include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "cluster/merge/work.h"

@@ -13,6 +13,7 @@
 
 #include <string.h>
 
+#include "base/key.h"
 #include "base/math/simd.h"
 #include "base/parallel.h"
 #include "base/sort.h"
@@ -60,13 +61,6 @@ static inline void offer(const fct_rounds *r, _Atomic uint64_t *least, uint32_t 
     uint64_t value = (uint64_t)key << 32 | tie_of(r, a, b);
     lower_to(r, &least[a], value);
     lower_to(r, &least[b], value);
-}
-
-static float cost_of_key(uint32_t key) {
-    uint32_t bits = key & 0x80000000u ? key & 0x7FFFFFFFu : ~key;
-    float cost;
-    memcpy(&cost, &bits, sizeof cost);
-    return cost;
 }
 
 /* --- Costs --- */
@@ -225,7 +219,7 @@ static void find_mates(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (uint32_t i = (uint32_t)begin; i < end; ++i) {
         uint64_t own = least_of(least, i);
         uint32_t other = best_of(round, i, own);
-        float cost = cost_of_key((uint32_t)(own >> 32)), more = cost * patience;
+        float cost = fct_float_of_key((uint32_t)(own >> 32)), more = cost * patience;
         uint32_t limit = fct_float_key(more > cost ? more : cost) | SIZE_BITS;
         bool mutual = (other != i) & (least_of(least, other) == own), done = mutual | (other == i);
         if (frozen && (frozen[slots[i]] || frozen[slots[other]])) mutual = false, done = true;
@@ -316,7 +310,7 @@ static void merge_queued(const fct_rounds *r, merge_queue *queue) {
     for (uint32_t q = 0; q < queue->count; ++q) {
         uint32_t i = queue->clusters[q], mate = queue->mates[q], entry = entry_of(&r->now, i, mate);
         pairs[q] = (fct_pair){r->now.slots[i], r->now.slots[mate], r->now.shared[entry]};
-        costs[q] = cost_of_key(r->now.keys[entry] & ~SIZE_BITS);
+        costs[q] = fct_float_of_key(r->now.keys[entry] & ~SIZE_BITS);
         __builtin_prefetch(&r->work->records[pairs[q].a]);
         __builtin_prefetch(&r->work->records[pairs[q].b]);
     }

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/math/simd.h"
+#include "base/sift.h"
 #include "cluster/merge/rounds.h"
 
 /* A long list in its place. */
@@ -17,31 +18,17 @@ typedef struct list {
     float *shared;
 } list;
 
-static inline bool before(const list *l, size_t p, size_t q) {
-    return l->others[p] != l->others[q] ? l->others[p] < l->others[q] : l->shared[p] < l->shared[q];
+static bool less_entries(const void *items, size_t i, size_t j) {
+    const list *l = items;
+    return l->others[i] != l->others[j] ? l->others[i] < l->others[j] : l->shared[i] < l->shared[j];
 }
 
-static void swap(const list *l, size_t p, size_t q) {
-    uint32_t other = l->others[p], key = l->keys[p];
-    float shared = l->shared[p];
-    l->others[p] = l->others[q], l->keys[p] = l->keys[q], l->shared[p] = l->shared[q];
-    l->others[q] = other, l->keys[q] = key, l->shared[q] = shared;
-}
-
-static void sift_down(const list *l, size_t at, size_t count) {
-    for (size_t child; (child = 2 * at + 1) < count; at = child) {
-        if (child + 1 < count && before(l, child, child + 1)) ++child;
-        if (!before(l, at, child)) break;
-        swap(l, at, child);
-    }
-}
-
-static void sort_list(const list *l, size_t count) {
-    for (size_t i = count / 2; i-- > 0;) sift_down(l, i, count);
-    for (size_t i = count; i-- > 1;) {
-        swap(l, 0, i);
-        sift_down(l, 0, i);
-    }
+static void swap_entries(void *items, size_t i, size_t j) {
+    const list *l = items;
+    uint32_t other = l->others[i], key = l->keys[i];
+    float shared = l->shared[i];
+    l->others[i] = l->others[j], l->keys[i] = l->keys[j], l->shared[i] = l->shared[j];
+    l->others[j] = other, l->keys[j] = key, l->shared[j] = shared;
 }
 
 /* Adds up neighbouring doubles; a double stands for a merge, so its cost is open. */
@@ -73,7 +60,7 @@ static uint32_t join_long(const fct_rounds *r, uint32_t i, uint32_t mate, uint32
     list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
     uint32_t count = renumber_list(r, i, next, &l, 0);
     if (mate != FCT_NONE) count = renumber_list(r, mate, next, &l, count);
-    sort_list(&l, count);
+    fct_sift_sort(&l, count, less_entries, swap_entries);
     return join_sorted(&l, count);
 }
 

@@ -6,8 +6,8 @@
 #include "cluster/shape/box.h"
 
 #include <float.h>
-#include <string.h>
 
+#include "base/key.h"
 #include "base/math/simd.h"
 
 /* fmax and fmin are calls here, for they must look out for NaN. */
@@ -76,11 +76,8 @@ void fct_extents_add(fct_extents *extents, fct_points points, size_t begin, size
 
 /* The next float above one that is not below 0. */
 static float above(float value) {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    bits += bits < 0x7F800000u;
-    memcpy(&value, &bits, sizeof bits);
-    return value;
+    uint32_t bits = fct_float_bits(value);
+    return fct_float_of_bits(bits + (bits < 0x7F800000u));
 }
 
 bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_cluster *cluster) {

@@ -5,7 +5,9 @@
  * 10^8 triangles can be verified where its dual graph would not fit: a lot has the pairs whose hash falls to
  * it, and all of a pair's faces. 4 bytes a face and 24 a side of a lot. A build knows all this already.
  */
+#include "base/key.h"
 #include "base/sort.h"
+#include "base/union_find.h"
 #include "cluster/tree/tree.h"
 
 typedef struct side_list {
@@ -20,16 +22,11 @@ typedef struct side_list {
 static uint64_t side_key(const uint32_t triangle[3], int k) {
     uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
     if (a == b) return 0;
-    return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+    return fct_pair_key(a, b);
 }
 
 static uint32_t lot_of(uint64_t key, uint32_t lots) {
     return (uint32_t)((key * 0x9E3779B97F4A7C15u >> 32) * lots >> 32);
-}
-
-static uint32_t find_part(uint32_t *parents, uint32_t face) {
-    while (parents[face] != face) face = parents[face] = parents[parents[face]];
-    return face;
 }
 
 /* Lists the sides of a lot, or only counts them where there is no list yet. */
@@ -48,15 +45,11 @@ static size_t list_sides(const side_list *list, uint32_t lot) {
 /* Runs of one pair; a face that has it twice counts once. */
 static void count_runs(side_list *list, size_t count, fct_edge_counts *out) {
     for (size_t i = 0, end; i < count; i = end) {
-        uint32_t faces = 1, part = find_part(list->parents, list->faces[i]);
+        uint32_t faces = 1;
         for (end = i + 1; end < count && list->keys[end] == list->keys[i]; ++end) {
             if (list->faces[end] == list->faces[end - 1]) continue;
-            uint32_t other = find_part(list->parents, list->faces[end]);
             ++faces;
-            if (other == part) continue;
-            --out->components;
-            list->parents[other > part ? other : part] = other < part ? other : part;
-            part = other < part ? other : part;
+            out->components -= fct_sets_join(list->parents, list->faces[end - 1], list->faces[end]);
         }
         out->boundary += faces == 1, out->nonmanifold += faces >= 3;
     }
@@ -67,7 +60,7 @@ static fct_result count_lots(const fct_env *env, side_list *list, size_t most, f
     list->faces = fct_allocate(env, most, sizeof *list->faces);
     fct_result result =
         list->keys && list->faces && list->parents ? FCT_OK : fct_fail_memory(env, "counting edges");
-    for (uint32_t f = 0; result == FCT_OK && f < list->view->face_count; ++f) list->parents[f] = f;
+    if (result == FCT_OK) fct_sets_create(list->parents, list->view->face_count);
     for (uint32_t lot = 0; result == FCT_OK && lot < list->lots; ++lot) {
         size_t count = list_sides(list, lot);
         result = fct_progress(env, "edges", (double)lot / list->lots);

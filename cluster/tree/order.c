@@ -10,6 +10,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "cluster/tree/tree.h"
