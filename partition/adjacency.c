@@ -6,6 +6,7 @@
  */
 #include "partition/adjacency.h"
 
+#include "base/key.h"
 #include "base/math/vec.h"
 #include "base/parallel.h"
 #include "base/sort.h"
@@ -57,7 +58,7 @@ static uint32_t list_edge(const lister *l, uint32_t head, uint32_t place) {
             if (l->keys) {
                 double share = fmin(runs / (first ? 1.0 : 2.0),
                                     next_runs / (l->sides->after[next_last] == FCT_NONE ? 1.0 : 2.0));
-                l->keys[place + count] = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+                l->keys[place + count] = fct_pair_key(a, b);
                 l->order[place + count] = place + count;
                 l->links[place + count] = (link){share * side_length(l->mesh, head), head};
             }

@@ -11,6 +11,7 @@
 
 #include "base/math/eigen.h"
 #include "base/parallel.h"
+#include "base/union_find.h"
 #include "cluster/tree/tree.h"
 #include "facetree/dual.h"
 #include "partition/labels.h"
@@ -146,14 +147,6 @@ static void judge_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) judge_piece(user, (uint32_t)i);
 }
 
-static uint32_t find(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    return i;
-}
-
 /* Borders of the clusters, and whether the faces of each hang together. */
 static bool walk_dual(const judge *j, const fct_dual *dual) {
     uint32_t joined = 0, filled = 0;
@@ -166,13 +159,7 @@ static bool walk_dual(const judge *j, const fct_dual *dual) {
         uint32_t a = dual->edges[2 * (size_t)e], b = dual->edges[2 * (size_t)e + 1];
         if (j->labels[a] != j->labels[b]) continue;
         j->pieces[j->labels[a]].perimeter -= 2 * (double)dual->lengths[e];
-        a = find(j->parents, a), b = find(j->parents, b);
-        if (a == b) continue;
-        ++joined;
-        if (a < b)
-            j->parents[b] = a;
-        else
-            j->parents[a] = b;
+        joined += fct_sets_join(j->parents, a, b);
     }
     return joined == dual->face_count - filled;
 }

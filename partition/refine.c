@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/heap.h"
+#include "base/key.h"
 #include "cluster/tree/tree.h"
 #include "partition/labels.h"
 #include "partition/units.h"
@@ -175,11 +176,9 @@ static void move(refiner *r, uint32_t unit, const step *s) {
     r->moved[unit] = r->sweep;
 }
 
-/* A larger gain is a smaller key: the bits of positive doubles are in their order. */
+/* The heap is a min-heap, so the largest gain gets the smallest key. */
 static uint64_t key_of(double gain) {
-    uint64_t bits;
-    memcpy(&bits, &gain, sizeof bits);
-    return ~bits;
+    return ~fct_double_bits(gain);
 }
 
 /* Returns how many units moved. */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/env.h"
+#include "base/union_find.h"
 
 void fct_units_release(const fct_env *env, fct_units *units) {
     fct_dual_release(env, &units->dual);
@@ -87,11 +88,6 @@ failed:
     return result;
 }
 
-static uint32_t root_of(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) i = parents[i] = parents[parents[i]];
-    return i;
-}
-
 /* Sums over the faces of each unit, and the units that never move. */
 static void sum_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *parents, uint32_t *pieces,
                      fct_units *out) {
@@ -110,11 +106,7 @@ static void sum_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *
             uint32_t other = faces->neighbours[i];
             if (unit_of[other] != u) continue;
             out->perimeters[u] -= fct_unit_length(faces, i);
-            if (other > f) continue;
-            uint32_t a = root_of(parents, f), b = root_of(parents, other);
-            if (a == b) continue;
-            parents[a] = b;
-            --pieces[u];
+            if (other < f && fct_sets_join(parents, f, other)) --pieces[u];
         }
     }
     for (uint32_t u = 0; u < out->count; ++u)

@@ -4,6 +4,7 @@
  * stamping the vertices and edges it uses. It shares no count with the code that made the charts. O(F).
  */
 #include "base/parallel.h"
+#include "base/union_find.h"
 #include "partition/chart/chart.h"
 
 enum { SEEN_ONCE = 1, SEEN_TWICE = 2, SEEN_MORE = 3 };
@@ -53,14 +54,6 @@ static void name_edges(auditor *a, fct_chart_stats *stats) {
     }
 }
 
-static uint32_t find(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    return i;
-}
-
 static bool chart_is_disk(auditor *a, uint32_t chart) {
     const fct_tree_view *view = a->charter->view;
     uint64_t vertices = 0, edges = 0, faces = a->first[chart + 1] - a->first[chart], joins = 0;
@@ -79,8 +72,7 @@ static bool chart_is_disk(auditor *a, uint32_t chart) {
             } else {
                 if (a->edge_uses[edge] < SEEN_MORE) ++a->edge_uses[edge];
                 clean = clean && a->edge_uses[edge] <= SEEN_TWICE;
-                uint32_t p = find(a->parents, place), q = find(a->parents, a->edge_face[edge]);
-                if (p != q) a->parents[p < q ? q : p] = p < q ? p : q, ++joins;
+                joins += fct_sets_join(a->parents, place, a->edge_face[edge]);
             }
             a->edge_face[edge] = place;
         }

@@ -9,6 +9,7 @@
 #include "partition/chart/chart.h"
 
 #include "base/parallel.h"
+#include "base/union_find.h"
 #include "partition/cut.h"
 
 enum { GRAIN = 1 << 15 };
@@ -52,14 +53,6 @@ static bool one_material(const fct_tree_view *view, const fct_cluster *c) {
     return true;
 }
 
-static uint32_t find(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    return i;
-}
-
 static bool is_disk(const opener *o, const fct_cluster *c) {
     const fct_tree_view *view = o->charter->view;
     const uint32_t *before = o->charter->sides.before;
@@ -76,13 +69,7 @@ static bool is_disk(const opener *o, const fct_cluster *c) {
                 continue;
             }
             if (before[other] != FCT_NONE && before[other] / 3 >= first) return false;
-            uint32_t a = find(o->parents, f), b = find(o->parents, other / 3);
-            if (a == b) continue;
-            if (a < b)
-                o->parents[b] = a;
-            else
-                o->parents[a] = b;
-            --parts;
+            parts -= fct_sets_join(o->parents, f, other / 3);
         }
     }
     bool bordered = 2 * edges > 3 * (uint64_t)c->count;

@@ -8,6 +8,7 @@
  */
 #include <string.h>
 
+#include "base/key.h"
 #include "base/sort.h"
 #include "partition/adjacency.h"
 #include "partition/chart/chart.h"
