@@ -3,6 +3,7 @@
  * Boxes are opened nearest first and pruned in float with a margin; what remains in a leaf is measured in
  * double, so the answer is the exact one to double rounding. Equal distances go to the lower face id.
  */
+#include "base/key.h"
 #include "base/math/simd.h"
 #include "base/parallel.h"
 #include "bvh/bvh.h"
@@ -127,19 +128,11 @@ static void search_leaf(search *s, const fct_leaf *leaf) {
 }
 
 static uint64_t wait_entry(float distance2, uint32_t ref) {
-    union {
-        float f;
-        uint32_t u;
-    } bits = {.f = distance2};
-    return (uint64_t)bits.u << 32 | ref;
+    return (uint64_t)fct_float_bits(distance2) << 32 | ref;
 }
 
 static float wait_distance2(uint64_t entry) {
-    union {
-        uint32_t u;
-        float f;
-    } bits = {.u = (uint32_t)(entry >> 32)};
-    return bits.f;
+    return fct_float_of_bits((uint32_t)(entry >> 32));
 }
 
 static void run_search(search *s) {

@@ -6,6 +6,7 @@
  * that of the face whose normal is closest to the sample's: the floor under a plinth is not compared with the
  * plinth's underside. Sums run over fixed chunks in order: the same bits for every thread count.
  */
+#include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "bvh/bvh.h"

@@ -7,6 +7,7 @@
  * own: a fused multiply-add would break that symmetry. An edge function that comes out zero is computed
  * again in double, where it is exact.
  */
+#include "base/key.h"
 #include "base/math/simd.h"
 #include "bvh/ray/ray.h"
 
@@ -200,19 +201,11 @@ static inline bool meet_leaf(traversal *t, const fct_leaf *leaf, bool any) {
 
 /* A waiting child: entry distance (not negative, so its bits order like the number) above the reference. */
 static inline uint64_t wait_entry(float enter, uint32_t ref) {
-    union {
-        float f;
-        uint32_t u;
-    } bits = {.f = enter};
-    return (uint64_t)bits.u << 32 | ref;
+    return (uint64_t)fct_float_bits(enter) << 32 | ref;
 }
 
 static inline float wait_distance(uint64_t entry) {
-    union {
-        uint32_t u;
-        float f;
-    } bits = {.u = (uint32_t)(entry >> 32)};
-    return bits.f;
+    return fct_float_of_bits((uint32_t)(entry >> 32));
 }
 
 /* Leaves are read a little later: four lines of 64 bytes. */
