@@ -8,6 +8,8 @@
 
 #include <string.h>
 
+#include "scene/transform.h"
+
 /* Light of neighbours that differs by less, as a share of its sum, may be one light and noise. */
 #define ALIKE .04
 
@@ -57,13 +59,8 @@ static void place_point(const fct_solution *s, uint32_t instance, uint32_t place
     fct_tree_view t = fct_tree_get(s->elements.view.models[in->model].tree);
     v3 p[3];
     for (int k = 0; k < 3; ++k) {
-        const float *x = t.positions + 3 * (size_t)t.triangles[3 * (size_t)place + (size_t)k],
-                    *m = in->to_world;
-        double w[3];
-        for (int r = 0; r < 3; ++r)
-            w[r] = (double)m[4 * r] * x[0] + (double)m[4 * r + 1] * x[1] + (double)m[4 * r + 2] * x[2] +
-                   m[4 * r + 3];
-        p[k] = v3_make(w[0], w[1], w[2]);
+        const float *corner = t.positions + 3 * (size_t)t.triangles[3 * (size_t)place + (size_t)k];
+        p[k] = fct_transform_point(in->to_world, v3_load(corner));
     }
     v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(v3_load(point), p[0]), n = v3_cross(e, f);
     double scale = v3_norm2(n);

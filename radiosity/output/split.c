@@ -2,6 +2,7 @@
  * positions alone, and nothing depends on their layout. */
 #include "radiosity/output/split.h"
 
+#include "base/key.h"
 #include "base/math/vec.h"
 #include "radiosity/sample.h"
 
@@ -35,7 +36,7 @@ void fct_edge_table_release(const fct_env *env, fct_edge_table *table) {
 }
 
 static uint64_t edge_key(uint32_t a, uint32_t b) {
-    return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
+    return fct_pair_key(a, b);
 }
 
 static size_t edge_slot(const fct_edge_table *table, uint64_t key) {

@@ -7,6 +7,8 @@
 #include "radiosity/output/surface_vertex.h"
 
 #include "base/parallel.h"
+#include "base/sort.h"
+#include "base/union_find.h"
 #include "radiosity/output/split.h"
 
 #include <string.h>
@@ -16,11 +18,6 @@
 
 /* What begins at a corner of the sorted list. */
 enum { BEGIN_VERTEX = 1, ADDED_VERTEX = 2, BEGIN_GROUP = 4, RIM_GROUP = 8 };
-
-typedef struct entry {
-    uint64_t key;
-    uint32_t value;
-} entry;
 
 typedef struct work {
     const fct_corners *mesh;
@@ -32,57 +29,12 @@ typedef struct work {
     uint8_t *taken;    /* per vertex: its number is given away */
     uint32_t *added;   /* per position: vertices added; then the first one's number */
     size_t largest;    /* most corners at a position */
-    entry *entries;    /* per thread 2 x largest */
+    uint64_t *keys;    /* per thread 2 x largest; with `values`, pairs to be sorted */
+    uint32_t *values;  /* likewise */
     uint32_t *parents; /* per thread largest */
     uint8_t *open;     /* per thread largest */
     fct_surface *out;
 } work;
-
-static bool entry_less(const entry *a, const entry *b) {
-    return a->key < b->key || (a->key == b->key && a->value < b->value);
-}
-
-static void sift(entry *e, size_t root, size_t count) {
-    for (;;) {
-        size_t child = 2 * root + 1;
-        if (child >= count) return;
-        if (child + 1 < count && entry_less(e + child, e + child + 1)) ++child;
-        if (!entry_less(e + root, e + child)) return;
-        entry swap = e[root];
-        e[root] = e[child], e[child] = swap;
-        root = child;
-    }
-}
-
-/* Insertion for the few of a usual vertex, a heap for the many of a hub. */
-static void sort_entries(entry *e, size_t count) {
-    if (count <= 40) {
-        for (size_t i = 1; i < count; ++i) {
-            entry x = e[i];
-            size_t j = i;
-            for (; j > 0 && entry_less(&x, e + j - 1); --j) e[j] = e[j - 1];
-            e[j] = x;
-        }
-        return;
-    }
-    for (size_t i = count / 2; i-- > 0;) sift(e, i, count);
-    for (size_t i = count; i-- > 1;) {
-        entry swap = e[0];
-        e[0] = e[i], e[i] = swap;
-        sift(e, 0, i);
-    }
-}
-
-static uint32_t find(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) i = parents[i] = parents[parents[i]];
-    return i;
-}
-
-static void join(uint32_t *parents, uint32_t a, uint32_t b) {
-    a = find(parents, a), b = find(parents, b);
-    if (a < b) parents[b] = a;
-    if (b < a) parents[a] = b;
-}
 
 /* A degenerate face has no normal to differ in. */
 static bool smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
@@ -92,26 +44,26 @@ static bool smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
 
 /* Joins the corners around a position across smooth edges. open[i]: corner i has an edge that is not joined;
  * for the lowest corner of a group: any of the group's has. */
-static void join_corners(const work *w, const uint32_t *corners, size_t count, entry *sides,
-                         uint32_t *parents, uint8_t *open) {
+static void join_corners(const work *w, const uint32_t *corners, size_t count, uint64_t *keys,
+                         uint32_t *values, uint32_t *parents, uint8_t *open) {
     const uint32_t *t = w->mesh->triangles;
     for (size_t i = 0; i < count; ++i) {
         size_t face = corners[i] / 3 * (size_t)3;
         uint32_t k = corners[i] % 3, slot = (uint32_t)i;
         parents[i] = slot, open[i] = 2;
-        sides[2 * i] = (entry){w->first[t[face + (k + 1) % 3]], 2 * slot};
-        sides[2 * i + 1] = (entry){w->first[t[face + (k + 2) % 3]], 2 * slot + 1};
+        keys[2 * i] = w->first[t[face + (k + 1) % 3]], values[2 * i] = 2 * slot;
+        keys[2 * i + 1] = w->first[t[face + (k + 2) % 3]], values[2 * i + 1] = 2 * slot + 1;
     }
-    sort_entries(sides, 2 * count);
+    fct_sort_in_place(keys, values, 2 * count);
     for (size_t i = 0, end; i < 2 * count; i = end) {
-        for (end = i + 1; end < 2 * count && sides[end].key == sides[i].key;) ++end;
-        uint32_t a = sides[i].value, b = sides[end - 1].value;
+        for (end = i + 1; end < 2 * count && keys[end] == keys[i];) ++end;
+        uint32_t a = values[i], b = values[end - 1];
         if (end - i != 2 || (a & 1) == (b & 1) || !smooth(w, corners[a / 2], corners[b / 2])) continue;
-        join(parents, a / 2, b / 2);
+        fct_sets_join(parents, a / 2, b / 2);
         --open[a / 2], --open[b / 2];
     }
     for (size_t i = 0; i < count; ++i) {
-        parents[i] = find(parents, (uint32_t)i);
+        parents[i] = fct_sets_find(parents, (uint32_t)i);
         if (open[i]) open[parents[i]] = 1;
     }
 }
@@ -141,21 +93,22 @@ static uint32_t mark_group(const work *w, size_t begin, size_t end, bool rim) {
 static void group_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk;
     const work *w = user;
-    entry *entries = w->entries + 2 * w->largest * thread;
+    uint64_t *keys = w->keys + 2 * w->largest * thread;
+    uint32_t *values = w->values + 2 * w->largest * thread;
     uint32_t *parents = w->parents + w->largest * thread;
     uint8_t *open = w->open + w->largest * thread;
     for (size_t v = begin; v < end; ++v) {
         size_t from = w->begin[v], count = w->begin[v + 1] - from;
         uint32_t *corners = w->corners + from;
-        join_corners(w, corners, count, entries, parents, open);
+        join_corners(w, corners, count, keys, values, parents, open);
         for (size_t i = 0; i < count; ++i)
-            entries[i] = (entry){(uint64_t)parents[i] << 32 | w->mesh->triangles[corners[i]], corners[i]};
-        sort_entries(entries, count);
-        for (size_t i = 0; i < count; ++i) corners[i] = entries[i].value;
+            keys[i] = (uint64_t)parents[i] << 32 | w->mesh->triangles[corners[i]], values[i] = corners[i];
+        fct_sort_in_place(keys, values, count);
+        memcpy(corners, values, count * sizeof *corners);
         w->added[v] = 0;
         for (size_t i = 0, next; i < count; i = next) {
-            uint64_t group = entries[i].key >> 32;
-            for (next = i + 1; next < count && entries[next].key >> 32 == group;) ++next;
+            uint64_t group = keys[i] >> 32;
+            for (next = i + 1; next < count && keys[next] >> 32 == group;) ++next;
             w->added[v] += mark_group(w, from + i, from + next, open[group]);
         }
     }
@@ -259,10 +212,12 @@ static fct_result allocate_work(const fct_env *env, work *w) {
 
 static fct_result allocate_scratch(const fct_env *env, work *w) {
     size_t threads = fct_env_threads(env);
-    w->entries = fct_allocate(env, threads * w->largest, 2 * sizeof *w->entries);
+    w->keys = fct_allocate(env, threads * w->largest, 2 * sizeof *w->keys);
+    w->values = fct_allocate(env, threads * w->largest, 2 * sizeof *w->values);
     w->parents = fct_allocate(env, threads * w->largest, sizeof *w->parents);
     w->open = fct_allocate(env, threads * w->largest, sizeof *w->open);
-    if (!w->entries || !w->parents || !w->open) return fct_fail_memory(env, "the vertices of a surface");
+    if (!w->keys || !w->values || !w->parents || !w->open)
+        return fct_fail_memory(env, "the vertices of a surface");
     return FCT_OK;
 }
 
@@ -274,7 +229,8 @@ static void release_work(const fct_env *env, work *w) {
     fct_release(env, w->flags);
     fct_release(env, w->taken);
     fct_release(env, w->added);
-    fct_release(env, w->entries);
+    fct_release(env, w->keys);
+    fct_release(env, w->values);
     fct_release(env, w->parents);
     fct_release(env, w->open);
 }

@@ -7,18 +7,12 @@
 
 #include <string.h>
 
+#include "scene/transform.h"
+
 enum { PAGE = 4096 };
 
-static v3 to_world(const fct_instance *in, v3 p) {
-    const float *m = in->to_world;
-    return v3_make(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-                   m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
-}
-
 static v3 area_to_world(const fct_instance *in, v3 s) {
-    const float *m = in->normal_matrix;
-    v3 r = v3_make(m[0] * s.x + m[1] * s.y + m[2] * s.z, m[3] * s.x + m[4] * s.y + m[5] * s.z,
-                   m[6] * s.x + m[7] * s.y + m[8] * s.z);
+    v3 r = fct_transform_normal(in->normal_matrix, s);
     return in->mirrored ? v3_scale(r, -1) : r;
 }
 
@@ -47,7 +41,7 @@ static void place_corners(const fct_elements *set, const fct_instance *in, uint3
     for (int k = 0; k < 3; ++k) {
         uint32_t v = t.triangles[3 * (size_t)place + (size_t)k];
         touch(set, in->model, 2, (size_t)v * 12, 12);
-        p[k] = to_world(in, v3_load(t.positions + 3 * (size_t)v));
+        p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * (size_t)v));
     }
 }
 
@@ -94,7 +88,7 @@ static void set_cluster(const fct_elements *set, const fct_instance *in, const f
         for (int k = 0; k < 6; ++k) m[k] = c->moment[k];
         e->area = c->area * s * s;
         e->vector = v3_scale(area_to_world(in, v3_load(c->area_vector)), sign);
-        e->center = to_world(in, v3_load(c->centroid));
+        e->center = fct_transform_point(in->to_world, v3_load(c->centroid));
         /* M' = N M N^T / s^2 with N = s^2 times a rotation */
         const float *n = in->normal_matrix;
         v3 rows[3] = {v3_load(n), v3_load(n + 3), v3_load(n + 6)};
@@ -109,7 +103,7 @@ static void set_cluster(const fct_elements *set, const fct_instance *in, const f
             for (int k = 0; k < 3; ++k) stretch += (double)in->to_world[4 * r + k] * in->to_world[4 * r + k];
         stretch = sqrt(stretch);
     }
-    v3 from = v3_sub(to_world(in, v3_load(c->box_center)), e->center);
+    v3 from = v3_sub(fct_transform_point(in->to_world, v3_load(c->box_center)), e->center);
     e->radius = stretch * v3_norm(v3_load(c->box_half)) + v3_norm(from);
 }
 
