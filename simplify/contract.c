@@ -136,8 +136,8 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
             for (uint32_t j = 0; j < s->quadric_size; ++j) to[j] += from[j];
             s->wedge_parents[w] = keep;
             s->wedge_uses[keep] += s->wedge_uses[w];
-            uint32_t class_keep = find_root(s->class_parents, s->wedge_classes[keep]);
-            s->class_parents[find_root(s->class_parents, s->wedge_classes[w])] = class_keep;
+            uint32_t class_keep = fct_sets_find(s->class_parents, s->wedge_classes[keep]);
+            s->class_parents[fct_sets_find(s->class_parents, s->wedge_classes[w])] = class_keep;
         }
         memcpy(s->attributes + (size_t)s->channel_count * keep, values[i], s->channel_count * sizeof(double));
         s->next_wedges[keep] = s->first_wedges[a];
@@ -282,7 +282,7 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
 /* Looks at the edge that came up: contracts it, sends it back, refuses or drops it. True when contracted. */
 static bool process_edge(fct_simplifier *s, uint32_t e) {
     uint32_t ends[2];
-    for (int k = 0; k < 2; ++k) ends[k] = find_root(s->point_parents, s->edges[e].ends[k]);
+    for (int k = 0; k < 2; ++k) ends[k] = fct_sets_find(s->point_parents, s->edges[e].ends[k]);
     if (ends[0] == ends[1]) {
         drop_edge(s, e);
         return false;

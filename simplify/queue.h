@@ -6,9 +6,8 @@
 #ifndef FCT_SIMPLIFY_QUEUE_H
 #define FCT_SIMPLIFY_QUEUE_H
 
-#include <string.h>
-
 #include "base/env.h"
+#include "base/key.h"
 
 enum { QUEUE_BUCKETS = 2048 };
 
@@ -31,10 +30,7 @@ typedef struct fct_queue {
 
 /* The bucket of a cost; anything that is not a positive number goes first. */
 static inline uint32_t queue_bucket(double cost) {
-    float narrow = (float)cost;
-    uint32_t bits;
-    memcpy(&bits, &narrow, sizeof bits);
-    return cost > 0 ? bits >> 20 : 0;
+    return cost > 0 ? fct_float_bits((float)cost) >> 20 : 0;
 }
 
 static inline void queue_push(fct_queue *q, uint32_t edge, uint32_t bucket) {

@@ -291,9 +291,9 @@ static void set_targets(void *user, size_t begin, size_t end, size_t chunk, uint
 /* Resolves parents, lists the faces, and gives each wedge of the input its weight. */
 static void prepare(refit *r) {
     fct_simplifier *s = r->s;
-    for (uint32_t p = 0; p < s->point_count; ++p) s->point_parents[p] = find_root(s->point_parents, p);
+    for (uint32_t p = 0; p < s->point_count; ++p) s->point_parents[p] = fct_sets_find(s->point_parents, p);
     for (uint32_t w = 0; w < s->wedge_count && s->wedge_parents; ++w)
-        s->wedge_parents[w] = find_root(s->wedge_parents, w);
+        s->wedge_parents[w] = fct_sets_find(s->wedge_parents, w);
     number_targets(r);
     memset(r->corners, 0xff, s->wedge_count * sizeof *r->corners);
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {

@@ -52,7 +52,7 @@ static void release(fct_simplifier *s) {
 /* Numbers what becomes a vertex, by a key per live corner, in order of first use. */
 static uint32_t vertex_key(fct_simplifier *s, uint32_t c) {
     if (!s->wedge_classes) return s->triangles[c];
-    return find_root(s->class_parents, s->wedge_classes[corner_wedge(s, c)]);
+    return fct_sets_find(s->class_parents, s->wedge_classes[corner_wedge(s, c)]);
 }
 
 static void write_position(const fct_simplifier *s, uint32_t point, float *out) {

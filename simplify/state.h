@@ -15,6 +15,7 @@
 
 #include "base/env.h"
 #include "base/math/vec.h"
+#include "base/union_find.h"
 #include "facetree/simplify.h"
 #include "simplify/queue.h"
 
@@ -80,13 +81,6 @@ typedef struct fct_simplifier {
     double max_error2; /* largest squared error of a contraction made */
 } fct_simplifier;
 
-static inline uint32_t find_root(uint32_t *parents, uint32_t i) {
-    while (parents[i] != i) {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    return i;
-}
 static inline uint32_t edge_root(fct_edge *edges, uint32_t e) {
     while (edges[e].parent != e) {
         edges[e].parent = edges[edges[e].parent].parent;
@@ -108,7 +102,7 @@ static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
                 s->positions[3 * (size_t)p + 2]};
 }
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
-    return s->corner_wedges ? find_root(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];
+    return s->corner_wedges ? fct_sets_find(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];
 }
 
 /* topology.c: points, wedges, rings and edges of the mesh. */

@@ -6,36 +6,30 @@
  * neighbours together. Linear in corners (expected, for the hash tables); the numbering follows the input's
  * order.
  */
+#include "base/key.h"
 #include "simplify/state.h"
 
 enum { KEY_WORDS = 7 };
 
-/* Writes the words that make item i distinct. */
+/* Writes the words that make item i distinct. -0 counts as 0, because -0 + 0 is 0. */
 typedef void key_of(const fct_simplifier *s, const uint32_t *base, uint32_t i, uint32_t key[KEY_WORDS]);
-
-static uint32_t float_bits(float value) {
-    uint32_t bits;
-    value += 0.0f; /* -0 becomes 0 */
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
 
 static void position_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
     (void)base;
-    for (int k = 0; k < 3; ++k) key[k] = float_bits(s->mesh->positions[3 * (size_t)v + k]);
+    for (int k = 0; k < 3; ++k) key[k] = fct_float_bits(s->mesh->positions[3 * (size_t)v + k] + 0.0f);
 }
 
 static void vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
     key[0] = base[v];
     for (int k = 0; k < 3; ++k) {
-        if (s->mesh->colors) key[1 + k] = float_bits(s->mesh->colors[3 * (size_t)v + k]);
-        if (s->mesh->normals) key[4 + k] = float_bits(s->mesh->normals[3 * (size_t)v + k]);
+        if (s->mesh->colors) key[1 + k] = fct_float_bits(s->mesh->colors[3 * (size_t)v + k] + 0.0f);
+        if (s->mesh->normals) key[4 + k] = fct_float_bits(s->mesh->normals[3 * (size_t)v + k] + 0.0f);
     }
 }
 
 static void corner_key(const fct_simplifier *s, const uint32_t *base, uint32_t c, uint32_t key[KEY_WORDS]) {
     key[0] = base[s->mesh->triangles[c]];
-    for (int k = 0; k < 2; ++k) key[1 + k] = float_bits(s->mesh->texcoords[2 * (size_t)c + k]);
+    for (int k = 0; k < 2; ++k) key[1 + k] = fct_float_bits(s->mesh->texcoords[2 * (size_t)c + k] + 0.0f);
 }
 
 static uint64_t hash_key(const uint32_t key[KEY_WORDS]) {

@@ -22,12 +22,6 @@ typedef struct weld {
     size_t crowd_count;
 } weld;
 
-static void join(uint32_t *parents, uint32_t a, uint32_t b) {
-    a = find_root(parents, a), b = find_root(parents, b);
-    if (a < b) parents[b] = a;
-    if (b < a) parents[a] = b;
-}
-
 /* Vertices at the ends of side c, that at the lower place first. */
 static void side_ends(const weld *w, uint32_t c, uint32_t ends[2]) {
     const uint32_t *places = w->s->point_of, *t = w->s->mesh->triangles;
@@ -47,24 +41,9 @@ static void join_sides(weld *w, uint32_t c, uint32_t d) {
     side_ends(w, c, first);
     side_ends(w, d, second);
     for (int k = 0; k < 2; ++k) {
-        join(w->parents, first[k], second[k]);
-        join(w->bodies, first[k], second[k]);
+        fct_sets_join(w->parents, first[k], second[k]);
+        fct_sets_join(w->bodies, first[k], second[k]);
     }
-}
-
-/* Sorts a part of `order` by its keys; most parts are short. */
-static fct_result sort_part(weld *w, size_t first, size_t count) {
-    uint64_t *keys = w->keys + first;
-    uint32_t *order = w->order + first;
-    if (count > 32) return fct_sort_pairs(w->s->env, keys, order, count);
-    for (size_t i = 1; i < count; ++i) {
-        uint64_t key = keys[i];
-        uint32_t side = order[i];
-        size_t k = i;
-        for (; k > 0 && keys[k - 1] > key; --k) keys[k] = keys[k - 1], order[k] = order[k - 1];
-        keys[k] = key, order[k] = side;
-    }
-    return FCT_OK;
 }
 
 /* Sides that other vertices at their ends could join. */
@@ -102,7 +81,7 @@ static fct_result find_open(weld *w, size_t first, size_t count, size_t *open) {
         side_ends(w, w->order[i], ends);
         w->keys[i] = (uint64_t)ends[0] << 32 | ends[1];
     }
-    fct_result result = sort_part(w, first, count);
+    fct_result result = fct_sort_pairs(w->s->env, w->keys + first, w->order + first, count);
     *open = 0;
     for (size_t i = first; i < first + count && result == FCT_OK; ++i) {
         bool met = (i > first && w->keys[i] == w->keys[i - 1]) ||
@@ -131,10 +110,10 @@ static fct_result join_runs(weld *w) {
 /* Open sides of one run, by their bodies as pairs of sides have made them. */
 static fct_result join_crowd(weld *w, const uint32_t *sides, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        w->keys[i] = find_root(w->bodies, w->s->mesh->triangles[sides[i]]);
+        w->keys[i] = fct_sets_find(w->bodies, w->s->mesh->triangles[sides[i]]);
         w->order[i] = sides[i];
     }
-    fct_result result = sort_part(w, 0, count);
+    fct_result result = fct_sort_pairs(w->s->env, w->keys, w->order, count);
     if (result != FCT_OK) return result;
     bool single = false;
     for (size_t i = 0; i < count; ++i)
@@ -145,7 +124,7 @@ static fct_result join_crowd(weld *w, const uint32_t *sides, size_t count) {
         uint32_t first[2], second[2];
         side_ends(w, w->order[i - 1], first);
         side_ends(w, w->order[i], second);
-        for (int k = 0; k < 2; ++k) join(w->parents, first[k], second[k]);
+        for (int k = 0; k < 2; ++k) fct_sets_join(w->parents, first[k], second[k]);
     }
     return FCT_OK;
 }
@@ -164,8 +143,8 @@ static void join_faces(weld *w) {
     const fct_mesh *mesh = w->s->mesh;
     for (uint32_t c = 0; c < 3 * mesh->face_count; ++c) {
         uint32_t a = mesh->triangles[c], b = mesh->triangles[corner_next(c)];
-        join(w->bodies, a, b);
-        if (w->s->point_of[a] == w->s->point_of[b]) join(w->parents, a, b);
+        fct_sets_join(w->bodies, a, b);
+        if (w->s->point_of[a] == w->s->point_of[b]) fct_sets_join(w->parents, a, b);
     }
 }
 
@@ -180,7 +159,8 @@ static fct_result prepare(weld *w, uint32_t place_count, bool *needed) {
     w->parents = fct_allocate(w->s->env, count, sizeof *w->parents);
     w->bodies = fct_allocate(w->s->env, count, sizeof *w->bodies);
     if (!w->parents || !w->bodies) return fct_fail_memory(w->s->env, "places");
-    for (uint32_t v = 0; v < count; ++v) w->parents[v] = w->bodies[v] = v;
+    fct_sets_create(w->parents, count);
+    fct_sets_create(w->bodies, count);
     return FCT_OK;
 }
 
@@ -197,7 +177,7 @@ fct_result fct_simplify_weld(fct_simplifier *s) {
     s->point_count = 0;
     for (uint32_t v = 0; v < s->mesh->vertex_count; ++v) {
         if (s->point_of[v] == FCT_NONE) continue;
-        uint32_t root = find_root(w.parents, v);
+        uint32_t root = fct_sets_find(w.parents, v);
         s->point_of[v] = root == v ? s->point_count++ : s->point_of[root];
     }
 done:
