@@ -8,7 +8,7 @@
  */
 #include <math.h>
 
-#include "bvh/bvh.h"
+#include "bvh/near/triangle.h"
 #include "scene/scene.h"
 #include "scene/transform.h"
 

@@ -5,12 +5,12 @@
  * most FCT_SCENE_DEPTH, for below level 32 ranges are halved; 2^30 instances need 30 more levels. Ties go to
  * the lower instance, so the result does not depend on threads or addresses.
  */
+#include "scene/volume.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "scene/scene.h"
 
 #define PAD 0x1p-21f /* of the scene's largest extent */
 

@@ -3,10 +3,11 @@
  * Input: the cluster tree. Output: leaves in order of place, which cover every face once. A leaf holds its
  * vertices once and its corners as bytes: 256 bytes at most, about 22 a triangle on a scan. O(F).
  */
-#include "base/parallel.h"
-#include "bvh/bvh.h"
+#include "bvh/build/leaves.h"
 
 #include <string.h>
+
+#include "base/parallel.h"
 
 /* Vertices of a leaf in order of first use; returns how many, or more than the limit as soon as that is
  * known. corners receives 3 count indices. */

@@ -6,8 +6,9 @@
  * less than .75 of the area of its axis boxes stores them as affine maps: they cost twice the arithmetic of
  * axis boxes and pay by leaves that are not visited. O(F) a level of the tree, in parallel.
  */
+#include "bvh/build/nodes.h"
+
 #include "base/parallel.h"
-#include "bvh/bvh.h"
 
 #define ORIENTED_RATIO .75
 

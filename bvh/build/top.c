@@ -5,7 +5,7 @@
  * centres coincide, halves by count, so that no input is deeper than FCT_TOP_DEPTH. Leaves weigh alike,
  * whatever they hold. O(n log n), one thread: a hundredth of the clustering's time.
  */
-#include "bvh/bvh.h"
+#include "bvh/build/top.h"
 
 enum { BIN_COUNT = 16, SPLIT_DEPTH = 48 };
 

@@ -9,7 +9,7 @@
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "bvh/bvh.h"
+#include "bvh/near/nearest.h"
 
 enum { CHUNK = 64 };
 
@@ -63,7 +63,8 @@ static void add_color(const compare_job *job, v3 point, v3 normal, v3 color, fct
     v3 unit = v3_unit(normal);
     if (v3_dot(unit, v3_unit(area_vector(view, near.place))) < AGREE) {
         fct_near facing;
-        if (fct_bvh_facing(job->to, point, unit, sqrt(near.distance2) + job->tie, &facing)) near = facing;
+        if (fct_nearest_search(job->to, point, &unit, sqrt(near.distance2) + job->tie, &facing, NULL))
+            near = facing;
     }
     v3 d = v3_sub(color, corner_mix(view->colors, view->triangles + 3 * (size_t)near.place, near.u, near.v));
     s->color2 += v3_norm2(d);
@@ -75,7 +76,7 @@ static void add_color(const compare_job *job, v3 point, v3 normal, v3 color, fct
 /* With colours, those of the sample and its normal, of any length. */
 static void add_sample(const compare_job *job, v3 point, v3 normal, v3 color, sums *s) {
     fct_near near;
-    if (!fct_bvh_near(job->to, point, INFINITY, &near, NULL)) return;
+    if (!fct_nearest_search(job->to, point, NULL, INFINITY, &near, NULL)) return;
     s->squares += near.distance2;
     if (near.distance2 > s->largest2) s->largest2 = near.distance2;
     ++s->samples;

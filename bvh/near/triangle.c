@@ -1,7 +1,7 @@
 /* bvh/near/triangle.c: the point of a triangle nearest to a point, in double (Ericson, "Real-Time Collision
  * Detection", 2005, 5.1.5: by Voronoi regions). A triangle without area is the union of its sides.
  */
-#include "bvh/bvh.h"
+#include "bvh/near/triangle.h"
 
 /* Parameter in [0, 1] of the point of the segment a b nearest to the origin. */
 static double segment_closest(v3 a, v3 b) {

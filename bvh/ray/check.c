@@ -6,10 +6,11 @@
  * that slips through a closed surface: so the faces around are looked at, and if they cover the ray's
  * neighbourhood on all sides, having missed them is wrong too.
  */
-#include "bvh/bvh.h"
-#include "bvh/ray/ray.h"
-
 #include <string.h>
+
+#include "bvh/near/triangle.h"
+#include "bvh/ray/embree.h"
+#include "bvh/ray/traverse.h"
 
 /* More than the float test moves a triangle by, in scaled units; see bvh.h. */
 #define ROUNDING ((double)FCT_AXIS_PAD)

@@ -3,7 +3,7 @@
  * One device for each structure. Robust traversal, as watertight as ours. Embree runs with denormals flushed
  * to zero, as it asks for; the caller's floating point mode is restored after each call.
  */
-#include "bvh/ray/ray.h"
+#include "bvh/ray/embree.h"
 
 #include <embree3/rtcore.h>
 #include <stdio.h>

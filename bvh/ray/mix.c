@@ -1,7 +1,7 @@
 /* bvh/ray/mix.c: rays that look for trouble: of every kind that has broken a ray tracer. A hash of seed and
  * number makes each ray, so that any one can be made again.
  */
-#include "bvh/bvh.h"
+#include "bvh/model.h"
 
 #include <float.h>
 

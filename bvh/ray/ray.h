@@ -1,26 +1,36 @@
-/* bvh/ray/ray.h: a caller's ray made ready for traversal: scaled like the model, its direction's largest
- * component in [1, 2), and its origin near the model.
+/* bvh/ray/ray.h: a caller's ray prepared for traversal, and the hit that a traversal reports.
+ *
+ * The prepared ray is scaled like the model. The largest component of its direction is in [1, 2), and its
+ * origin is within FCT_REACH of the model's centre.
  */
 #ifndef FCT_BVH_RAY_H
 #define FCT_BVH_RAY_H
 
-#include "bvh/bvh.h"
+#include "bvh/model.h"
 
 typedef struct fct_prepared_ray {
     float origin[3], direction[3];
-    float t_min, t_max;   /* 0 <= t_min */
-    float inverse[3];     /* of the direction, finite */
-    uint32_t side[3];     /* 1 where the direction is negative: which bound is met last */
-    uint32_t axis[3];     /* the last is that of the largest direction component */
-    float shear[3];       /* Woop's: x/z, y/z, 1/z */
+    float t_min, t_max; /* 0 <= t_min */
+    float inverse[3];   /* 1 / direction, finite */
+    uint32_t side[3];   /* per axis, the bound where the ray enters a slab: 1 if the direction is negative */
+    uint32_t axis[3];   /* x, y, z of the shear; z is the axis of the largest direction component */
+    float shear[3];     /* x/z, y/z, 1/z of the direction along these axes (Woop et al. 2013) */
     double factor, shift; /* the caller's t = (shift + t) factor */
-    bool moved;
+    bool moved;           /* the origin is not the caller's */
 } fct_prepared_ray;
 
-/* False where the ray cannot hit anything: malformed, or passing by the model's bounds from afar. */
+/* In scaled space. */
+typedef struct fct_raw_hit {
+    float t, u, v;
+    uint32_t place; /* FCT_NONE on a miss */
+    v3 normal;      /* (p1 - p0) x (p2 - p0) */
+} fct_raw_hit;
+
+/* Returns false if the ray cannot hit anything: it is malformed, or it misses the model's bounds from outside
+ * FCT_REACH. */
 bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *out);
 
-/* The caller's t, within the caller's limits. */
+/* The caller's t of a prepared t, clamped to [ray->t_min, ray->t_max]. */
 float fct_ray_t(const fct_prepared_ray *prepared, const fct_ray *ray, float t);
 
 #endif

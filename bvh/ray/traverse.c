@@ -7,9 +7,10 @@
  * own: a fused multiply-add would break that symmetry. An edge function that comes out zero is computed
  * again in double, where it is exact.
  */
+#include "bvh/ray/traverse.h"
+
 #include "base/key.h"
 #include "base/math/simd.h"
-#include "bvh/ray/ray.h"
 
 typedef struct traversal {
     const fct_bvh *bvh;
@@ -276,39 +277,25 @@ static traversal begin(const fct_bvh *bvh, const fct_prepared_ray *ray) {
         .bvh = bvh, .ray = ray, .hit = {.t = ray->t_max, .place = FCT_NONE}, .visits = {0, 0, 0}};
 }
 
-/* (p1 - p0) x (p2 - p0) of the triangle hit. */
-static v3 hit_normal(const traversal *t) {
-    const float *rows = fct_leaf_vertices(t->leaf);
-    const uint8_t *corners = fct_leaf_corners(t->leaf) + 24 * (t->number / 8) + t->number % 8;
-    uint32_t stride = 8u * t->leaf->vertex_octets;
+static v3 cross_sides(const traversal *t) {
     v3 p[3];
-    for (int c = 0; c < 3; ++c) {
-        uint32_t i = corners[8 * c];
-        p[c] = v3_make((double)rows[i], (double)rows[stride + i], (double)rows[2 * stride + i]);
-    }
+    fct_leaf_triangle(t->leaf, t->number, p);
     return v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
-}
-
-static void add_visits(fct_visits *visits, const fct_visits *more) {
-    if (!visits) return;
-    visits->nodes += more->nodes;
-    visits->boxes += more->boxes;
-    visits->triangles += more->triangles;
 }
 
 bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit,
                           fct_visits *visits) {
     traversal t = begin(bvh, ray);
     bool found = traverse(&t, false);
-    if (found) t.hit.normal = hit_normal(&t);
+    if (found) t.hit.normal = cross_sides(&t);
     *hit = t.hit;
-    add_visits(visits, &t.visits);
+    fct_visits_add(visits, &t.visits);
     return found;
 }
 
 bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits) {
     traversal t = begin(bvh, ray);
     bool found = traverse(&t, true);
-    add_visits(visits, &t.visits);
+    fct_visits_add(visits, &t.visits);
     return found;
 }

@@ -5,14 +5,15 @@
  * textures, skins and animations. Under a mirroring node the specification turns the winding, as instances of
  * a scene do.
  */
+#include "scene/read/gltf.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "mesh/glb/glb.h"
 #include "mesh/soup.h"
-#include "scene/read/gltf.h"
-#include "scene/read/load.h"
+#include "scene/read/gltf_pack.h"
 #include "scene/transform.h"
 
 /* Whites of 1 would let light live for ever. */

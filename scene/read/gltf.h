@@ -1,11 +1,12 @@
-/* scene/read/gltf.h: between the two halves of the glTF reader. */
+/* scene/read/gltf.h: reads glTF 2.0 into a scene. */
 #ifndef FCT_SCENE_GLTF_H
 #define FCT_SCENE_GLTF_H
 
-#include "base/env.h"
+#include "scene/scene.h"
 
-/* A .gltf with all its buffers as a GLB; *out is to be released. Errors: DATA, INPUT, MEMORY. */
-fct_result fct_gltf_pack(const fct_env *env, const char *name, const char *text, size_t size,
-                         const char *base, unsigned char **out, size_t *out_size);
+/* Adds the nodes of a .gltf or GLB to an empty scene. `name` is for messages, `base` is the folder of
+ * relative paths ("" or ending in '/'). Errors: DATA, INPUT, MEMORY, CANCELLED. */
+fct_result fct_scene_read_gltf(fct_scene *scene, const char *name, const unsigned char *data, size_t size,
+                               const char *base);
 
 #endif

@@ -4,12 +4,13 @@
  * Buffers are files beside the .gltf or data URIs in base64; they are laid one behind another, and
  * bufferViews are moved along. Nothing is allocated beyond what the files hold.
  */
+#include "scene/read/gltf_pack.h"
+
 #include <string.h>
 
 #include "base/io/file.h"
-#include "scene/read/gltf.h"
-#include "scene/read/json.h"
-#include "scene/read/load.h"
+#include "scene/read/json/json.h"
+#include "scene/read/path.h"
 
 typedef struct packer {
     fct_json json;

@@ -6,6 +6,8 @@
  * winding of such files is seldom to be trusted; what emits is one-sided, by its winding. A library that is
  * missing, a material that is used and not defined, and a polygon before the first usemtl are errors.
  */
+#include "scene/read/obj.h"
+
 #include <jansson.h>
 #include <string.h>
 
@@ -13,7 +15,7 @@
 #include "mesh/parse.h"
 #include "mesh/soup.h"
 #include "mesh/text/text.h"
-#include "scene/read/load.h"
+#include "scene/read/path.h"
 
 typedef struct span {
     uint32_t first; /* polygon */

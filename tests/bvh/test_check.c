@@ -2,7 +2,7 @@
  * where there is one. */
 #include "models.h"
 
-#include "bvh/bvh.h"
+#include "bvh/model.h"
 
 static void backends_agree(const fct_env *env, const fct_mesh *mesh, size_t count, const char *name) {
     if (SANITIZED) count /= 10;

@@ -1,7 +1,7 @@
 /* Nearest points against brute force, closed forms and Embree's point query; errors between surfaces. */
 #include "models.h"
 
-#include "bvh/bvh.h"
+#include "bvh/near/triangle.h"
 
 #include <embree3/rtcore.h>
 

@@ -1,7 +1,7 @@
 /* No ray from inside a closed model leaves it; and the eight-wide kernels answer as their scalar twins. */
 #include "models.h"
 
-#include "bvh/ray/ray.h"
+#include "bvh/ray/traverse.h"
 
 bool scalar_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit, fct_visits *visits);
 bool scalar_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits);

@@ -1,4 +1,5 @@
-/* scene/read/json.h: typed values out of a JSON document, and errors that name the file and the place. */
+/* scene/read/json/json.h: typed values out of a JSON document, and errors that name the file and the place.
+ */
 #ifndef FCT_SCENE_JSON_H
 #define FCT_SCENE_JSON_H
 

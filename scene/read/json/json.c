@@ -1,5 +1,5 @@
-/* scene/read/json.c: see json.h. */
-#include "scene/read/json.h"
+/* scene/read/json/json.c: see json.h. */
+#include "scene/read/json/json.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,0 +1,23 @@
+/* bvh/build/top.h: a binary tree over the leaves, split by surface-area cost. */
+#ifndef FCT_BVH_TOP_H
+#define FCT_BVH_TOP_H
+
+#include "bvh/build/leaves.h"
+
+typedef struct fct_top_node {
+    float bounds[6];      /* lower then upper, scaled */
+    uint32_t left, right; /* nodes; FCT_NONE in a leaf, which has end == begin + 1 */
+    uint32_t begin, end;  /* range of fct_top.order */
+} fct_top_node;
+
+typedef struct fct_top {
+    uint32_t node_count;
+    fct_top_node *nodes; /* node 0 is the root */
+    uint32_t *order;     /* indices into fct_leaf_list */
+} fct_top;
+
+/* At most FCT_TOP_DEPTH levels. fct_top_release frees *out. Errors: MEMORY. */
+fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_top *out);
+void fct_top_release(const fct_env *env, fct_top *top);
+
+#endif

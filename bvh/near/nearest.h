@@ -1,0 +1,25 @@
+/* bvh/near/nearest.h: the search for the nearest face. A kernel: nearest.c is compiled per processor. */
+#ifndef FCT_BVH_NEAREST_H
+#define FCT_BVH_NEAREST_H
+
+#include "bvh/model.h"
+
+typedef struct fct_near {
+    v3 point;         /* unscaled */
+    double distance2; /* squared, unscaled */
+    double u, v;      /* barycentric weights of corners 1 and 2 */
+    uint32_t place;
+} fct_near;
+
+/* The nearest face within max_distance of the point; equal distances: the lower face id.
+ *
+ * If `normal` (a unit vector) is not NULL, the faces within max_distance compete by their normals instead:
+ * the result is the face whose normal has the largest cosine to it; equal cosines: the nearest; equal
+ * distances: the lower face id. A face without area ranks last.
+ *
+ * Returns false if no face is that near, if the point or max_distance is not a number, or for the Embree
+ * backend, and then leaves *out unchanged. visits may be NULL. */
+bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
+                        fct_visits *visits);
+
+#endif

@@ -1,0 +1,19 @@
+/* bvh/ray/embree.h: Embree as the second backend. */
+#ifndef FCT_BVH_EMBREE_H
+#define FCT_BVH_EMBREE_H
+
+#include "bvh/ray/ray.h"
+
+typedef struct fct_embree fct_embree;
+
+/* Sets bvh->embree, also after a failure; fct_embree_destroy frees it. Errors: MEMORY, CANCELLED, INTERNAL.
+ */
+fct_result fct_embree_create(fct_bvh *bvh);
+void fct_embree_destroy(const fct_env *env, fct_embree *embree);
+size_t fct_embree_bytes(const fct_embree *embree);
+
+/* *hit is unchanged on a miss. */
+bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit);
+bool fct_embree_any(const fct_bvh *bvh, const fct_prepared_ray *ray);
+
+#endif

@@ -1,0 +1,77 @@
+/* bvh/ray/query.c: the public ray queries, single and in batches, over either backend. */
+#include "base/parallel.h"
+#include "bvh/ray/embree.h"
+#include "bvh/ray/traverse.h"
+
+/* Items per task of a batch: both are 1,024 rays. */
+enum { CLOSEST_CHUNK = 1024, WORD_CHUNK = 1024 / 64 };
+
+/* The scaled normal in the model's unit. If a float would overflow or vanish, the result is another positive
+ * multiple of it. */
+static void unscale_normal(const fct_bvh *bvh, v3 n, float out[3]) {
+    double unit = 1 / bvh->scale, largest = fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) * unit * unit;
+    double factor = unit * unit;
+    if (largest > 0x1p126 || (largest > 0 && largest < 0x1p-100)) factor *= ldexp(1, -ilogb(largest));
+    v3_store(out, v3_scale(n, factor));
+}
+
+bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, fct_visits *visits) {
+    fct_prepared_ray prepared;
+    fct_raw_hit raw;
+    bool found = fct_ray_prepare(bvh, ray, &prepared) &&
+                 (bvh->embree ? fct_embree_closest(bvh, &prepared, &raw)
+                              : fct_traverse_closest(bvh, &prepared, &raw, visits));
+    if (!found) {
+        *hit = (fct_hit){.t = INFINITY, .face = FCT_NONE, .place = FCT_NONE};
+        return false;
+    }
+    hit->t = fct_ray_t(&prepared, ray, raw.t);
+    hit->u = raw.u, hit->v = raw.v;
+    hit->place = raw.place;
+    hit->face = bvh->view.face_ids[raw.place];
+    unscale_normal(bvh, raw.normal, hit->normal);
+    return true;
+}
+
+bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits) {
+    fct_prepared_ray prepared;
+    return fct_ray_prepare(bvh, ray, &prepared) &&
+           (bvh->embree ? fct_embree_any(bvh, &prepared) : fct_traverse_any(bvh, &prepared, visits));
+}
+
+typedef struct ray_batch {
+    const fct_bvh *bvh;
+    const fct_ray *rays;
+    size_t count;
+    fct_hit *hits;
+    uint64_t *occluded;
+} ray_batch;
+
+static void find_closest_hits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const ray_batch *batch = user;
+    for (size_t i = begin; i < end; ++i)
+        fct_bvh_closest_hit(batch->bvh, &batch->rays[i], &batch->hits[i], NULL);
+}
+
+void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, fct_hit *hits) {
+    ray_batch batch = {.bvh = bvh, .rays = rays, .count = count, .hits = hits};
+    fct_parallel_for(bvh->env, count, CLOSEST_CHUNK, find_closest_hits, &batch);
+}
+
+/* An item is a word of 64 rays, so that two threads never write the same word. */
+static void find_any_hits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const ray_batch *batch = user;
+    for (size_t word = begin; word < end; ++word) {
+        uint64_t bits = 0;
+        for (size_t i = 64 * word; i < batch->count && i < 64 * word + 64; ++i)
+            bits |= (uint64_t)fct_bvh_any_hit(batch->bvh, &batch->rays[i], NULL) << (i % 64);
+        batch->occluded[word] = bits;
+    }
+}
+
+void fct_bvh_any_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, uint64_t *occluded) {
+    ray_batch batch = {.bvh = bvh, .rays = rays, .count = count, .occluded = occluded};
+    fct_parallel_for(bvh->env, (count + 63) / 64, WORD_CHUNK, find_any_hits, &batch);
+}

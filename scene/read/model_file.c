@@ -1,0 +1,54 @@
+/* scene/read/model_file.c: see model_file.h. */
+#include "scene/read/model_file.h"
+
+#include <string.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "base/io/file.h"
+#include "scene/read/path.h"
+
+/* The hierarchy beside the mesh, if there is one and it is of these very bytes. */
+static fct_result open_beside(const fct_env *env, const char *path, fct_tree **out) {
+    *out = NULL;
+    const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
+    if (!dot || (slash && dot < slash)) return FCT_OK;
+    size_t stem = (size_t)(dot - path);
+    char *beside = fct_allocate(env, stem + 5, 1);
+    if (!beside) return fct_fail_memory(env, "a path");
+    memcpy(beside, path, stem);
+    memcpy(beside + stem, ".fct", 5);
+    fct_file file = {0};
+    fct_result result = FCT_OK;
+    if (access(beside, F_OK) == 0) {
+        result = fct_file_open(env, path, &file);
+        if (result == FCT_OK) result = fct_tree_open(env, beside, out);
+        if (result == FCT_OK && fct_tree_get(*out).source_hash != XXH3_64bits(file.data, file.size)) {
+            fct_note(env, FCT_MESSAGE_NOTE, "%s is not of the present %s and is left aside", beside, path);
+            fct_tree_destroy(*out);
+            *out = NULL;
+        }
+    }
+    fct_file_close(env, &file);
+    fct_release(env, beside);
+    return result;
+}
+
+fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, fct_model_file *out) {
+    *out = (fct_model_file){0};
+    if (fct_path_ends(path, ".fct")) return fct_tree_open(env, path, &out->tree);
+    fct_result result = want_mesh ? FCT_OK : open_beside(env, path, &out->tree);
+    if (result != FCT_OK || out->tree) return result;
+    result = fct_mesh_load(env, path, &out->mesh);
+    if (result == FCT_OK && out->mesh.face_count == 0) {
+        fct_mesh_release(env, &out->mesh);
+        result = fct_fail(env, FCT_ERROR_DATA, "%s: a model needs at least one face, found none", path);
+    }
+    return result;
+}
+
+void fct_model_close(const fct_env *env, fct_model_file *file) {
+    if (file->tree) fct_tree_destroy(file->tree);
+    fct_mesh_release(env, &file->mesh);
+    *file = (fct_model_file){0};
+}
