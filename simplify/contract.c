@@ -1,22 +1,28 @@
-/* simplify/contract.c: the loop that takes the cheapest edge and contracts it.
+/* simplify/contract.c: see contract.h.
  *
- * Quadrics only grow, so the cost an edge was queued with is a lower bound: an edge is looked at again when
- * it comes up, and goes back if it has become dearer. Where two edges become one, one of them is dropped.
- * Refused edges return to the queue when a contraction changes their surroundings. A contraction is O(faces
- * around the smaller end) at a hub, a point of more than SIMPLIFY_HUB faces, and O(both rings) elsewhere.
+ * 1. Compute the cost of every edge (in parallel) and queue the edges by it.
+ * 2. Pop the cheapest edge and compute its cost again. Quadrics only grow, so the queued cost is a lower
+ * bound: an edge whose cost has grown returns to the queue.
+ * 3. Refuse edges that fail a check or cost more than max_error. They return when a contraction changes their
+ *    surroundings.
+ * 4. Contract, and merge edges that became twins.
+ * Cost of a contraction: O(corners of both rings); at a hub only O(corners of the smaller ring).
+ * Source: Garland 1999, section 3.9, with lazy re-evaluation.
  */
+#include "simplify/contract.h"
+
 #include "base/parallel.h"
+#include "simplify/collapse.h"
 #include "simplify/cost/loss.h"
-#include "simplify/cost/placement.h"
+#include "simplify/topology/link.h"
+#include "simplify/topology/ring.h"
 
-/* Cosine of the largest angle by which a face may turn in one contraction. */
-#define MIN_TURN_COSINE .1
+enum {
+    EDGE_CHUNK = 4096,      /* edges per parallel task */
+    PROGRESS_PERIOD = 4096, /* contractions between two calls of the progress hook */
+};
 
-static void drop_edge(fct_simplifier *s, uint32_t e) {
-    s->edges[e].state = EDGE_DEAD;
-}
-
-/* Puts an edge aside until something changes around it. */
+/* Keeps an edge out of the queue until a contraction changes its surroundings. */
 static void refuse_edge(fct_simplifier *s, uint32_t e, const uint32_t ends[2], uint8_t state) {
     s->edges[e].state = state;
     s->refused[ends[0]] = s->refused[ends[1]] = 1;
@@ -31,179 +37,13 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
     queue_push(&s->queue, e, s->queue.current);
 }
 
-uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring) {
-    uint32_t count = 0, last = FCT_NONE;
-    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
-        if (corner_dead(s, c)) continue;
-        if (last == FCT_NONE)
-            s->first_corners[point] = c;
-        else
-            s->next_corners[last] = c;
-        last = c;
-        ring[count++] = c;
-    }
-    if (last == FCT_NONE)
-        s->first_corners[point] = FCT_NONE;
-    else
-        s->next_corners[last] = FCT_NONE;
-    s->last_corners[point] = last;
-    return count;
-}
-
-bool fct_simplify_folds_over(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
-                             v3 from, v3 at) {
-    for (uint32_t i = 0; i < count; ++i) {
-        uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
-        if (x == other || y == other) continue;
-        v3 px = point_position(s, x), side = v3_sub(point_position(s, y), px);
-        v3 before = v3_cross(v3_sub(px, from), side), after = v3_cross(v3_sub(px, at), side);
-        double before2 = v3_norm2(before), dot = v3_dot(before, after);
-        if (before2 == 0) continue;
-        if (!(dot > 0 && dot * dot > MIN_TURN_COSINE * MIN_TURN_COSINE * before2 * v3_norm2(after)))
-            return true;
-    }
-    return false;
-}
-
-/* Takes a wedge without faces out of its point's list; what it knows of the position stays with another. */
-static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
-    uint32_t keep = FCT_NONE, *link = &s->first_wedges[point];
-    for (uint32_t w = *link; w != FCT_NONE; w = s->next_wedges[w])
-        if (w != wedge && (keep == FCT_NONE || s->wedge_uses[w] > s->wedge_uses[keep])) keep = w;
-    if (keep == FCT_NONE) return;
-    while (*link != wedge) link = &s->next_wedges[*link];
-    *link = s->next_wedges[wedge];
-    const double *q = s->quadrics + (size_t)s->quadric_size * wedge;
-    double *to = s->quadrics + (size_t)s->quadric_size * keep;
-    fct_elimination e;
-    fct_quadric_eliminate(q, s->steering, s->attributes + (size_t)s->channel_count * wedge,
-                          1e-12 * quadric_trace(q), &e);
-    for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += e.position[k];
-}
-
-static void drop_corner(fct_simplifier *s, uint32_t c) {
-    --s->valences[s->triangles[c]];
-    if (s->corner_wedges) --s->wedge_uses[corner_wedge(s, c)];
-}
-
-/* The sides from the face's apex to the two ends of the contracted edge become one edge. */
-static void join_twins(fct_simplifier *s, uint32_t side_a, uint32_t side_b) {
-    uint32_t ea = edge_root(s->edges, s->side_edges[side_a]);
-    uint32_t eb = edge_root(s->edges, s->side_edges[side_b]);
-    if (ea == eb) return;
-    const fct_edge *a = &s->edges[ea], *b = &s->edges[eb];
-    bool queued_a = a->state == EDGE_QUEUED, queued_b = b->state == EDGE_QUEUED;
-    bool keep_b = queued_b && (!queued_a || b->bucket > a->bucket);
-    uint32_t keep = keep_b ? eb : ea, drop = keep_b ? ea : eb;
-    drop_edge(s, drop);
-    s->edges[drop].parent = keep;
-}
-
-/* Face of corner c at b, which also has a corner at a. */
-static void remove_face(fct_simplifier *s, uint32_t c, uint32_t a) {
-    uint32_t next = corner_next(c), previous = corner_previous(c);
-    if (s->triangles[next] == a)
-        join_twins(s, next, previous);
-    else
-        join_twins(s, next, c);
-    uint32_t apex = s->triangles[next] == a ? previous : next;
-    uint32_t point = s->triangles[apex];
-    for (int k = 0; k < 3; ++k) drop_corner(s, c - c % 3 + (uint32_t)k);
-    if (s->corner_wedges && s->wedge_uses[corner_wedge(s, apex)] == 0)
-        retire_wedge(s, point, corner_wedge(s, apex));
-    s->triangles[c - c % 3] = FCT_NONE;
-    --s->live_faces;
-}
-
-/* Makes each group one wedge of point a. */
-static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candidate *candidate, uint32_t a,
-                         v3 first, v3 second) {
-    double values[SIMPLIFY_MAX_WEDGES][SIMPLIFY_MAX_CHANNELS];
-    for (uint32_t i = 0; i < g->group_count; ++i)
-        fct_place_attributes(s, g, i, candidate, first, second, values[i]);
-    s->first_wedges[a] = FCT_NONE;
-    for (uint32_t i = g->group_count; i-- > 0;) {
-        uint32_t keep = FCT_NONE;
-        for (uint32_t k = 0; k < g->wedge_count; ++k) {
-            uint32_t w = g->wedges[k];
-            if (g->group_of[k] != i) continue;
-            if (keep == FCT_NONE) {
-                keep = w;
-                continue;
-            }
-            double *to = s->quadrics + (size_t)s->quadric_size * keep;
-            const double *from = s->quadrics + (size_t)s->quadric_size * w;
-            for (uint32_t j = 0; j < s->quadric_size; ++j) to[j] += from[j];
-            s->wedge_parents[w] = keep;
-            s->wedge_uses[keep] += s->wedge_uses[w];
-            uint32_t class_keep = fct_sets_find(s->class_parents, s->wedge_classes[keep]);
-            s->class_parents[fct_sets_find(s->class_parents, s->wedge_classes[w])] = class_keep;
-        }
-        memcpy(s->attributes + (size_t)s->channel_count * keep, values[i], s->channel_count * sizeof(double));
-        s->next_wedges[keep] = s->first_wedges[a];
-        s->first_wedges[a] = keep;
-    }
-    for (uint32_t w = s->first_wedges[a], next; w != FCT_NONE; w = next) {
-        next = s->next_wedges[w];
-        if (s->wedge_uses[w] == 0) retire_wedge(s, a, w);
-    }
-}
-
-/* Moves what b has to a; ring_b holds b's corners. */
-static void contract_into(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
-    uint32_t first = FCT_NONE, last = FCT_NONE;
-    for (uint32_t i = 0; i < count_b; ++i) {
-        uint32_t c = s->ring_b[i];
-        if (s->triangles[corner_next(c)] == a || s->triangles[corner_previous(c)] == a) {
-            remove_face(s, c, a);
-            continue;
-        }
-        s->triangles[c] = a;
-        if (first == FCT_NONE)
-            first = c;
-        else
-            s->next_corners[last] = c;
-        last = c;
-        ++s->valences[a];
-        --s->valences[b];
-    }
-    s->first_corners[b] = s->last_corners[b] = FCT_NONE;
-    s->point_parents[b] = a;
-    if (first == FCT_NONE) return;
-    s->next_corners[last] = FCT_NONE;
-    if (s->first_corners[a] == FCT_NONE)
-        s->first_corners[a] = first;
-    else
-        s->next_corners[s->last_corners[a]] = first;
-    s->last_corners[a] = last;
-}
-
-static void apply(fct_simplifier *s, uint32_t ends[2], const fct_candidate *candidate, uint32_t keep,
-                  uint32_t count_b) {
-    uint32_t a = ends[keep], b = ends[1 - keep];
-    fct_groups g;
-    v3 first = point_position(s, ends[0]), second = point_position(s, ends[1]);
-    if (s->corner_wedges) fct_groups_find(s, ends[0], ends[1], &g);
-    uint32_t source = candidate->end < 2 ? s->sources[ends[candidate->end]] : FCT_NONE;
-    contract_into(s, a, b, count_b);
-    s->sources[a] = source;
-    if (s->corner_wedges)
-        merge_wedges(s, &g, candidate, a, first, second);
-    else {
-        double *to = s->quadrics + (size_t)POSITION_QUADRIC * a;
-        const double *from = s->quadrics + (size_t)POSITION_QUADRIC * b;
-        for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
-    }
-    double *at = s->positions + 3 * (size_t)a;
-    at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
-}
-
-static double *first_quadric(const fct_simplifier *s, uint32_t point) {
+static double *find_first_quadric(const fct_simplifier *s, uint32_t point) {
     uint32_t w = s->first_wedges ? s->first_wedges[point] : point;
     return s->quadrics + (size_t)s->quadric_size * w;
 }
 
-/* Edges of the faces around a point that were put aside come back; `refused` tells where there may be any. */
+/* Returns the refused edges of the faces of a ring to the queue. `refused` marks the points that may have
+ * some. */
 static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         if (corner_dead(s, ring[i])) continue;
@@ -214,17 +54,19 @@ static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t cou
     }
 }
 
-/* Whether moving b into a, for good or bad, keeps faces from turning over, and topology where asked. */
-static bool allowed(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b, v3 at) {
+/* Whether contracting a and b folds no face over and, if the caller asked, keeps the topology. */
+static bool check_contraction(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
+                              v3 at) {
     if (s->def->keep_topology && !fct_simplify_link_holds(s, a, b, count_a, count_b)) return false;
     return !s->def->check_foldover ||
            !(fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), at) ||
              fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), at));
 }
 
-/* Whether a candidate that costs more than was thought can still be taken now; if not, it is put back. */
-static bool still_cheapest(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
-                           const fct_candidate *candidate) {
+/* Whether the edge may be contracted now. If its cost has grown beyond the current bucket, the edge returns
+ * to the queue; if its error exceeds max_error, the edge is refused. */
+static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
+                         const fct_candidate *candidate) {
     uint32_t bucket = queue_bucket(candidate->key);
     if (bucket > s->queue.current) {
         queue_push(&s->queue, e, bucket);
@@ -238,7 +80,8 @@ static bool still_cheapest(fct_simplifier *s, uint32_t e, const uint32_t ends[2]
     return true;
 }
 
-/* Gathers both rings (b's alone where a is a hub) and contracts if that is allowed. */
+/* Contracts the edge if the checks and the loss allow it. Gathers both rings, or only that of the smaller end
+ * if the larger one is a hub. */
 static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
     fct_edge *edge = &s->edges[e];
     uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
@@ -249,11 +92,12 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     for (uint32_t i = 0; i < count_b; ++i)
         shared +=
             s->triangles[corner_next(s->ring_b[i])] == a || s->triangles[corner_previous(s->ring_b[i])] == a;
-    bool fine = shared > 0 && allowed(s, a, b, count_a, count_b, candidate->at);
+    bool fine = shared > 0 && check_contraction(s, a, b, count_a, count_b, candidate->at);
     if (!fine) {
-        /* An edge without faces is none any more; two hubs are looked at once only, for the time it takes. */
+        /* An edge without faces no longer exists. An edge of two hubs is tried only once, because it takes
+         * long. */
         if (shared == 0 || two_hubs)
-            drop_edge(s, e);
+            fct_simplify_drop_edge(s, e);
         else if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
             refuse_edge(s, e, ends, EDGE_REFUSED);
         else {
@@ -263,14 +107,14 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
         return false;
     }
     fct_loss loss;
-    double cost = hub ? 0 : fct_simplify_loss(s, a, b, count_a, count_b, candidate, &loss);
+    double cost = hub ? 0 : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
     if (cost > 0) {
         candidate->error += cost, candidate->key += cost;
-        if (!still_cheapest(s, e, ends, candidate)) return false;
+        if (!confirm_cost(s, e, ends, candidate)) return false;
     }
-    drop_edge(s, e);
-    apply(s, ends, candidate, keep, count_b);
-    if (cost > 0) fct_simplify_remember(&loss, first_quadric(s, a));
+    fct_simplify_drop_edge(s, e);
+    fct_simplify_collapse(s, ends, candidate, keep, count_b);
+    if (cost > 0) fct_loss_add(&loss, find_first_quadric(s, a));
     s->refused[a] |= s->refused[b];
     if (s->refused[a]) {
         requeue_around(s, s->ring_a, count_a);
@@ -279,12 +123,12 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     return true;
 }
 
-/* Looks at the edge that came up: contracts it, sends it back, refuses or drops it. True when contracted. */
+/* Contracts, requeues, refuses or drops the edge that the queue gave. True if it was contracted. */
 static bool process_edge(fct_simplifier *s, uint32_t e) {
     uint32_t ends[2];
     for (int k = 0; k < 2; ++k) ends[k] = fct_sets_find(s->point_parents, s->edges[e].ends[k]);
     if (ends[0] == ends[1]) {
-        drop_edge(s, e);
+        fct_simplify_drop_edge(s, e);
         return false;
     }
     fct_candidate candidate;
@@ -292,13 +136,14 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
         refuse_edge(s, e, ends, EDGE_REFUSED);
         return false;
     }
-    if (!still_cheapest(s, e, ends, &candidate)) return false;
+    if (!confirm_cost(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
     if (candidate.error > 0) s->max_error2 = fmax(s->max_error2, candidate.error / candidate.area);
     return true;
 }
 
-static void first_buckets(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+/* Edges [begin, end): the bucket of their first cost. */
+static void find_first_buckets(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     fct_simplifier *s = user;
     for (size_t e = begin; e < end; ++e) {
@@ -312,7 +157,8 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     uint32_t before = s->live_faces, contractions = 0;
     *stop = FCT_STOP_FACES;
     if (before <= s->def->target_faces) return FCT_OK;
-    fct_result result = fct_parallel_for_progress(s->env, "costs", s->edge_count, 4096, first_buckets, s);
+    fct_result result =
+        fct_parallel_for_progress(s->env, "costs", s->edge_count, EDGE_CHUNK, find_first_buckets, s);
     if (result != FCT_OK) return result;
     queue_clear(&s->queue, s->edges);
     for (uint32_t e = s->edge_count; e-- > 0;) queue_push(&s->queue, e, s->edges[e].bucket);
@@ -320,7 +166,7 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
         uint32_t e = queue_pop(&s->queue);
         if (e == FCT_NONE) break;
         if (s->edges[e].state != EDGE_QUEUED) continue;
-        if (!process_edge(s, e) || ++contractions % 4096) continue;
+        if (!process_edge(s, e) || ++contractions % PROGRESS_PERIOD) continue;
         double goal = (double)before - s->def->target_faces;
         result = fct_progress(s->env, "contract", (before - s->live_faces) / goal);
         if (result != FCT_OK) return result;

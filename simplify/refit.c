@@ -1,29 +1,40 @@
-/* simplify/refit.c: moves the points that are left closer to the input.
+/* simplify/refit.c: see refit.h. Each pass:
  *
- * Every input face asks, at its centroid and corners (weights 3/4 and 1/12 of its area, the rule exact to
- * second degree), for the nearest point of the faces around the points it was contracted to. Each point then
- * takes one damped least-squares step along the directions to its samples, and each attribute one towards
- * their values: half the way for points, whose neighbours move too, with a tenth of the trace on the diagonal
- * so that nothing slides along the surface. Steps that would turn a face over are not made. O(samples x
- * valence) a pass; the search is parallel, the sums run in the order of the samples.
+ * 1. Samples are the corners (weight 1/12 of the face's area) and centroids (weight 3/4) of the input's
+ * faces. Each finds the nearest point of the faces around the points that its corners were contracted to.
+ * 2. Each point takes one damped least-squares step along the directions to its samples, each attribute a
+ * step towards their values. Steps that would fold a face over are left out. The search is parallel; the sums
+ * run in the order of the samples, so the result does not depend on the threads. Cost of a pass: O(samples *
+ * valence).
  */
+#include "simplify/refit.h"
+
 #include "base/parallel.h"
 #include "simplify/cost/nearest.h"
-#include "simplify/cost/quadric.h"
+#include "simplify/topology/ring.h"
 
-#define STEP    .5
+/* The fraction of a least-squares step that a point takes: half, because its neighbours move too. */
+#define STEP .5
+/* Added to the diagonal of a point's system, times its trace, so that no point slides along the surface. With
+ * a far smaller value points move far away from it. */
 #define DAMPING .1
 /* The longest step, in lengths of the shortest edge at the point. */
 #define MAX_STEP .5
-/* Distances below this, in the unit cube, are rounding of the input's floats. */
+/* Shorter distances, in the unit cube, are rounding errors of the input's floats. */
 #define NOISE 1e-7
+/* A barycentric weight above this counts as positive. */
+#define RIM 1e-6
+/* Quadrature over a face, exact for polynomials of degree 2: the centroid weighs 3/4 of the area, each corner
+ * 1/12. */
+#define CENTROID_WEIGHT .75
+#define CORNER_DIVISOR  12
 
-enum { GRAIN = 1024, MAX_STEPS = 4 };
+enum { CHUNK = 1024 /* items per parallel task */, MAX_WALK = 4 /* steps from ring to ring */ };
 
-/* Where a sample came to lie: barycentrics of the second and third corner. */
+/* The nearest point of a sample: a + u ab + v ac of the target. */
 typedef struct landing {
-    uint32_t target; /* FCT_NONE: nowhere */
-    bool attributes; /* on its own side of a seam, so that its attributes count */
+    uint32_t target; /* FCT_NONE: there is none */
+    bool attributes; /* the target is on the sample's side of a seam, so its attributes count */
     float u, v;
 } landing;
 
@@ -31,7 +42,7 @@ typedef struct ring_entry {
     uint32_t corner, target;
 } ring_entry;
 
-/* A face of the result, ready for the search. */
+/* A live face, prepared for the search. */
 typedef struct target {
     triangle shape;
     v3 n; /* unit normal */
@@ -40,17 +51,19 @@ typedef struct target {
 
 typedef struct refit {
     fct_simplifier *s;
-    uint32_t *corners;      /* by wedge of the input, which is a sample: a corner of it, or FCT_NONE */
-    double *corner_weights; /* by wedge of the input */
-    landing *landings;      /* by sample: the wedges of the input, then its faces */
+    uint32_t *corners;      /* per wedge of the input: one of its corners, or FCT_NONE */
+    double *corner_weights; /* per wedge of the input */
+    landing *landings;      /* per sample: first the wedges of the input, then its faces */
     target *targets;        /* the live faces */
     ring_entry *rings;      /* the corners at each point, point after point */
-    uint32_t *ring_ends;    /* by point: end of its part of rings; it begins valence before */
-    double (*systems)[9];   /* by point: xx xy xz yy yz zz, then the right side */
-    double *sums, *weights; /* by wedge and channel; by wedge */
+    uint32_t *ring_ends;    /* per point: end of its part of `rings`, which holds `valence` entries */
+    double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
+    double *sums;           /* per wedge and channel: weighted residuals */
+    double *weights;        /* per wedge */
 } refit;
 
-/* Looks for the nearest face around a point, among those on the wedge's side of a seam if there are any. */
+/* Updates *best and *out by the faces around a point. Faces on the wedge's side of a seam take precedence
+ * over nearer faces on another side. Hubs are skipped. */
 static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, foot *best, landing *out) {
     const fct_simplifier *s = r->s;
     if (s->valences[point] > SIMPLIFY_HUB) return;
@@ -69,30 +82,32 @@ static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, fo
     }
 }
 
-static v3 input_position(const fct_simplifier *s, uint32_t corner) {
+/* A corner of the input in the unit cube. */
+static v3 find_input_position(const fct_simplifier *s, uint32_t corner) {
     v3 p = v3_load(s->mesh->positions + 3 * (size_t)s->mesh->triangles[corner]);
     return v3_scale(v3_sub(p, s->center), 1 / s->extent);
 }
 
-static bool input_degenerate(const fct_simplifier *s, uint32_t f) {
+/* Whether two corners of a face of the input share a point. */
+static bool is_degenerate(const fct_simplifier *s, uint32_t f) {
     const uint32_t *t = s->mesh->triangles + 3 * (size_t)f;
     uint32_t a = s->point_of[t[0]], b = s->point_of[t[1]], c = s->point_of[t[2]];
     return a == b || b == c || c == a;
 }
 
-static double input_area(const fct_simplifier *s, uint32_t f) {
-    v3 a = input_position(s, 3 * f);
-    return .5 * v3_norm(v3_cross(v3_sub(input_position(s, 3 * f + 1), a),
-                                 v3_sub(input_position(s, 3 * f + 2), a)));
+static double find_input_area(const fct_simplifier *s, uint32_t f) {
+    v3 a = find_input_position(s, 3 * f);
+    return .5 * v3_norm(v3_cross(v3_sub(find_input_position(s, 3 * f + 1), a),
+                                 v3_sub(find_input_position(s, 3 * f + 2), a)));
 }
 
-static uint32_t input_wedge(const fct_simplifier *s, uint32_t corner) {
+static uint32_t find_input_wedge(const fct_simplifier *s, uint32_t corner) {
     return s->corner_wedges ? s->corner_wedges[corner] : s->point_of[s->mesh->triangles[corner]];
 }
 
-/* The corners whose mean a sample is: one of a wedge, all three of a face. Returns how many, 0 for a sample
- * that does not count. */
-static uint32_t sample_corners(const refit *r, size_t sample, uint32_t corners[3]) {
+/* A sample is the mean of these corners: one for a wedge, three for a face. Returns their number; 0 if the
+ * sample does not count. */
+static uint32_t find_sample_corners(const refit *r, size_t sample, uint32_t corners[3]) {
     const fct_simplifier *s = r->s;
     if (sample < s->wedge_count) {
         corners[0] = r->corners[sample];
@@ -100,31 +115,32 @@ static uint32_t sample_corners(const refit *r, size_t sample, uint32_t corners[3
     }
     uint32_t f = (uint32_t)(sample - s->wedge_count);
     for (uint32_t k = 0; k < 3; ++k) corners[k] = 3 * f + k;
-    return input_degenerate(s, f) ? 0 : 3;
+    return is_degenerate(s, f) ? 0 : 3;
 }
 
-static v3 sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count) {
+static v3 find_sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count) {
     v3 sum = {0, 0, 0};
-    for (uint32_t i = 0; i < count; ++i) sum = v3_add(sum, input_position(s, corners[i]));
+    for (uint32_t i = 0; i < count; ++i) sum = v3_add(sum, find_input_position(s, corners[i]));
     return count == 1 ? sum : v3_scale(sum, 1. / 3);
 }
 
-/* Goes on from a foot on the rim of the rings searched to the rings of that side's ends, while it gets
- * nearer. */
-static void walk(const refit *r, const uint32_t *points, uint32_t count, v3 p, foot *best, landing *out) {
+/* If the nearest point lies on the rim of the searched rings, searches the rings of the points of that rim,
+ * and so on while the distance decreases. */
+static void walk_rings(const refit *r, const uint32_t *points, uint32_t count, v3 p, foot *best,
+                       landing *out) {
     const fct_simplifier *s = r->s;
-    uint32_t searched[3 + 2 * MAX_STEPS], number = count;
+    uint32_t searched[3 + 2 * MAX_WALK], number = count;
     memcpy(searched, points, count * sizeof *points);
-    for (uint32_t step = 0; step < MAX_STEPS && out->target != FCT_NONE; ++step) {
+    for (uint32_t step = 0; step < MAX_WALK && out->target != FCT_NONE; ++step) {
         uint32_t from = out->target, first = 3 * r->targets[from].face, fresh = number;
         double b[3] = {1 - best->u - best->v, best->u, best->v};
         for (uint32_t k = 0; k < 3; ++k) {
             bool met = false;
             for (uint32_t j = 0; j < number; ++j) met |= searched[j] == s->triangles[first + k];
-            if (met && b[k] > 1e-6) return;
-            if (!met && b[k] > 1e-6) searched[fresh++] = s->triangles[first + k];
+            if (met && b[k] > RIM) return;
+            if (!met && b[k] > RIM) searched[fresh++] = s->triangles[first + k];
         }
-        if (fresh == number + 3) return; /* inside a face */
+        if (fresh == number + 3) return; /* inside the face: no rim */
         for (; number < fresh; ++number) {
             uint32_t wedge = FCT_NONE;
             for (uint32_t k = 0; k < 3 && s->corner_wedges; ++k)
@@ -136,34 +152,35 @@ static void walk(const refit *r, const uint32_t *points, uint32_t count, v3 p, f
     }
 }
 
-/* In the first pass, searches; later, finds the foot on the same face, for points move little. */
+/* Samples [begin, end): the first pass searches the target; later passes keep it, because points move little.
+ */
 static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     refit *r = user;
     const fct_simplifier *s = r->s;
     for (size_t i = begin; i < end; ++i) {
         landing *out = &r->landings[i];
-        uint32_t corners[3], points[3], count = sample_corners(r, i, corners);
-        v3 p = sample_position(s, corners, count);
+        uint32_t corners[3], points[3], count = find_sample_corners(r, i, corners);
+        v3 p = find_sample_position(s, corners, count);
         foot best = {0, 0, INFINITY};
         if (out->target != FCT_NONE)
             best = triangle_nearest(&r->targets[out->target].shape, p);
         else {
             for (uint32_t k = 0; k < count; ++k) {
-                uint32_t input = input_wedge(s, corners[k]);
+                uint32_t input = find_input_wedge(s, corners[k]);
                 points[k] = s->point_parents[s->point_of[s->mesh->triangles[corners[k]]]];
                 if ((k > 0 && points[k] == points[0]) || (k > 1 && points[k] == points[1])) continue;
                 search_ring(r, points[k], s->corner_wedges ? s->wedge_parents[input] : FCT_NONE, p, &best,
                             out);
             }
-            walk(r, points, count, p, &best, out);
+            walk_rings(r, points, count, p, &best, out);
         }
         out->u = (float)best.u, out->v = (float)best.v;
     }
 }
 
-/* Value of a channel at a corner of the input, scaled. */
-static double input_value(const fct_simplifier *s, const fct_channel *channel, uint32_t corner) {
+/* The scaled value of a channel at a corner of the input. */
+static double find_input_value(const fct_simplifier *s, const fct_channel *channel, uint32_t corner) {
     const fct_mesh *mesh = s->mesh;
     size_t v = mesh->triangles[corner], i = channel->component;
     double value = channel->source == CHANNEL_COLOR    ? mesh->colors[3 * v + i]
@@ -172,8 +189,9 @@ static double input_value(const fct_simplifier *s, const fct_channel *channel, u
     return value * channel->factor;
 }
 
-static void add_attributes(refit *r, const uint32_t *corners, uint32_t count, uint32_t face,
-                           const double b[3], double weight) {
+/* Adds the residual of the sample's attributes to the wedges of its target, with barycentric weights b. */
+static void add_attribute_residual(refit *r, const uint32_t *corners, uint32_t count, uint32_t face,
+                                   const double b[3], double weight) {
     const fct_simplifier *s = r->s;
     uint32_t n = s->channel_count, wedges[3];
     for (uint32_t k = 0; k < 3; ++k) {
@@ -182,22 +200,25 @@ static void add_attributes(refit *r, const uint32_t *corners, uint32_t count, ui
     }
     for (uint32_t i = 0; i < n; ++i) {
         double rest = 0;
-        for (uint32_t k = 0; k < count; ++k) rest += input_value(s, &s->channels[i], corners[k]);
+        for (uint32_t k = 0; k < count; ++k) rest += find_input_value(s, &s->channels[i], corners[k]);
         rest /= count;
         for (uint32_t k = 0; k < 3; ++k) rest -= b[k] * s->attributes[(size_t)n * wedges[k] + i];
         for (uint32_t k = 0; k < 3; ++k) r->sums[(size_t)n * wedges[k] + i] += weight * b[k] * rest;
     }
 }
 
+/* Adds weight * b^2 n n^T and weight * b * residual * n to the system of each corner of the target, where n
+ * points from the target to the sample. */
 static void add_sample(refit *r, size_t sample, const landing *at) {
     const fct_simplifier *s = r->s;
     if (at->target == FCT_NONE) return;
-    uint32_t corners[3], count = sample_corners(r, sample, corners);
-    double weight = count == 1 ? r->corner_weights[sample] : .75 * input_area(s, corners[0] / 3);
+    uint32_t corners[3], count = find_sample_corners(r, sample, corners);
+    double weight =
+        count == 1 ? r->corner_weights[sample] : CENTROID_WEIGHT * find_input_area(s, corners[0] / 3);
     const target *face = &r->targets[at->target];
     const triangle *shape = &face->shape;
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
-    v3 rest = v3_sub(sample_position(s, corners, count), shape->a);
+    v3 rest = v3_sub(find_sample_position(s, corners, count), shape->a);
     rest = v3_sub(rest, v3_add(v3_scale(shape->ab, b[1]), v3_scale(shape->ac, b[2])));
     double residual = v3_norm(rest);
     v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : face->n;
@@ -207,10 +228,10 @@ static void add_sample(refit *r, size_t sample, const landing *at) {
         double g = residual > NOISE ? weight * b[k] * residual : 0;
         system[6] += g * n.x, system[7] += g * n.y, system[8] += g * n.z;
     }
-    if (at->attributes) add_attributes(r, corners, count, face->face, b, weight);
+    if (at->attributes) add_attribute_residual(r, corners, count, face->face, b, weight);
 }
 
-/* Solves (A + ridge I) d = g by Cramer's rule; the ridge keeps the determinant away from 0. */
+/* Solves (A + DAMPING trace(A) I) d = g by Cramer's rule. The damping keeps the determinant away from 0. */
 static v3 solve_damped(const double q[9]) {
     double ridge = DAMPING * (q[0] + q[3] + q[5]);
     double xx = q[0] + ridge, yy = q[3] + ridge, zz = q[5] + ridge, xy = q[1], xz = q[2], yz = q[4];
@@ -222,6 +243,8 @@ static v3 solve_damped(const double q[9]) {
                 (c * q[6] + e * q[7] + f * q[8]) / det};
 }
 
+/* Moves each point by its step, in the order of the points. Hubs and steps that would fold a face over are
+ * left out. */
 static void move_points(refit *r) {
     fct_simplifier *s = r->s;
     for (uint32_t p = 0; p < s->point_count; ++p) {
@@ -247,6 +270,7 @@ static void move_points(refit *r) {
     }
 }
 
+/* Each attribute takes the full step, the mean residual, clamped to the input's range. */
 static void move_attributes(refit *r) {
     fct_simplifier *s = r->s;
     uint32_t n = s->channel_count;
@@ -288,8 +312,9 @@ static void set_targets(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* Resolves parents, lists the faces, and gives each wedge of the input its weight. */
-static void prepare(refit *r) {
+/* Resolves the parents of points and wedges, lists the targets, and sums the weight of each wedge of the
+ * input. */
+static void prepare_samples(refit *r) {
     fct_simplifier *s = r->s;
     for (uint32_t p = 0; p < s->point_count; ++p) s->point_parents[p] = fct_sets_find(s->point_parents, p);
     for (uint32_t w = 0; w < s->wedge_count && s->wedge_parents; ++w)
@@ -297,12 +322,12 @@ static void prepare(refit *r) {
     number_targets(r);
     memset(r->corners, 0xff, s->wedge_count * sizeof *r->corners);
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
-        if (input_degenerate(s, f)) continue;
-        double area = input_area(s, f);
+        if (is_degenerate(s, f)) continue;
+        double area = find_input_area(s, f);
         for (uint32_t c = 3 * f; c < 3 * f + 3; ++c) {
-            uint32_t w = input_wedge(s, c);
+            uint32_t w = find_input_wedge(s, c);
             if (r->corners[w] == FCT_NONE) r->corners[w] = c;
-            r->corner_weights[w] += area / 12;
+            r->corner_weights[w] += area / CORNER_DIVISOR;
         }
     }
 }
@@ -314,8 +339,8 @@ static fct_result run_pass(refit *r, uint32_t pass, size_t samples) {
     if (s->channel_count) memset(r->weights, 0, s->wedge_count * sizeof *r->weights);
     fct_result result = fct_progress(s->env, "refit", (double)pass / s->def->refit_passes);
     if (result != FCT_OK) return result;
-    fct_parallel_for(s->env, s->live_faces, GRAIN, set_targets, r);
-    fct_parallel_for(s->env, samples, GRAIN, land_samples, r);
+    fct_parallel_for(s->env, s->live_faces, CHUNK, set_targets, r);
+    fct_parallel_for(s->env, samples, CHUNK, land_samples, r);
     for (size_t i = 0; i < samples; ++i) add_sample(r, i, &r->landings[i]);
     move_points(r);
     move_attributes(r);
@@ -342,7 +367,7 @@ fct_result fct_simplify_refit(fct_simplifier *s) {
     if (result != FCT_OK)
         fct_fail_memory(s->env, "the refit");
     else {
-        prepare(&r);
+        prepare_samples(&r);
         for (size_t i = 0; i < samples; ++i) r.landings[i] = (landing){.target = FCT_NONE};
     }
     for (uint32_t pass = 0; pass < s->def->refit_passes && result == FCT_OK; ++pass)

@@ -1,14 +1,14 @@
-/* simplify/state.h: what one run of the simplifier holds.
+/* simplify/state.h: the data of one run: points, wedges, corners, edges and their quadrics.
  *
- * Topology lives on points: places in space, which input vertices with equal coordinates share where their
- * faces meet along a side. Attributes
- * live on wedges: the distinct attribute values that meet at a point. A point with one value has one wedge;
- * on a crease or a texture seam it has several, which move together, so that a seam cannot open into a crack.
- * A mesh without attributes has exactly one wedge a point, of the same number.
+ *          corner 3f+2                A point is a place. Input vertices at one place share a point (weld.c).
+ *              /\                     A wedge is one attribute value at a point. A smooth point has one
+ * wedge; /  \   side c goes      a point on a crease or texture seam has several. Wedges of a point move /  f
+ * \  from corner c    together, so seams cannot crack. A mesh without attributes has exactly corner
+ * /______\ to the next      one wedge per point, with the same number. c = 3f           corner c+1
  *
- * Corner c = 3 f + k. Side c runs from corner c to the next corner of its face. A contraction moves all
- * corners of one point to another; a removed face has triangles[3 f] == FCT_NONE and leaves the rings when
- * these are walked next. Coordinates are in the unit cube around the origin.
+ * A contraction moves the corners of one point to another. A removed face has triangles[3f] == FCT_NONE; its
+ * corners stay in the rings until fct_simplify_gather drops them. Positions lie in the unit cube that is
+ * centred at the origin.
  */
 #ifndef FCT_SIMPLIFY_STATE_H
 #define FCT_SIMPLIFY_STATE_H
@@ -17,22 +17,23 @@
 #include "base/math/vec.h"
 #include "base/union_find.h"
 #include "facetree/simplify.h"
+#include "simplify/cost/quadric.h"
 #include "simplify/queue.h"
 
 enum {
-    SIMPLIFY_MAX_CHANNELS = 8, /* r g b, u v, and the normal */
-    SIMPLIFY_MAX_WEDGES = 64,  /* at both ends of an edge; more are not contracted */
-    SIMPLIFY_HUB = 512,        /* a point of more faces than this stays where it is */
+    SIMPLIFY_MAX_CHANNELS = QUADRIC_MAX_ATTRIBUTES,
+    SIMPLIFY_MAX_WEDGES = 64, /* at both ends of an edge together; edges with more are not contracted */
+    SIMPLIFY_HUB = 512,       /* a point with more faces is a hub: it does not move */
 };
 
 enum { EDGE_BOUNDARY = 1, EDGE_BORDER = 2 };
 
-/* One float of an attribute: value * factor is its coordinate beside the position. */
+/* One float of an attribute. value * factor is its coordinate in the space of the quadrics. */
 typedef struct fct_channel {
     enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD } source;
     uint32_t component;
     double factor;
-    double lower, upper; /* of value * factor in the input; results are clamped */
+    double lower, upper; /* range of value * factor in the input; results are clamped to it */
 } fct_channel;
 
 typedef struct fct_simplifier {
@@ -40,45 +41,46 @@ typedef struct fct_simplifier {
     const fct_mesh *mesh;
     const fct_simplify_def *def;
     v3 center;
-    double extent; /* of the longest side of the bounds; 1 where that is 0 */
+    double extent; /* longest side of the bounds, 1 if that is 0 */
 
     uint32_t point_count, wedge_count, edge_count;
-    uint32_t face_count, live_faces; /* at the start, without degenerate ones, and now */
-    uint32_t *point_of;              /* vertex -> point; FCT_NONE when no face uses it */
+    uint32_t face_count, live_faces; /* faces with three distinct points: at the start, and now */
+    uint32_t *point_of;              /* vertex -> point; FCT_NONE if no face uses the vertex */
 
-    /* By point. */
+    /* Per point. */
     double *positions;       /* x 3 */
-    uint32_t *sources;       /* input vertex whose position it is, FCT_NONE once moved elsewhere */
-    uint32_t *point_parents; /* what it was contracted to, itself while alive */
+    uint32_t *sources;       /* input vertex with exactly this position; FCT_NONE after a move */
+    uint32_t *point_parents; /* the point that this one was contracted to; itself while alive */
     uint32_t *first_corners, *last_corners, *valences;
     uint32_t *first_wedges; /* NULL without attributes */
 
-    /* By corner. */
-    uint32_t *triangles; /* points */
-    uint32_t *next_corners;
+    /* Per corner. */
+    uint32_t *triangles;    /* points */
+    uint32_t *next_corners; /* next corner at the same point */
     uint32_t *side_edges;
-    uint32_t *corner_wedges; /* NULL without attributes; resolve with fct_wedge_find */
+    uint32_t *corner_wedges; /* NULL without attributes; resolve with corner_wedge */
 
     fct_edge *edges;
-    uint8_t *edge_flags; /* by edge, until the quadrics are made */
+    uint8_t *edge_flags; /* per edge: EDGE_BOUNDARY, EDGE_BORDER; valid until the quadrics are made */
 
-    /* By wedge. The first `steering` of `channels` are dimensions of the quadrics. */
+    /* Per wedge. The first `steering` channels are dimensions of the quadrics; the others are interpolated.
+     */
     uint32_t steering, channel_count, quadric_size;
     fct_channel channels[SIMPLIFY_MAX_CHANNELS];
     double *quadrics;   /* x quadric_size */
-    double *attributes; /* x channel_count, NULL without attributes */
+    double *attributes; /* x channel_count; NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
     uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
     uint32_t *class_parents;
     uint32_t class_count;
 
     fct_queue queue;
-    uint32_t ring_a[SIMPLIFY_HUB]; /* corners around the ends of the edge at hand */
+    uint32_t ring_a[SIMPLIFY_HUB]; /* corners around the two ends of the current edge */
     uint32_t *ring_b;              /* x face_count */
-    uint8_t *refused;              /* by point: an edge there may be refused */
-    uint32_t *link_marks;          /* by point, with keep_topology */
+    uint8_t *refused;              /* per point: 1 if an edge at the point may be refused */
+    uint32_t *link_marks;          /* per point; only with keep_topology */
     uint32_t link_epoch;
-    double max_error2; /* largest squared error of a contraction made */
+    double max_error2; /* largest squared error of a contraction that was made */
 } fct_simplifier;
 
 static inline uint32_t edge_root(fct_edge *edges, uint32_t e) {
@@ -104,27 +106,5 @@ static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
     return s->corner_wedges ? fct_sets_find(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];
 }
-
-/* topology.c: points, wedges, rings and edges of the mesh. */
-fct_result fct_simplify_topology(fct_simplifier *s);
-/* weld.c: point_of, by place on entry, becomes the points; point_count with it. */
-fct_result fct_simplify_weld(fct_simplifier *s);
-/* channels.c: which attributes there are, their scales, and the wedges' values. */
-void fct_simplify_channels(fct_simplifier *s);
-fct_result fct_simplify_attributes(fct_simplifier *s);
-/* quadric.c: the quadric of every wedge. */
-fct_result fct_simplify_quadrics(fct_simplifier *s);
-/* link.c: whether contracting b into a keeps the topology, by their rings. */
-bool fct_simplify_link_holds(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b);
-/* contract.c: whether moving the point of these corners from `from` to `at` turns a face over that does not
- * also touch `other`. */
-bool fct_simplify_folds_over(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
-                             v3 from, v3 at);
-/* Collects the live corners at a point that is no hub, and drops the dead ones from its list. */
-uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring);
-/* Contracts until a stop. */
-fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop);
-/* refit.c: moves the points that are left closer to the input. */
-fct_result fct_simplify_refit(fct_simplifier *s);
 
 #endif

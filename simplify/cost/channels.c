@@ -1,15 +1,19 @@
-/* simplify/cost/channels.c: the attributes of a mesh as coordinates beside the position (Garland 1999, 5.2).
- *
- * Each attribute is scaled to about unit range and then by its weight. The range of colours is that of most
- * of them, from the 2nd to the 98th percentile but at least a twentieth of the whole: one lamp must not hide
- * the shadows on every wall. An attribute of weight 0 rides along without steering.
- */
-#include "simplify/state.h"
+/* simplify/cost/channels.c: see channels.h. Cost: linear in vertices and corners. */
+#include "simplify/cost/channels.h"
 
 #include <stdlib.h>
 
-static const float *channel_values(const fct_mesh *mesh, const fct_channel *channel, size_t *count,
-                                   uint32_t *stride) {
+/* Colours count by the range of the middle 96 %: one bright lamp must not hide the shadows on the walls. But
+ * the range is at least a twentieth of the full one. */
+#define COLOR_TAIL  50  /* each tail holds at most one value in 50 */
+#define LEAST_RANGE .05 /* of the full range */
+
+/* Normals have components from -1 to 1: a factor of 1/2 gives them a range of 1. */
+#define NORMAL_FACTOR .5
+
+/* The array that holds a channel, its number of items, and the floats from one item to the next. */
+static const float *find_channel_values(const fct_mesh *mesh, const fct_channel *channel, size_t *count,
+                                        uint32_t *stride) {
     *stride = channel->source == CHANNEL_TEXCOORD ? 2 : 3;
     *count = channel->source == CHANNEL_TEXCOORD ? 3 * (size_t)mesh->face_count : mesh->vertex_count;
     return channel->source == CHANNEL_COLOR    ? mesh->colors
@@ -24,7 +28,7 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
         channel->source = source;
         size_t count;
         uint32_t stride;
-        const float *values = channel_values(s->mesh, channel, &count, &stride);
+        const float *values = find_channel_values(s->mesh, channel, &count, &stride);
         for (size_t k = 0; k < count; ++k) {
             double value = factor * values[stride * k + i];
             channel->lower = fmin(channel->lower, value), channel->upper = fmax(channel->upper, value);
@@ -33,17 +37,17 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
     }
 }
 
-static void full_range(const float *values, size_t count, double *lower, double *upper) {
+static void find_full_range(const float *values, size_t count, double *lower, double *upper) {
     *lower = INFINITY, *upper = -INFINITY;
     for (size_t i = 0; i < count; ++i) *lower = fmin(*lower, values[i]), *upper = fmax(*upper, values[i]);
     if (count == 0) *lower = *upper = 0;
 }
 
-/* The range from the 2nd to the 98th percentile, by a histogram over the full range's 1,024th parts. */
-static double color_range(const float *values, size_t count) {
+/* The range from the 2nd to the 98th percentile, by a histogram of 1,024 cells over the full range. */
+static double find_color_range(const float *values, size_t count) {
     enum { CELLS = 1024 };
     double lower, upper;
-    full_range(values, count, &lower, &upper);
+    find_full_range(values, count, &lower, &upper);
     double range = upper - lower;
     if (!(range > 0)) return 0;
     size_t cells[CELLS] = {0};
@@ -52,13 +56,14 @@ static double color_range(const float *values, size_t count) {
         ++cells[cell < CELLS ? cell : CELLS - 1];
     }
     size_t below = 0, first = 0, last = CELLS;
-    while (first < CELLS && (below + cells[first]) * 50 <= count) below += cells[first++];
+    while (first < CELLS && (below + cells[first]) * COLOR_TAIL <= count) below += cells[first++];
     size_t above = 0;
-    while (last > first && (above + cells[last - 1]) * 50 <= count) above += cells[--last];
-    return range * fmax((double)(last - first) / CELLS, .05);
+    while (last > first && (above + cells[last - 1]) * COLOR_TAIL <= count) above += cells[--last];
+    return range * fmax((double)(last - first) / CELLS, LEAST_RANGE);
 }
 
-static double texcoord_range(const float *values, size_t corners) {
+/* The larger range of u and v, so that both keep one scale. */
+static double find_texcoord_range(const float *values, size_t corners) {
     double range = 0;
     for (size_t k = 0; k < 2; ++k) {
         double lower = INFINITY, upper = -INFINITY;
@@ -74,16 +79,16 @@ void fct_simplify_channels(fct_simplifier *s) {
     const fct_simplify_def *def = s->def;
     for (int steering = 1; steering >= 0; --steering) {
         if (mesh->colors && (def->color_weight > 0) == steering) {
-            double range = color_range(mesh->colors, 3 * (size_t)mesh->vertex_count);
+            double range = find_color_range(mesh->colors, 3 * (size_t)mesh->vertex_count);
             add_channels(s, CHANNEL_COLOR, 3, (steering ? def->color_weight : 1) / (range > 0 ? range : 1));
         }
         if (mesh->texcoords && (def->texcoord_weight > 0) == steering) {
-            double range = texcoord_range(mesh->texcoords, 3 * (size_t)mesh->face_count);
+            double range = find_texcoord_range(mesh->texcoords, 3 * (size_t)mesh->face_count);
             add_channels(s, CHANNEL_TEXCOORD, 2,
                          (steering ? def->texcoord_weight : 1) / (range > 0 ? range : 1));
         }
         if (mesh->normals && (def->normal_weight > 0) == steering)
-            add_channels(s, CHANNEL_NORMAL, 3, .5 * (steering ? def->normal_weight : 1));
+            add_channels(s, CHANNEL_NORMAL, 3, NORMAL_FACTOR * (steering ? def->normal_weight : 1));
         if (steering) s->steering = s->channel_count;
     }
 }
@@ -96,7 +101,7 @@ fct_result fct_simplify_attributes(fct_simplifier *s) {
         const fct_channel *channel = &s->channels[i];
         size_t count;
         uint32_t stride;
-        const float *values = channel_values(s->mesh, channel, &count, &stride);
+        const float *values = find_channel_values(s->mesh, channel, &count, &stride);
         for (size_t c = 0; c < 3 * (size_t)s->mesh->face_count; ++c) {
             size_t item = channel->source == CHANNEL_TEXCOORD ? c : s->mesh->triangles[c];
             s->attributes[(size_t)s->channel_count * s->corner_wedges[c] + i] =

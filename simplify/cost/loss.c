@@ -1,16 +1,18 @@
-/* simplify/cost/loss.c: what a contraction takes from the reach of the surface.
+/* simplify/cost/loss.c: see loss.h.
  *
- * The planes of its faces do not notice when a rod, a fin or a needle gets shorter: the point slides along
- * all of them. So what goes is measured to the faces that stay: the two ends, apexes that lose their last
- * face, and the middles of sides that lose theirs. A third of the area gathered at each times its squared
- * distance counts, as far as the quadric does not resist that direction itself, and stays in the quadric as a
- * plane through the lost point. On smooth surfaces points are lost along the normal, which the quadric
- * resists in full, and nothing changes.
+ * 1. List the lost points: both ends; apexes that lose their last face; middles of sides that lose theirs.
+ * Each weighs a third of the area that the quadrics gathered there.
+ * 2. Find the nearest point of the remaining faces for each.
+ * 3. The quadric resists a move in this direction with n^T A n. Only the rest of the weight counts:
+ *    weight * (1 - n^T A n / area), times the squared distance.
+ * On a smooth surface the points are lost along the normal, which the quadric resists in full: the loss is 0.
+ * Cost: O(lost points * faces of both rings).
  */
 #include "simplify/cost/loss.h"
 #include "simplify/cost/nearest.h"
 
-static double area_at(const fct_simplifier *s, uint32_t point) {
+/* The area that the quadrics of a point have summed. */
+static double sum_area(const fct_simplifier *s, uint32_t point) {
     if (!s->corner_wedges) return s->quadrics[(size_t)POSITION_QUADRIC * point + 10];
     double area = 0;
     for (uint32_t w = s->first_wedges[point]; w != FCT_NONE; w = s->next_wedges[w])
@@ -25,14 +27,15 @@ static void add_lost(fct_loss *loss, v3 lost, v3 at, double weight) {
     loss->weights[k] = weight;
 }
 
-/* The corner of a face at b across from a, FCT_NONE when the face does not touch a. */
-static uint32_t apex_of(const fct_simplifier *s, uint32_t corner, uint32_t a) {
+/* The apex of a face between b (at `corner`) and a; FCT_NONE if the face does not touch a. */
+static uint32_t find_apex(const fct_simplifier *s, uint32_t corner, uint32_t a) {
     uint32_t x = s->triangles[corner_next(corner)], y = s->triangles[corner_previous(corner)];
     return x == a ? y : y == a ? x : FCT_NONE;
 }
 
-static bool touches(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
-                    uint32_t point) {
+/* Whether a face of the ring, other than those at `other`, has a side to `point`. */
+static bool ring_touches(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
+                         uint32_t point) {
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
         if ((x == point && y != other) || (y == point && x != other)) return true;
@@ -40,27 +43,30 @@ static bool touches(const fct_simplifier *s, const uint32_t *ring, uint32_t coun
     return false;
 }
 
-/* Apexes of the faces between a and b that no face will join to the point that is left. */
+/* Adds what vanishing faces take away. An apex that no remaining face joins to the new point loses a side:
+ * its middle counts, with the area of the face. An apex without any other face is lost itself, with its area.
+ */
 static void add_apexes(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
                        v3 at, fct_loss *loss) {
     for (uint32_t i = 0; i < count_b && loss->count < LOSS_POINTS; ++i) {
-        uint32_t apex = apex_of(s, s->ring_b[i], a), faces = 0;
-        if (apex == FCT_NONE || touches(s, s->ring_a, count_a, b, apex) ||
-            touches(s, s->ring_b, count_b, a, apex))
+        uint32_t apex = find_apex(s, s->ring_b[i], a), faces = 0;
+        if (apex == FCT_NONE || ring_touches(s, s->ring_a, count_a, b, apex) ||
+            ring_touches(s, s->ring_b, count_b, a, apex))
             continue;
         v3 p = point_position(s, apex), pa = point_position(s, a), pb = point_position(s, b);
-        for (uint32_t k = 0; k < count_b; ++k) faces += apex_of(s, s->ring_b[k], a) == apex;
+        for (uint32_t k = 0; k < count_b; ++k) faces += find_apex(s, s->ring_b[k], a) == apex;
         if (faces < s->valences[apex]) {
             double area = .5 * v3_norm(v3_cross(v3_sub(pa, p), v3_sub(pb, p)));
             add_lost(loss, v3_scale(v3_add(p, at), .5), at, area / 3);
         } else
-            add_lost(loss, p, at, area_at(s, apex) / (3 * faces));
+            add_lost(loss, p, at, sum_area(s, apex) / (3 * faces));
     }
 }
 
-/* Measures the lost points to the faces of the ring that do not touch `other`, once their corner is `at`. */
-static void search(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other, v3 at,
-                   fct_loss *loss) {
+/* Measures the distance from the lost points to the remaining faces of a ring, with their corner moved to
+ * `at`. Faces that touch `other` vanish. */
+static void search_ring_faces(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
+                              v3 at, fct_loss *loss) {
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
         if (x == other || y == other) continue;
@@ -75,15 +81,15 @@ static void search(const fct_simplifier *s, const uint32_t *ring, uint32_t count
     }
 }
 
-double fct_simplify_loss(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
-                         const fct_candidate *candidate, fct_loss *loss) {
+double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
+                        const fct_candidate *candidate, fct_loss *loss) {
     double cost = 0;
     loss->count = 0;
-    add_lost(loss, point_position(s, a), candidate->at, area_at(s, a) / 3);
-    add_lost(loss, point_position(s, b), candidate->at, area_at(s, b) / 3);
+    add_lost(loss, point_position(s, a), candidate->at, sum_area(s, a) / 3);
+    add_lost(loss, point_position(s, b), candidate->at, sum_area(s, b) / 3);
     add_apexes(s, a, b, count_a, count_b, candidate->at, loss);
-    search(s, s->ring_a, count_a, b, candidate->at, loss);
-    search(s, s->ring_b, count_b, a, candidate->at, loss);
+    search_ring_faces(s, s->ring_a, count_a, b, candidate->at, loss);
+    search_ring_faces(s, s->ring_b, count_b, a, candidate->at, loss);
     for (uint32_t k = 0; k < loss->count; ++k) {
         double distance2 = loss->distance2[k];
         v3 away = v3_sub(loss->lost[k], loss->nearest[k]);
@@ -95,7 +101,7 @@ double fct_simplify_loss(const fct_simplifier *s, uint32_t a, uint32_t b, uint32
     return cost;
 }
 
-void fct_simplify_remember(const fct_loss *loss, double *q) {
+void fct_loss_add(const fct_loss *loss, double *q) {
     for (uint32_t k = 0; k < loss->count; ++k) {
         if (!(loss->weights[k] > 0)) continue;
         v3 away = v3_sub(loss->lost[k], loss->nearest[k]);

@@ -1,25 +1,31 @@
-/* simplify/cost/loss.h: see loss.c. */
+/* simplify/cost/loss.h: the part of a contraction's error that face planes cannot measure.
+ *
+ * A rod, a fin or a needle can become shorter at no cost in its planes, because its end slides along all of
+ * them. So the loss measures the distance from the points that vanish to the faces that remain.
+ */
 #ifndef FCT_SIMPLIFY_LOSS_H
 #define FCT_SIMPLIFY_LOSS_H
 
 #include "simplify/cost/placement.h"
 
-/* Shorter distances, in the unit cube, are rounding of the input's floats. */
+/* Shorter distances, in the unit cube, are rounding errors of the input's floats. */
 #define LOSS_NOISE 1e-7
 
 enum { LOSS_POINTS = 6 };
 
-/* The points that go, the nearest points of the faces that stay, and what each weighs. */
+/* The lost points, their nearest points on the remaining faces, and the weights. */
 typedef struct fct_loss {
     uint32_t count;
     v3 lost[LOSS_POINTS], nearest[LOSS_POINTS];
     double distance2[LOSS_POINTS], weights[LOSS_POINTS];
 } fct_loss;
 
-/* What contracting a and b, no hubs, costs beside the candidate's error; their rings are gathered. */
-double fct_simplify_loss(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
-                         const fct_candidate *candidate, fct_loss *loss);
-/* Adds the loss to the quadric of the point that is left. */
-void fct_simplify_remember(const fct_loss *loss, double *q);
+/* The cost of contracting a and b in addition to candidate->error. Neither end is a hub; ring_a and ring_b
+ * hold their corners. */
+double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
+                        const fct_candidate *candidate, fct_loss *loss);
+/* Adds a plane through each lost point to the quadric q of the new point, so that later contractions count
+ * the same loss again. */
+void fct_loss_add(const fct_loss *loss, double *q);
 
 #endif

@@ -1,5 +1,5 @@
-/* simplify/cost/nearest.h: the nearest point of a triangle, prepared for many queries. Triangles without area
- * are their sides.
+/* simplify/cost/nearest.h: the point of a triangle nearest to p. A triangle is prepared once for many
+ * queries. A triangle without area counts as its three sides.
  */
 #ifndef FCT_SIMPLIFY_NEAREST_H
 #define FCT_SIMPLIFY_NEAREST_H
@@ -11,7 +11,7 @@ typedef struct triangle {
     double aa, bb, cc, det; /* ab.ab, ab.ac, ac.ac, aa cc - bb bb */
 } triangle;
 
-/* Barycentrics of the second and third corner, and the squared distance. */
+/* The nearest point a + u ab + v ac, and its squared distance. */
 typedef struct foot {
     double u, v, distance2;
 } foot;
@@ -23,7 +23,7 @@ static inline triangle triangle_make(v3 a, v3 b, v3 c) {
     return t;
 }
 
-/* By the regions of the triangle's corners and sides. */
+/* The projection if it lies inside, else the nearest point of the nearest side. */
 static inline foot triangle_nearest(const triangle *t, v3 p) {
     v3 ap = v3_sub(p, t->a);
     double d1 = v3_dot(t->ab, ap), d2 = v3_dot(t->ac, ap), aa = t->aa, bb = t->bb, cc = t->cc;

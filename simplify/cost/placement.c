@@ -1,102 +1,28 @@
-/* simplify/cost/placement.c: see placement.h. Garland 1999, section 3.5, over quadrics whose attributes have
- * been eliminated (quadric.h), so that one 3 x 3 system serves any number of attributes and wedges.
+/* simplify/cost/placement.c: see placement.h. Garland 1999, section 3.5, on quadrics whose attributes are
+ * eliminated.
  *
- * The system is solved about the edge's midpoint m with gamma times the trace on the diagonal: in directions
- * that the quadric leaves free the point stays at m. The energy gamma trace (|p - a|^2 + |p - b|^2) / 2 also
- * orders contractions that cost nothing, short edges first.
+ * The system is solved about the midpoint m of the edge, with the ridge gamma * trace on the diagonal. So the
+ * point stays at m in directions that the quadric leaves free. The energy of this ridge,
+ * gamma * trace * (|p - a|^2 + |p - b|^2) / 2, also orders contractions without error: short edges go first.
+ * This regularisation (course notes COMP 557, "Mesh Simplification") replaces Garland's test for a singular
+ * matrix: the result moves smoothly to the midpoint as the faces become coplanar.
  */
 #include "simplify/cost/placement.h"
 
-/* The farthest a minimiser may lie from the edge's midpoint, in edge lengths. */
+/* The largest distance of a minimiser from the edge's midpoint, in lengths of the edge. */
 #define MAX_REACH 2.0
 
-static uint32_t find_wedge(const fct_groups *g, uint32_t wedge) {
-    for (uint32_t i = 0; i < g->wedge_count; ++i)
-        if (g->wedges[i] == wedge) return i;
-    return FCT_NONE;
-}
+/* The smallest ridge of the attributes, relative to trace plus area: it only keeps the pivots above 0. */
+#define LEAST_RIDGE 1e-12
 
-static bool list_wedges(fct_simplifier *s, uint32_t point, bool second, fct_groups *g) {
-    for (uint32_t w = s->first_wedges[point]; w != FCT_NONE; w = s->next_wedges[w]) {
-        if (g->wedge_count == SIMPLIFY_MAX_WEDGES) return false;
-        g->group_of[g->wedge_count] = g->wedge_count;
-        g->second[g->wedge_count] = second;
-        g->wedges[g->wedge_count++] = w;
-    }
-    return true;
-}
-
-static void join_groups(fct_groups *g, uint32_t i, uint32_t j) {
-    uint32_t low = g->group_of[i], high = g->group_of[j];
-    if (low == high) return;
-    if (low > high) {
-        uint32_t swap = low;
-        low = high, high = swap;
-    }
-    for (uint32_t k = 0; k < g->wedge_count; ++k)
-        if (g->group_of[k] == high) g->group_of[k] = low;
-}
-
-bool fct_groups_find(fct_simplifier *s, uint32_t a, uint32_t b, fct_groups *g) {
-    g->wedge_count = 0;
-    if (!list_wedges(s, a, false, g) || !list_wedges(s, b, true, g)) return false;
-    if (g->wedge_count == 2) {
-        g->group_of[0] = g->group_of[1] = 0;
-        g->group_count = 1;
-        return true;
-    }
-    uint32_t from = s->valences[a] <= s->valences[b] ? a : b, to = from == a ? b : a;
-    for (uint32_t c = s->first_corners[from]; c != FCT_NONE; c = s->next_corners[c]) {
-        if (corner_dead(s, c)) continue;
-        uint32_t other = s->triangles[corner_next(c)] == to ? corner_next(c) : corner_previous(c);
-        if (s->triangles[other] == to)
-            join_groups(g, find_wedge(g, corner_wedge(s, c)), find_wedge(g, corner_wedge(s, other)));
-    }
-    /* Number the groups 0, 1, ... by their lowest member. */
-    uint32_t numbers[SIMPLIFY_MAX_WEDGES];
-    g->group_count = 0;
-    for (uint32_t i = 0; i < g->wedge_count; ++i) {
-        if (g->group_of[i] == i) numbers[i] = g->group_count++;
-        g->group_of[i] = numbers[g->group_of[i]];
-    }
-    return true;
-}
-
-/* The sum of a group's quadrics, and as prior the mean of its attributes. */
-static void sum_group(const fct_simplifier *s, const fct_groups *g, uint32_t group, double *sum,
-                      double *prior) {
-    uint32_t members = 0;
-    memset(sum, 0, s->quadric_size * sizeof *sum);
-    memset(prior, 0, s->channel_count * sizeof *prior);
-    for (uint32_t i = 0; i < g->wedge_count; ++i) {
-        if (g->group_of[i] != group) continue;
-        ++members;
-        const double *q = s->quadrics + (size_t)s->quadric_size * g->wedges[i];
-        const double *a = s->attributes + (size_t)s->channel_count * g->wedges[i];
-        for (uint32_t k = 0; k < s->quadric_size; ++k) sum[k] += q[k];
-        for (uint32_t k = 0; k < s->channel_count; ++k) prior[k] += a[k];
-    }
-    for (uint32_t k = 0; k < s->channel_count; ++k) prior[k] /= members;
-}
-
-static double group_ridge(const fct_simplifier *s, const double *q) {
-    return fmax(s->def->regularization, 1e-12) * (quadric_trace(q) + q[10]);
-}
-
-/* The attributes of the first member of a group at the given end, else of its first member. */
-static const double *end_attributes(const fct_simplifier *s, const fct_groups *g, uint32_t group,
-                                    uint32_t end) {
-    uint32_t chosen = FCT_NONE;
-    for (uint32_t i = 0; i < g->wedge_count; ++i)
-        if (g->group_of[i] == group &&
-            (chosen == FCT_NONE || (g->second[i] == end && g->second[chosen] != end)))
-            chosen = i;
-    return s->attributes + (size_t)s->channel_count * g->wedges[chosen];
+/* A weight for the prior that keeps the attributes' matrix regular, relative to the quadric's size. */
+static double find_group_ridge(const fct_simplifier *s, const double *q) {
+    return fmax(s->def->regularization, LEAST_RIDGE) * (quadric_trace(q) + q[10]);
 }
 
 void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uint32_t group,
                           const fct_candidate *candidate, v3 pa, v3 pb, double *attributes) {
-    const double *first = end_attributes(s, groups, group, 0), *second = end_attributes(s, groups, group, 1);
+    const double *first = fct_groups_end(s, groups, group, 0), *second = fct_groups_end(s, groups, group, 1);
     if (s->def->placement == FCT_PLACE_SUBSET) {
         memcpy(attributes, candidate->end == 0 ? first : second, s->channel_count * sizeof *attributes);
         return;
@@ -110,15 +36,15 @@ void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uin
     if (!s->steering) return;
     double sum[MAX_QUADRIC], prior[SIMPLIFY_MAX_CHANNELS];
     fct_elimination e;
-    sum_group(s, groups, group, sum, prior);
-    fct_quadric_eliminate(sum, s->steering, prior, group_ridge(s, sum), &e);
+    fct_groups_sum(s, groups, group, sum, prior);
+    fct_quadric_eliminate(sum, s->steering, prior, find_group_ridge(s, sum), &e);
     fct_quadric_attributes(&e, s->steering, candidate->at, attributes);
     for (uint32_t k = 0; k < s->steering; ++k)
         attributes[k] = fmin(fmax(attributes[k], s->channels[k].lower), s->channels[k].upper);
 }
 
-/* delta = -(A + ridge I)^-1 g by A = L D L^T; false when a pivot is not positive. */
-static bool solve(const double *r, double ridge, v3 g, v3 *delta) {
+/* delta = -(A + ridge I)^-1 g by an L D L^T decomposition; false if a pivot is not positive. */
+static bool solve_position(const double *r, double ridge, v3 g, v3 *delta) {
     double d0 = r[0] + ridge;
     if (!(d0 > 0)) return false;
     double l1 = r[1] / d0, l2 = r[2] / d0;
@@ -137,13 +63,14 @@ static void try_point(const double *r, v3 at, uint32_t end, fct_candidate *best)
     if (end == 0 || error < best->error) *best = (fct_candidate){.at = at, .end = end, .error = error};
 }
 
-/* The lowest of the ends and, where the policy has it, the middle. */
+/* The cheapest of both ends and, if `middle`, the midpoint. */
 static void place_at_ends(const double *r, v3 a, v3 b, bool middle, fct_candidate *best) {
     try_point(r, a, 0, best);
     try_point(r, b, 1, best);
     if (middle) try_point(r, v3_scale(v3_add(a, b), .5), 2, best);
 }
 
+/* The minimum on the segment, by the slope at its midpoint: at = midpoint + t (b - a), t in [-.5, .5]. */
 static void place_on_segment(const double *r, v3 a, v3 b, double ridge, fct_candidate *best) {
     v3 along = v3_sub(b, a), middle = v3_scale(v3_add(a, b), .5);
     double curvature = sym3_form(r, along, along) + ridge * v3_norm2(along);
@@ -153,6 +80,7 @@ static void place_on_segment(const double *r, v3 a, v3 b, double ridge, fct_cand
     *best = (fct_candidate){.at = at, .end = t == -.5 ? 0 : t == .5 ? 1 : 2, .error = quadric_at(r, at)};
 }
 
+/* Step 1 of 3.5 with the regularised matrix; step 2 if the minimiser is too far away. */
 static void place_by_policy(const fct_simplifier *s, const double *r, v3 a, v3 b, bool ends_only,
                             fct_candidate *out) {
     fct_placement policy = s->def->placement;
@@ -164,7 +92,8 @@ static void place_by_policy(const fct_simplifier *s, const double *r, v3 a, v3 b
     if (policy == FCT_PLACE_OPTIMAL) {
         v3 middle = v3_scale(v3_add(a, b), .5), delta;
         v3 g = quadric_gradient(r, middle);
-        if (solve(r, ridge, g, &delta) && v3_norm2(delta) <= MAX_REACH * MAX_REACH * v3_norm2(v3_sub(b, a))) {
+        if (solve_position(r, ridge, g, &delta) &&
+            v3_norm2(delta) <= MAX_REACH * MAX_REACH * v3_norm2(v3_sub(b, a))) {
             *out = (fct_candidate){.at = v3_add(middle, delta), .end = 2};
             out->error = quadric_at(r, out->at);
             return;
@@ -173,21 +102,22 @@ static void place_by_policy(const fct_simplifier *s, const double *r, v3 a, v3 b
     place_on_segment(r, a, b, ridge, out);
 }
 
-/* With subset placement attributes come from the chosen end too, so they count as they are. */
+/* Subset placement takes the attributes of the chosen end too, so they are part of its cost. */
 static void place_subset(const fct_simplifier *s, const fct_groups *g, double sums[][MAX_QUADRIC], v3 a, v3 b,
                          fct_candidate *out) {
     for (uint32_t end = 0; end < 2; ++end) {
         double error = 0;
         for (uint32_t i = 0; i < g->group_count; ++i)
-            error += fct_quadric_value(sums[i], s->steering, end ? b : a, end_attributes(s, g, i, end));
+            error += fct_quadric_value(sums[i], s->steering, end ? b : a, fct_groups_end(s, g, i, end));
         if (end == 0 || error < out->error)
             *out = (fct_candidate){.at = end ? b : a, .end = end, .error = error};
     }
 }
 
-/* The quadric of the position: summed over the groups, attributes eliminated. */
-static bool position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, double *r, fct_groups *g,
-                             double sums[][MAX_QUADRIC]) {
+/* r = the quadric of the new point's position: the sum over the groups, attributes eliminated. Also returns
+ * the groups and their sums. False if there are too many wedges. */
+static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, double *r, fct_groups *g,
+                                 double sums[][MAX_QUADRIC]) {
     memset(r, 0, POSITION_QUADRIC * sizeof *r);
     if (!s->corner_wedges) {
         const double *qa = s->quadrics + (size_t)POSITION_QUADRIC * a;
@@ -198,9 +128,9 @@ static bool position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, double *
     if (!fct_groups_find(s, a, b, g)) return false;
     for (uint32_t i = 0; i < g->group_count; ++i) {
         double prior[SIMPLIFY_MAX_CHANNELS];
-        sum_group(s, g, i, sums[i], prior);
+        fct_groups_sum(s, g, i, sums[i], prior);
         fct_elimination e;
-        fct_quadric_eliminate(sums[i], s->steering, prior, group_ridge(s, sums[i]), &e);
+        fct_quadric_eliminate(sums[i], s->steering, prior, find_group_ridge(s, sums[i]), &e);
         for (int k = 0; k < POSITION_QUADRIC; ++k) r[k] += e.position[k];
     }
     return true;
@@ -210,10 +140,10 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
     v3 pa = point_position(s, a), pb = point_position(s, b);
-    bool larger_b = s->valences[b] > s->valences[a]; /* of two hubs the larger stays */
+    bool larger_b = s->valences[b] > s->valences[a]; /* of two hubs the larger one does not move */
     bool hub_a = !larger_b && s->valences[a] > SIMPLIFY_HUB;
     bool hub_b = larger_b && s->valences[b] > SIMPLIFY_HUB;
-    if (!position_quadric(s, a, b, r, &g, sums)) return false;
+    if (!sum_position_quadric(s, a, b, r, &g, sums)) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
     else if (s->steering && s->def->placement == FCT_PLACE_SUBSET)

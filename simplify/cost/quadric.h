@@ -1,18 +1,32 @@
-/* simplify/cost/quadric.h: quadrics over a position and m attributes (Garland 1999, (3.10), (5.8)-(5.10)).
+/* simplify/cost/quadric.h: the algebra of quadrics over a position p and m attributes a.
  *
- * Q(p, a) = p^T A p + 2 b^T p + c + 2 a^T (C p + d) + a^T D a, packed as
- *   [0, 6) A as xx xy xz yy yz zz, [6, 9) b, 9 c, 10 the area that was added up,
- *   then for each attribute its row of C and its d (4), then D's upper triangle by rows.
- * Eliminating the attributes leaves the first 11 numbers, the quadric of the position whose attributes are
- * the best for it (a Schur complement); the sum of these over the wedges of a point is the point's.
+ * Q(p, a) = p^T A p + 2 b^T p + c + 2 a^T (C p + d) + a^T D a
+ *
+ * The doubles of one quadric, in order:
+ *   [0, 6)       A as xx xy xz yy yz zz
+ *   [6, 9)       b
+ *   [9]          c
+ *   [10]         area of the faces that were added
+ *   [11, 11+4m)  per attribute: its row of C (3) and its d (1)
+ *   then         the upper triangle of D by rows, m (m + 1) / 2
+ * With m = 0 this is Garland's Q = (A, b, c) of (3.8) and (3.9).
+ * Source: Garland 1999, sections 3.4 and 5.2.
  */
 #ifndef FCT_SIMPLIFY_QUADRIC_H
 #define FCT_SIMPLIFY_QUADRIC_H
 
-#include "simplify/state.h"
+#include <stdint.h>
 
-enum { POSITION_QUADRIC = 11, MAX_QUADRIC = 11 + 4 * 8 + 36 };
+#include "base/math/vec.h"
 
+enum {
+    QUADRIC_MAX_ATTRIBUTES = 8, /* red, green, blue, u, v and the three components of the normal */
+    POSITION_QUADRIC = 11,
+    MAX_QUADRIC = POSITION_QUADRIC + 4 * QUADRIC_MAX_ATTRIBUTES +
+                  QUADRIC_MAX_ATTRIBUTES * (QUADRIC_MAX_ATTRIBUTES + 1) / 2
+};
+
+/* Number of doubles of a quadric with m attributes. */
 static inline uint32_t quadric_size(uint32_t m) {
     return POSITION_QUADRIC + 4 * m + m * (m + 1) / 2;
 }
@@ -20,17 +34,18 @@ static inline uint32_t quadric_size(uint32_t m) {
 static inline double quadric_trace(const double *q) {
     return q[0] + q[3] + q[5];
 }
-/* A p + b: half the gradient. */
+/* A p + b, which is half the gradient of the position's part. */
 static inline v3 quadric_gradient(const double *q, v3 p) {
     return (v3){q[0] * p.x + q[1] * p.y + q[2] * p.z + q[6], q[1] * p.x + q[3] * p.y + q[4] * p.z + q[7],
                 q[2] * p.x + q[4] * p.y + q[5] * p.z + q[8]};
 }
+/* Q(p) of (3.9): the position's part alone. */
 static inline double quadric_at(const double *q, v3 p) {
     v3 g = quadric_gradient(q, p);
     return v3_dot(p, g) + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
 }
 
-/* q += weight times the squared distance from the plane through p with unit normal n. */
+/* q += weight times the quadric (3.10) of the plane through p with the unit normal n. */
 static inline void quadric_add_plane(double *q, v3 n, v3 p, double weight) {
     double d = -v3_dot(n, p);
     sym3_add_outer(q, weight, n);
@@ -38,19 +53,25 @@ static inline void quadric_add_plane(double *q, v3 n, v3 p, double weight) {
     q[9] += weight * d * d;
 }
 
-/* The attributes eliminated from a quadric: what is left for the position, and how to find them again. */
+/* q = the squared distance from the 2-plane through the three points x of R^(3 + m), (5.8)-(5.10), with area
+ * 1. The first two points must differ. */
+void fct_quadric_of_plane(double *q, uint32_t m, double x[3][3 + QUADRIC_MAX_ATTRIBUTES]);
+
+/* Q(p, a) for m attributes. */
+double fct_quadric_value(const double *q, uint32_t m, v3 p, const double *a);
+
+/* The result of fct_quadric_eliminate. */
 typedef struct fct_elimination {
-    double position[POSITION_QUADRIC];
-    double rows[SIMPLIFY_MAX_CHANNELS][4];
-    double upper[SIMPLIFY_MAX_CHANNELS][SIMPLIFY_MAX_CHANNELS];
+    double position[POSITION_QUADRIC]; /* min over a of Q(p, a) + ridge |a - prior|^2, as a quadric of p */
+    double rows[QUADRIC_MAX_ATTRIBUTES][4];
+    double upper[QUADRIC_MAX_ATTRIBUTES][QUADRIC_MAX_ATTRIBUTES];
 } fct_elimination;
 
-/* `ridge` times the squared distance of the attributes from `prior` (m of them) makes them unique. */
+/* Eliminates the m attributes (a Schur complement). One 3 x 3 system then serves any number of attributes and
+ * wedges. `ridge` times the squared distance from `prior` makes the best attributes unique. */
 void fct_quadric_eliminate(const double *q, uint32_t m, const double *prior, double ridge,
                            fct_elimination *out);
-/* The best attributes for a position. */
+/* The attributes that minimise Q(p, a) + ridge |a - prior|^2 at the position p. */
 void fct_quadric_attributes(const fct_elimination *e, uint32_t m, v3 p, double *attributes);
-/* Q(p, a). */
-double fct_quadric_value(const double *q, uint32_t m, v3 p, const double *a);
 
 #endif

@@ -1,29 +1,33 @@
-/* simplify/weld.c: which vertices at one place are one point.
+/* simplify/topology/weld.c: see weld.h.
  *
- * Vertices at one place are joined where open sides of their faces coincide: a side with a single face, in
- * terms of input vertices, is open, and two of them between the same two places are a doubled crease or seam,
- * whose ends must move together. Bodies that merely touch, at vertices or along closed edges, stay apart.
- * Where more than two open sides coincide, each goes with those of its own body, if every body there has
- * another; else all are joined. Vertices of one face at one place are joined too. Linear but for a sort of
- * the sides that could matter; the numbering follows the input's order.
+ * A side is open if no other face has it, in terms of input vertices. Vertices at one place become one point:
+ * 1. if one face has both of them;
+ * 2. if they are the ends of two open sides between the same two places: a doubled crease or a seam, which
+ *    must not crack;
+ * 3. if more than two open sides lie between the same places: each joins the others of its own body if every
+ *    body there has at least two, else all are joined.
+ * So bodies that only touch, at vertices or along closed edges, stay apart. Cost: linear, plus a sort of the
+ * sides at places with several vertices. Points are numbered in the order of the input's vertices.
  */
+#include "simplify/topology/weld.h"
+
 #include "base/sort.h"
-#include "simplify/state.h"
 
 typedef struct weld {
     const fct_simplifier *s;
-    uint32_t *vertices; /* by place: how many it has */
-    uint32_t *parents;  /* by vertex: joined ones; the lowest is the root */
-    uint32_t *bodies;   /* by vertex: connected by faces and pairs of open sides */
-    uint32_t *order;    /* sides, as corners, sorted by their places */
-    uint64_t *keys;     /* of `order` */
-    size_t count;
-    uint32_t *open, *crowd; /* corners: open sides of one run; of runs with more than two, FCT_NONE between */
+    uint32_t *vertices; /* per place: the number of its vertices */
+    uint32_t *parents;  /* per vertex: union-find of the points; the lowest vertex is the root */
+    uint32_t *bodies;   /* per vertex: union-find over faces and over pairs of open sides */
+    uint32_t *order;    /* sides (as corners) that could be joined, sorted by the places of their ends */
+    uint64_t *keys;     /* the sort keys of `order` */
+    size_t count;       /* of `order` */
+    uint32_t *open;     /* the open sides of the current run */
+    uint32_t *crowd;    /* the runs of more than two open sides, each ended by FCT_NONE */
     size_t crowd_count;
 } weld;
 
-/* Vertices at the ends of side c, that at the lower place first. */
-static void side_ends(const weld *w, uint32_t c, uint32_t ends[2]) {
+/* The vertices at the ends of side c; the one at the lower place comes first. */
+static void find_side_ends(const weld *w, uint32_t c, uint32_t ends[2]) {
     const uint32_t *places = w->s->point_of, *t = w->s->mesh->triangles;
     uint32_t a = t[c], b = t[corner_next(c)];
     bool swap = places[a] > places[b];
@@ -32,21 +36,22 @@ static void side_ends(const weld *w, uint32_t c, uint32_t ends[2]) {
 
 static uint64_t side_key(const weld *w, uint32_t c) {
     uint32_t ends[2];
-    side_ends(w, c, ends);
+    find_side_ends(w, c, ends);
     return (uint64_t)w->s->point_of[ends[0]] << 32 | w->s->point_of[ends[1]];
 }
 
 static void join_sides(weld *w, uint32_t c, uint32_t d) {
     uint32_t first[2], second[2];
-    side_ends(w, c, first);
-    side_ends(w, d, second);
+    find_side_ends(w, c, first);
+    find_side_ends(w, d, second);
     for (int k = 0; k < 2; ++k) {
         fct_sets_join(w->parents, first[k], second[k]);
         fct_sets_join(w->bodies, first[k], second[k]);
     }
 }
 
-/* Sides that other vertices at their ends could join. */
+/* Lists the sides with a place that has several vertices, sorted by their places. A run is a range of sides
+ * with the same two places. */
 static fct_result list_sides(weld *w) {
     const fct_mesh *mesh = w->s->mesh;
     const uint32_t *places = w->s->point_of;
@@ -73,12 +78,11 @@ static fct_result list_sides(weld *w) {
     return fct_sort_pairs(w->s->env, w->keys, w->order, w->count);
 }
 
-/* Sorts the sides of a run by their vertices, so that equal ones are neighbours, and keeps the single ones.
- */
-static fct_result find_open(weld *w, size_t first, size_t count, size_t *open) {
+/* Finds the open sides of a run: those whose two vertices no other side of the run has. */
+static fct_result find_open_sides(weld *w, size_t first, size_t count, size_t *open) {
     for (size_t i = first; i < first + count; ++i) {
         uint32_t ends[2];
-        side_ends(w, w->order[i], ends);
+        find_side_ends(w, w->order[i], ends);
         w->keys[i] = (uint64_t)ends[0] << 32 | ends[1];
     }
     fct_result result = fct_sort_pairs(w->s->env, w->keys + first, w->order + first, count);
@@ -91,12 +95,13 @@ static fct_result find_open(weld *w, size_t first, size_t count, size_t *open) {
     return result;
 }
 
+/* Joins the runs with exactly two open sides and collects the larger ones in `crowd`. */
 static fct_result join_runs(weld *w) {
     for (size_t first = 0, count; first < w->count; first += count) {
         uint64_t key = w->keys[first];
         for (count = 1; first + count < w->count && w->keys[first + count] == key;) ++count;
         size_t open;
-        fct_result result = find_open(w, first, count, &open);
+        fct_result result = find_open_sides(w, first, count, &open);
         if (result != FCT_OK) return result;
         if (open == 2) join_sides(w, w->open[0], w->open[1]);
         if (open <= 2) continue;
@@ -107,7 +112,8 @@ static fct_result join_runs(weld *w) {
     return FCT_OK;
 }
 
-/* Open sides of one run, by their bodies as pairs of sides have made them. */
+/* Joins the open sides of one run body by body, if each body there has at least two; else joins all of them.
+ */
 static fct_result join_crowd(weld *w, const uint32_t *sides, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         w->keys[i] = fct_sets_find(w->bodies, w->s->mesh->triangles[sides[i]]);
@@ -122,8 +128,8 @@ static fct_result join_crowd(weld *w, const uint32_t *sides, size_t count) {
     for (size_t i = 1; i < count; ++i) {
         if (!single && w->keys[i] != w->keys[i - 1]) continue;
         uint32_t first[2], second[2];
-        side_ends(w, w->order[i - 1], first);
-        side_ends(w, w->order[i], second);
+        find_side_ends(w, w->order[i - 1], first);
+        find_side_ends(w, w->order[i], second);
         for (int k = 0; k < 2; ++k) fct_sets_join(w->parents, first[k], second[k]);
     }
     return FCT_OK;
@@ -138,7 +144,7 @@ static fct_result join_crowds(weld *w) {
     return result;
 }
 
-/* Vertices of one face at one place; and bodies, as faces connect them. */
+/* Joins the vertices of one face that share a place, and the bodies that faces connect. */
 static void join_faces(weld *w) {
     const fct_mesh *mesh = w->s->mesh;
     for (uint32_t c = 0; c < 3 * mesh->face_count; ++c) {
@@ -148,7 +154,8 @@ static void join_faces(weld *w) {
     }
 }
 
-static fct_result prepare(weld *w, uint32_t place_count, bool *needed) {
+/* *needed: whether a place has several vertices. If not, places are points already. */
+static fct_result prepare_weld(weld *w, uint32_t place_count, bool *needed) {
     uint32_t count = w->s->mesh->vertex_count;
     *needed = false;
     w->vertices = fct_allocate_zero(w->s->env, place_count, sizeof *w->vertices);
@@ -159,15 +166,14 @@ static fct_result prepare(weld *w, uint32_t place_count, bool *needed) {
     w->parents = fct_allocate(w->s->env, count, sizeof *w->parents);
     w->bodies = fct_allocate(w->s->env, count, sizeof *w->bodies);
     if (!w->parents || !w->bodies) return fct_fail_memory(w->s->env, "places");
-    fct_sets_create(w->parents, count);
-    fct_sets_create(w->bodies, count);
+    for (uint32_t v = 0; v < count; ++v) w->parents[v] = w->bodies[v] = v;
     return FCT_OK;
 }
 
 fct_result fct_simplify_weld(fct_simplifier *s) {
     weld w = {.s = s};
     bool needed;
-    fct_result result = prepare(&w, s->point_count, &needed);
+    fct_result result = prepare_weld(&w, s->point_count, &needed);
     if (result != FCT_OK || !needed) goto done;
     join_faces(&w);
     result = list_sides(&w);

@@ -1,25 +1,31 @@
-/* simplify/topology.c: from an indexed mesh to points, wedges, rings and edges.
+/* simplify/topology/topology.c: see topology.h.
  *
- * Vertices with equal coordinates (equal bits, with -0 read as 0) become one point where their faces meet
- * along a side (weld.c); wedges are the distinct (point, attributes). Faces with two corners at one point are
- * left out here and for good; faces of no area with three distinct points stay, for they hold their
- * neighbours together. Linear in corners (expected, for the hash tables); the numbering follows the input's
- * order.
+ * 1. Points: vertices with equal coordinates share a place; weld.c decides which of them share a point.
+ * 2. Rings: the faces in terms of points. Faces with two corners at one point are removed. Faces without area
+ * but with three distinct points stay, because they connect their neighbours.
+ * 3. Wedges: the distinct (point, attributes).
+ * 4. Edges, with flags for boundaries and borders.
+ * Cost: linear in the corners (expected, because of hash tables). Numbers follow the order of the input.
  */
+#include "simplify/topology/topology.h"
+
 #include "base/key.h"
-#include "simplify/state.h"
+#include "simplify/topology/weld.h"
 
 enum { KEY_WORDS = 7 };
 
-/* Writes the words that make item i distinct. -0 counts as 0, because -0 + 0 is 0. */
+/* Writes the words that distinguish item i from others; unused words stay 0. -0 counts as 0, because
+ * -0 + 0 is 0. */
 typedef void key_of(const fct_simplifier *s, const uint32_t *base, uint32_t i, uint32_t key[KEY_WORDS]);
 
-static void position_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
+static void write_position_key(const fct_simplifier *s, const uint32_t *base, uint32_t v,
+                               uint32_t key[KEY_WORDS]) {
     (void)base;
     for (int k = 0; k < 3; ++k) key[k] = fct_float_bits(s->mesh->positions[3 * (size_t)v + k] + 0.0f);
 }
 
-static void vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v, uint32_t key[KEY_WORDS]) {
+static void write_vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v,
+                             uint32_t key[KEY_WORDS]) {
     key[0] = base[v];
     for (int k = 0; k < 3; ++k) {
         if (s->mesh->colors) key[1 + k] = fct_float_bits(s->mesh->colors[3 * (size_t)v + k] + 0.0f);
@@ -27,7 +33,8 @@ static void vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v
     }
 }
 
-static void corner_key(const fct_simplifier *s, const uint32_t *base, uint32_t c, uint32_t key[KEY_WORDS]) {
+static void write_corner_key(const fct_simplifier *s, const uint32_t *base, uint32_t c,
+                             uint32_t key[KEY_WORDS]) {
     key[0] = base[s->mesh->triangles[c]];
     for (int k = 0; k < 2; ++k) key[1 + k] = fct_float_bits(s->mesh->texcoords[2 * (size_t)c + k] + 0.0f);
 }
@@ -41,13 +48,13 @@ static uint64_t hash_key(const uint32_t key[KEY_WORDS]) {
     return h ^ h >> 32;
 }
 
-/* Numbers the items [0, count) whose id is not FCT_NONE on entry by distinct key, in order of first
- * appearance; ids[i] receives the number. */
+/* Numbers the items [0, count) by distinct key, in the order of first appearance: ids[i] receives the number.
+ * Items with ids[i] == FCT_NONE on entry are skipped. */
 static fct_result number_keys(const fct_simplifier *s, key_of *key, const uint32_t *base, uint32_t count,
                               uint32_t *ids, uint32_t *distinct) {
     size_t size = 64;
     while (size < 2 * (size_t)count) size *= 2;
-    uint32_t *table = fct_allocate(s->env, size, sizeof *table); /* representative items */
+    uint32_t *table = fct_allocate(s->env, size, sizeof *table); /* per slot: the first item with its key */
     if (!table) return fct_fail_memory(s->env, "a table of vertices");
     memset(table, 0xff, size * sizeof *table);
     *distinct = 0;
@@ -70,13 +77,30 @@ static fct_result number_keys(const fct_simplifier *s, key_of *key, const uint32
     return FCT_OK;
 }
 
+/* The longest side of the bounds becomes 1 and their centre the origin. */
+static void find_frame(fct_simplifier *s) {
+    v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t v = 0; v < s->mesh->vertex_count; ++v) {
+        if (s->point_of[v] == FCT_NONE) continue;
+        v3 p = v3_load(s->mesh->positions + 3 * (size_t)v);
+        lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
+        upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
+    }
+    bool empty = s->point_count == 0;
+    v3 size = v3_sub(upper, lower);
+    s->center = empty ? (v3){0, 0, 0} : v3_scale(v3_add(lower, upper), .5);
+    s->extent = empty ? 1 : fmax(size.x, fmax(size.y, size.z));
+    if (!(s->extent > 0)) s->extent = 1;
+}
+
 static fct_result make_points(fct_simplifier *s) {
     const fct_mesh *mesh = s->mesh;
     s->point_of = fct_allocate(s->env, mesh->vertex_count, sizeof *s->point_of);
     if (!s->point_of) return fct_fail_memory(s->env, "the points of a mesh");
     memset(s->point_of, 0xff, mesh->vertex_count * sizeof *s->point_of);
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) s->point_of[mesh->triangles[c]] = 0;
-    fct_result result = number_keys(s, position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
+    fct_result result =
+        number_keys(s, write_position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
     if (result == FCT_OK) result = fct_simplify_weld(s);
     if (result != FCT_OK) return result;
 
@@ -90,17 +114,8 @@ static fct_result make_points(fct_simplifier *s) {
     if (!s->positions || !s->sources || !s->point_parents || !s->first_corners || !s->last_corners ||
         !s->valences)
         return fct_fail_memory(s->env, "the points of a mesh");
-    v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
-        if (s->point_of[v] == FCT_NONE) continue;
-        v3 p = v3_load(mesh->positions + 3 * (size_t)v);
-        lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
-        upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
-    }
-    s->center = count ? v3_scale(v3_add(lower, upper), .5) : (v3){0, 0, 0};
-    v3 size = v3_sub(upper, lower);
-    s->extent = count ? fmax(size.x, fmax(size.y, size.z)) : 1;
-    if (!(s->extent > 0)) s->extent = 1;
+    find_frame(s);
+    /* Downwards, so that the lowest vertex of a point is its source. */
     for (uint32_t v = mesh->vertex_count; v-- > 0;) {
         uint32_t p = s->point_of[v];
         if (p == FCT_NONE) continue;
@@ -114,7 +129,8 @@ static fct_result make_points(fct_simplifier *s) {
     return FCT_OK;
 }
 
-/* The faces in terms of points, and each point's list of corners. */
+/* Writes the faces in terms of points, and the list of corners at each point. Faces with two corners at one
+ * point are removed for good. */
 static fct_result make_rings(fct_simplifier *s) {
     size_t corners = 3 * (size_t)s->mesh->face_count;
     s->triangles = fct_allocate(s->env, corners, sizeof *s->triangles);
@@ -146,6 +162,7 @@ static fct_result make_rings(fct_simplifier *s) {
     return FCT_OK;
 }
 
+/* Classes are distinct (point, colour, normal), wedges are distinct (class, texture coordinates). */
 static fct_result make_wedges(fct_simplifier *s) {
     const fct_mesh *mesh = s->mesh;
     s->wedge_count = s->point_count;
@@ -158,11 +175,12 @@ static fct_result make_wedges(fct_simplifier *s) {
     memcpy(class_of, s->point_of, mesh->vertex_count * sizeof *class_of);
     s->class_count = s->point_count;
     if (mesh->colors || mesh->normals)
-        result = number_keys(s, vertex_key, s->point_of, mesh->vertex_count, class_of, &s->class_count);
+        result = number_keys(s, write_vertex_key, s->point_of, mesh->vertex_count, class_of, &s->class_count);
     if (result != FCT_OK) goto done;
     s->wedge_count = s->class_count;
     if (mesh->texcoords)
-        result = number_keys(s, corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
+        result =
+            number_keys(s, write_corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
     else
         for (size_t c = 0; c < corners; ++c) s->corner_wedges[c] = class_of[mesh->triangles[c]];
     if (result != FCT_OK) goto done;
@@ -194,7 +212,8 @@ done:
     return result;
 }
 
-/* Whether two faces differ in what makes a border of the side they share: material, face colour. */
+/* Whether the side between two faces is a border: other material, or face colours that differ by more than
+ * the threshold in |dr| + |dg| + |db|. */
 static bool faces_differ(const fct_simplifier *s, uint32_t f, uint32_t g) {
     const fct_mesh *mesh = s->mesh;
     if (mesh->materials && mesh->materials[f] != mesh->materials[g]) return true;
@@ -206,13 +225,14 @@ static bool faces_differ(const fct_simplifier *s, uint32_t f, uint32_t g) {
 }
 
 typedef struct edge_builder {
-    uint32_t *marks;  /* point -> the point whose edges are being made */
-    uint32_t *slots;  /* point -> its edge with that point */
+    uint32_t *marks;  /* point -> the last point that it got an edge with */
+    uint32_t *slots;  /* point -> that edge */
     uint32_t *apexes; /* edge -> apex of its first face */
     uint32_t *faces;  /* edge -> its first face */
 } edge_builder;
 
-/* Side c joins point a with a point of a higher number. */
+/* Adds side c, between point a and the higher point `other`. An edge is a boundary if all its faces have the
+ * same apex, so duplicate faces count once. */
 static void add_side(fct_simplifier *s, edge_builder *b, uint32_t a, uint32_t other, uint32_t c) {
     uint32_t apex = s->triangles[corner_previous(c)], f = c / 3;
     if (b->marks[other] != a) {
@@ -231,7 +251,7 @@ static void add_side(fct_simplifier *s, edge_builder *b, uint32_t a, uint32_t ot
 }
 
 static fct_result make_edges(fct_simplifier *s) {
-    size_t corners = 3 * (size_t)s->live_faces; /* the most edges there can be */
+    size_t corners = 3 * (size_t)s->live_faces; /* an upper bound of the edge count */
     edge_builder b = {0};
     b.marks = fct_allocate(s->env, s->point_count, sizeof *b.marks);
     b.slots = fct_allocate(s->env, s->point_count, sizeof *b.slots);

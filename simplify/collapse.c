@@ -1,0 +1,146 @@
+/* simplify/collapse.c: see collapse.h. Cost: linear in the corners of the end that vanishes, plus O(wedges^2)
+ * with at most 64 wedges. */
+#include "simplify/collapse.h"
+
+/* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
+#define RETIRED_RIDGE 1e-12
+
+void fct_simplify_drop_edge(fct_simplifier *s, uint32_t e) {
+    s->edges[e].state = EDGE_DEAD;
+}
+
+/* Removes a wedge without faces from its point's list. Its quadric, with the attributes eliminated, goes to
+ * the wedge of the point that most corners use. The last wedge of a point stays. */
+static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
+    uint32_t keep = FCT_NONE, *link = &s->first_wedges[point];
+    for (uint32_t w = *link; w != FCT_NONE; w = s->next_wedges[w])
+        if (w != wedge && (keep == FCT_NONE || s->wedge_uses[w] > s->wedge_uses[keep])) keep = w;
+    if (keep == FCT_NONE) return;
+    while (*link != wedge) link = &s->next_wedges[*link];
+    *link = s->next_wedges[wedge];
+    const double *q = s->quadrics + (size_t)s->quadric_size * wedge;
+    double *to = s->quadrics + (size_t)s->quadric_size * keep;
+    fct_elimination e;
+    fct_quadric_eliminate(q, s->steering, s->attributes + (size_t)s->channel_count * wedge,
+                          RETIRED_RIDGE * quadric_trace(q), &e);
+    for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += e.position[k];
+}
+
+static void count_corner_out(fct_simplifier *s, uint32_t c) {
+    --s->valences[s->triangles[c]];
+    if (s->corner_wedges) --s->wedge_uses[corner_wedge(s, c)];
+}
+
+/* Two sides of a removed face become one edge: those from its apex to both ends. Of two queued edges the one
+ * with the higher bucket stays: costs only grow, so that bound is tighter. */
+static void join_twins(fct_simplifier *s, uint32_t side_a, uint32_t side_b) {
+    uint32_t ea = edge_root(s->edges, s->side_edges[side_a]);
+    uint32_t eb = edge_root(s->edges, s->side_edges[side_b]);
+    if (ea == eb) return;
+    const fct_edge *a = &s->edges[ea], *b = &s->edges[eb];
+    bool queued_a = a->state == EDGE_QUEUED, queued_b = b->state == EDGE_QUEUED;
+    bool keep_b = queued_b && (!queued_a || b->bucket > a->bucket);
+    uint32_t keep = keep_b ? eb : ea, drop = keep_b ? ea : eb;
+    fct_simplify_drop_edge(s, drop);
+    s->edges[drop].parent = keep;
+}
+
+/* Removes the face of corner c, which lies at b; the face also has a corner at a. */
+static void remove_face(fct_simplifier *s, uint32_t c, uint32_t a) {
+    uint32_t next = corner_next(c), previous = corner_previous(c);
+    if (s->triangles[next] == a)
+        join_twins(s, next, previous);
+    else
+        join_twins(s, next, c);
+    uint32_t apex = s->triangles[next] == a ? previous : next;
+    uint32_t point = s->triangles[apex];
+    for (int k = 0; k < 3; ++k) count_corner_out(s, c - c % 3 + (uint32_t)k);
+    if (s->corner_wedges && s->wedge_uses[corner_wedge(s, apex)] == 0)
+        retire_wedge(s, point, corner_wedge(s, apex));
+    s->triangles[c - c % 3] = FCT_NONE;
+    --s->live_faces;
+}
+
+/* Makes each group one wedge of point a, with the summed quadric and the best attributes. first, second: the
+ * ends' positions before the contraction. */
+static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candidate *candidate, uint32_t a,
+                         v3 first, v3 second) {
+    double values[SIMPLIFY_MAX_WEDGES][SIMPLIFY_MAX_CHANNELS];
+    for (uint32_t i = 0; i < g->group_count; ++i)
+        fct_place_attributes(s, g, i, candidate, first, second, values[i]);
+    s->first_wedges[a] = FCT_NONE;
+    for (uint32_t i = g->group_count; i-- > 0;) {
+        uint32_t keep = FCT_NONE;
+        for (uint32_t k = 0; k < g->wedge_count; ++k) {
+            uint32_t w = g->wedges[k];
+            if (g->group_of[k] != i) continue;
+            if (keep == FCT_NONE) {
+                keep = w;
+                continue;
+            }
+            double *to = s->quadrics + (size_t)s->quadric_size * keep;
+            const double *from = s->quadrics + (size_t)s->quadric_size * w;
+            for (uint32_t j = 0; j < s->quadric_size; ++j) to[j] += from[j];
+            s->wedge_parents[w] = keep;
+            s->wedge_uses[keep] += s->wedge_uses[w];
+            uint32_t class_keep = fct_sets_find(s->class_parents, s->wedge_classes[keep]);
+            s->class_parents[fct_sets_find(s->class_parents, s->wedge_classes[w])] = class_keep;
+        }
+        memcpy(s->attributes + (size_t)s->channel_count * keep, values[i], s->channel_count * sizeof(double));
+        s->next_wedges[keep] = s->first_wedges[a];
+        s->first_wedges[a] = keep;
+    }
+    for (uint32_t w = s->first_wedges[a], next; w != FCT_NONE; w = next) {
+        next = s->next_wedges[w];
+        if (s->wedge_uses[w] == 0) retire_wedge(s, a, w);
+    }
+}
+
+/* Removes the faces between a and b and moves the other corners of b to a. ring_b holds the corners of b. */
+static void move_corners(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
+    uint32_t first = FCT_NONE, last = FCT_NONE;
+    for (uint32_t i = 0; i < count_b; ++i) {
+        uint32_t c = s->ring_b[i];
+        if (s->triangles[corner_next(c)] == a || s->triangles[corner_previous(c)] == a) {
+            remove_face(s, c, a);
+            continue;
+        }
+        s->triangles[c] = a;
+        if (first == FCT_NONE)
+            first = c;
+        else
+            s->next_corners[last] = c;
+        last = c;
+        ++s->valences[a];
+        --s->valences[b];
+    }
+    s->first_corners[b] = s->last_corners[b] = FCT_NONE;
+    s->point_parents[b] = a;
+    if (first == FCT_NONE) return;
+    s->next_corners[last] = FCT_NONE;
+    if (s->first_corners[a] == FCT_NONE)
+        s->first_corners[a] = first;
+    else
+        s->next_corners[s->last_corners[a]] = first;
+    s->last_corners[a] = last;
+}
+
+void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_candidate *candidate,
+                           uint32_t keep, uint32_t count_b) {
+    uint32_t a = ends[keep], b = ends[1 - keep];
+    fct_groups g;
+    v3 first = point_position(s, ends[0]), second = point_position(s, ends[1]);
+    if (s->corner_wedges) fct_groups_find(s, ends[0], ends[1], &g);
+    uint32_t source = candidate->end < 2 ? s->sources[ends[candidate->end]] : FCT_NONE;
+    move_corners(s, a, b, count_b);
+    s->sources[a] = source;
+    if (s->corner_wedges)
+        merge_wedges(s, &g, candidate, a, first, second);
+    else {
+        double *to = s->quadrics + (size_t)POSITION_QUADRIC * a;
+        const double *from = s->quadrics + (size_t)POSITION_QUADRIC * b;
+        for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
+    }
+    double *at = s->positions + 3 * (size_t)a;
+    at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
+}

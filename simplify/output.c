@@ -1,0 +1,106 @@
+/* simplify/output.c: see output.h. Cost: linear in the corners of the input. */
+#include "simplify/output.h"
+
+/* Corners with equal keys share an output vertex: their point, or the class of their wedge. */
+static uint32_t find_vertex_key(fct_simplifier *s, uint32_t c) {
+    if (!s->wedge_classes) return s->triangles[c];
+    return fct_sets_find(s->class_parents, s->wedge_classes[corner_wedge(s, c)]);
+}
+
+/* A point that never moved keeps the bits of its input vertex. */
+static void write_position(const fct_simplifier *s, uint32_t point, float *out) {
+    if (s->sources[point] != FCT_NONE) {
+        memcpy(out, s->mesh->positions + 3 * (size_t)s->sources[point], 3 * sizeof *out);
+        return;
+    }
+    v3_store(out, v3_mad(s->center, s->extent, point_position(s, point)));
+}
+
+/* Writes the attributes of a live corner's wedge: c in the input, `corner` and its vertex v in the output.
+ * Wedges that share a vertex differ only in texture coordinates, apart from rounding; the last one written
+ * counts. */
+static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, uint32_t c, uint32_t v) {
+    const double *a = s->attributes + (size_t)s->channel_count * corner_wedge(s, c);
+    for (uint32_t i = 0; i < s->channel_count; ++i) {
+        const fct_channel *channel = &s->channels[i];
+        float value = (float)(a[i] / channel->factor);
+        if (channel->source == CHANNEL_COLOR)
+            out->colors[3 * (size_t)v + channel->component] = value;
+        else if (channel->source == CHANNEL_NORMAL)
+            out->normals[3 * (size_t)v + channel->component] = value;
+        else
+            out->texcoords[2 * (size_t)corner + channel->component] = value;
+    }
+}
+
+static void normalize_normals(fct_mesh *out) {
+    for (uint32_t v = 0; v < out->vertex_count; ++v) {
+        float *n = out->normals + 3 * (size_t)v;
+        v3 unit = v3_unit(v3_load(n));
+        if (v3_norm2(unit) > 0) v3_store(n, unit);
+    }
+}
+
+static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
+    if (!mesh->material_names) {
+        out->material_count = mesh->material_count;
+        return FCT_OK;
+    }
+    out->material_names = fct_allocate_zero(env, mesh->material_count, sizeof *out->material_names);
+    if (!out->material_names) return fct_fail_memory(env, "material names");
+    for (uint32_t i = 0; i < mesh->material_count; ++i) {
+        size_t length = strlen(mesh->material_names[i]) + 1;
+        out->material_names[i] = fct_allocate(env, length, 1);
+        if (!out->material_names[i]) return fct_fail_memory(env, "material names");
+        memcpy(out->material_names[i], mesh->material_names[i], length);
+        out->material_count = i + 1;
+    }
+    return FCT_OK;
+}
+
+static void write_face(const fct_mesh *mesh, fct_mesh *out, uint32_t f, uint32_t to) {
+    if (out->face_colors)
+        memcpy(out->face_colors + 3 * (size_t)to, mesh->face_colors + 3 * (size_t)f, 3 * sizeof(float));
+    if (out->materials) out->materials[to] = mesh->materials[f];
+    if (out->source_faces) out->source_faces[to] = mesh->source_faces[f];
+}
+
+/* numbers: key -> output vertex, in the order of first use. Returns the number of vertices. */
+static uint32_t number_vertices(fct_simplifier *s, uint32_t *numbers, uint32_t key_count) {
+    uint32_t vertices = 0, corners = 3 * s->mesh->face_count;
+    memset(numbers, 0xff, key_count * sizeof *numbers);
+    for (uint32_t c = 0; c < corners; ++c) {
+        if (corner_dead(s, c)) continue;
+        uint32_t key = find_vertex_key(s, c);
+        if (numbers[key] == FCT_NONE) numbers[key] = vertices++;
+    }
+    return vertices;
+}
+
+fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out) {
+    const fct_mesh *mesh = s->mesh;
+    uint32_t key_count = s->wedge_classes ? s->class_count : s->point_count;
+    uint32_t *numbers = fct_allocate(s->env, key_count, sizeof *numbers);
+    if (!numbers) return fct_fail_memory(s->env, "output vertices");
+    uint32_t vertices = number_vertices(s, numbers, key_count);
+    unsigned arrays =
+        (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
+        (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
+        (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
+    fct_result result = fct_mesh_create(s->env, vertices, s->live_faces, arrays, out);
+    if (result == FCT_OK) result = copy_names(s->env, mesh, out);
+    uint32_t to = 0;
+    for (uint32_t f = 0; f < mesh->face_count && result == FCT_OK; ++f) {
+        if (corner_dead(s, 3 * f)) continue;
+        for (uint32_t k = 0; k < 3; ++k) {
+            uint32_t c = 3 * f + k, v = numbers[find_vertex_key(s, c)];
+            out->triangles[3 * (size_t)to + k] = v;
+            write_position(s, s->triangles[c], out->positions + 3 * (size_t)v);
+            if (s->channel_count) write_attributes(s, out, 3 * to + k, c, v);
+        }
+        write_face(mesh, out, f, to++);
+    }
+    if (result == FCT_OK && out->normals) normalize_normals(out);
+    fct_release(s->env, numbers);
+    return result;
+}

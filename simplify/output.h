@@ -1,0 +1,11 @@
+/* simplify/output.h: the mesh that remains. */
+#ifndef FCT_SIMPLIFY_OUTPUT_H
+#define FCT_SIMPLIFY_OUTPUT_H
+
+#include "simplify/state.h"
+
+/* Writes the live faces in the order of the input, with the same arrays as the input. Vertices are numbered
+ * in the order in which faces first use them. Errors: MEMORY; *out is then partly filled: release it. */
+fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out);
+
+#endif

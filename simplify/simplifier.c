@@ -1,0 +1,46 @@
+/* simplify/simplifier.c: see simplifier.h. Cost: linear in the corners. */
+#include "simplify/simplifier.h"
+
+#include "simplify/cost/channels.h"
+#include "simplify/cost/fundamental.h"
+#include "simplify/topology/topology.h"
+
+static fct_result fill_simplifier(fct_simplifier *s) {
+    fct_simplify_channels(s);
+    fct_result result = fct_simplify_topology(s);
+    if (result == FCT_OK) result = fct_simplify_attributes(s);
+    if (result == FCT_OK) result = fct_simplify_quadrics(s);
+    if (result != FCT_OK) return result;
+    size_t ring = s->face_count > SIMPLIFY_HUB ? s->face_count : SIMPLIFY_HUB;
+    s->ring_b = fct_allocate(s->env, ring, sizeof *s->ring_b);
+    s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
+    if (!s->ring_b || !s->refused) return fct_fail_memory(s->env, "rings");
+    if (!s->def->keep_topology) return FCT_OK;
+    s->link_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->link_marks);
+    return s->link_marks ? FCT_OK : fct_fail_memory(s->env, "marks of points");
+}
+
+void fct_simplifier_destroy(fct_simplifier *s) {
+    if (!s) return;
+    void *arrays[] = {s->point_of,      s->positions,     s->sources,      s->point_parents, s->first_corners,
+                      s->last_corners,  s->valences,      s->first_wedges, s->triangles,     s->next_corners,
+                      s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,    s->quadrics,
+                      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,    s->wedge_classes,
+                      s->class_parents, s->link_marks,    s->ring_b,       s->refused};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
+    fct_release(s->env, s);
+}
+
+fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                                 fct_simplifier **out) {
+    *out = NULL;
+    fct_simplifier *s = fct_allocate_zero(env, 1, sizeof *s);
+    if (!s) return fct_fail_memory(env, "the simplifier");
+    s->env = env, s->mesh = mesh, s->def = def;
+    fct_result result = fill_simplifier(s);
+    if (result == FCT_OK)
+        *out = s;
+    else
+        fct_simplifier_destroy(s);
+    return result;
+}
