@@ -1,5 +1,5 @@
-/* tests/simplify/oracle.h: arithmetic and meshes for the oracles of the simplifier. The arithmetic is plain double and
- * shares no code with the library. */
+/* tests/simplify/oracle.h: arithmetic and meshes for the oracles of the simplifier. The arithmetic is plain
+ * double and shares no code with the library. */
 #ifndef FCT_TESTS_SIMPLIFY_ORACLE_H
 #define FCT_TESTS_SIMPLIFY_ORACLE_H
 
@@ -62,8 +62,10 @@ static inline void solve_dense(int n, double *a, double *b) {
     }
 }
 
-/* Squared distance of v from the plane x0 + s h + t k in R^n: the least-squares s and t, then the residual. */
-static inline double squared_distance(int n, const double *x0, const double *x1, const double *x2, const double *v) {
+/* Squared distance of v from the plane x0 + s h + t k in R^n: the least-squares s and t, then the residual.
+ */
+static inline double squared_distance(int n, const double *x0, const double *x1, const double *x2,
+                                      const double *v) {
     double hh = 0, hk = 0, kk = 0, hu = 0, ku = 0, sum = 0;
     for (int i = 0; i < n; ++i) {
         double h = x1[i] - x0[i], k = x2[i] - x0[i], u = v[i] - x0[i];
@@ -83,11 +85,11 @@ static inline void v3_to_array(v3 p, double out[3]) {
 
 /* A bumpy sheet of 4 x 4 squares with two triangles each, 3 units wide and away from the origin.
  *
- *   row 4  equal colours    . . . . .       Column 2 has two vertices per row, one for the faces on each side.
- *   row 3  equal colours    . . | . .       Texture coordinates jump along row 2. The last column of squares has
- *   row 2  faint crease     . . | . .       another material, the first one clearly other face colours, the top row
- *   row 1  crease           . . | . .       slightly other ones.
- *   row 0  crease           . . | . .
+ *   row 4  equal colours    . . . . .       Column 2 has two vertices per row, one for the faces on each
+ * side. row 3  equal colours    . . | . .       Texture coordinates jump along row 2. The last column of
+ * squares has row 2  faint crease     . . | . .       another material, the first one clearly other face
+ * colours, the top row row 1  crease           . . | . .       slightly other ones. row 0  crease           .
+ * . | . .
  */
 static inline fct_mesh make_sheet(const fct_env *env, unsigned arrays, uint64_t seed) {
     enum { N = 4, M = N + 1 };
@@ -135,9 +137,13 @@ static inline fct_mesh make_sheet(const fct_env *env, unsigned arrays, uint64_t 
     return mesh;
 }
 
-enum { ALL_ARRAYS = FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS };
+enum {
+    ALL_ARRAYS =
+        FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS
+};
 
-static inline fct_simplifier *open_simplifier(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
+static inline fct_simplifier *open_simplifier(const fct_env *env, const fct_mesh *mesh,
+                                              const fct_simplify_def *def) {
     fct_simplifier *s;
     assert_int_equal(fct_simplifier_create(env, mesh, def, &s), FCT_OK);
     return s;
@@ -145,14 +151,16 @@ static inline fct_simplifier *open_simplifier(const fct_env *env, const fct_mesh
 
 /* A vertex in the unit cube, by the bounds of the vertices that faces use. */
 static inline v3 scaled_vertex(const fct_mesh *mesh, uint32_t v) {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, out[3], extent = 0;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, out[3],
+           extent = 0;
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c)
         for (int k = 0; k < 3; ++k) {
             double x = mesh->positions[3 * (size_t)mesh->triangles[c] + k];
             low[k] = fmin(low[k], x), high[k] = fmax(high[k], x);
         }
     for (int k = 0; k < 3; ++k) extent = fmax(extent, high[k] - low[k]);
-    for (int k = 0; k < 3; ++k) out[k] = (mesh->positions[3 * (size_t)v + k] - .5 * (low[k] + high[k])) / extent;
+    for (int k = 0; k < 3; ++k)
+        out[k] = (mesh->positions[3 * (size_t)v + k] - .5 * (low[k] + high[k])) / extent;
     return (v3){out[0], out[1], out[2]};
 }
 

@@ -103,8 +103,8 @@ static void attributes_of_weight_zero_come_last(void **state) {
                 assert_true(steers == !(zero & 2));
                 assert_close(channel->factor, (steers ? .25 : 1) / range_u, 1e-12);
             }
-            unsigned bit = 1u << (3 * (channel->source == CHANNEL_NORMAL) + 6 * (channel->source == CHANNEL_TEXCOORD) +
-                                  channel->component);
+            unsigned bit = 1u << (3 * (channel->source == CHANNEL_NORMAL) +
+                                  6 * (channel->source == CHANNEL_TEXCOORD) + channel->component);
             assert_false(seen & bit);
             seen |= bit;
         }
@@ -123,7 +123,8 @@ static void wedges_hold_the_scaled_values_of_their_corners(void **state) {
         double want[3 + SIMPLIFY_MAX_CHANNELS];
         corner_vector(s, c, s->channel_count, want);
         for (uint32_t i = 0; i < s->channel_count; ++i)
-            assert_close(s->attributes[(size_t)s->channel_count * s->corner_wedges[c] + i], want[3 + i], 1e-15);
+            assert_close(s->attributes[(size_t)s->channel_count * s->corner_wedges[c] + i], want[3 + i],
+                         1e-15);
         v3 p = point_position(s, s->triangles[c]);
         assert_close(p.x, want[0], 1e-12);
         assert_close(p.y, want[1], 1e-12);

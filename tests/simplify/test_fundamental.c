@@ -41,7 +41,8 @@ static double side_strength(const fct_simplifier *s, uint32_t c) {
     for (uint32_t d = 0; d < 3 * mesh->face_count; ++d) {
         bool same_way;
         if (d / 3 == c / 3 || !side_is_shared(s, c, d, &same_way)) continue;
-        uint32_t d2 = d - d % 3 + (d + 1) % 3, apex_c = c - c % 3 + (c + 2) % 3, apex_d = d - d % 3 + (d + 2) % 3;
+        uint32_t d2 = d - d % 3 + (d + 1) % 3, apex_c = c - c % 3 + (c + 2) % 3,
+                 apex_d = d - d % 3 + (d + 2) % 3;
         if (s->triangles[apex_c] != s->triangles[apex_d]) open = false;
         if (faces_have_a_border(mesh, c / 3, d / 3, s->def->feature_threshold)) strength = 1;
         if (!s->channel_count) continue;
@@ -51,8 +52,8 @@ static double side_strength(const fct_simplifier *s, uint32_t c) {
     return open ? 1 : strength;
 }
 
-/* The sum over the corners of one wedge at the vector v: a third of each face's area times the squared distance from
- * its plane, and the constraint planes through the sides at the corner. */
+/* The sum over the corners of one wedge at the vector v: a third of each face's area times the squared
+ * distance from its plane, and the constraint planes through the sides at the corner. */
 static double direct_sum(const fct_simplifier *s, uint32_t wedge, const double *v) {
     const fct_mesh *mesh = s->mesh;
     double sum = 0;

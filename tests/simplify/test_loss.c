@@ -1,5 +1,5 @@
-/* The nearest point of a triangle by brute force; the loss of a contraction against its definition, evaluated on the
- * whole mesh. */
+/* The nearest point of a triangle by brute force; the loss of a contraction against its definition, evaluated
+ * on the whole mesh. */
 #include "oracle.h"
 #include "simplify/cost/loss.h"
 #include "simplify/cost/nearest.h"
@@ -17,7 +17,8 @@ static double search_distance2(v3 a, v3 b, v3 c, v3 p) {
             for (int j = 0; j < 90; ++j) {
                 double v[2] = {first + (last - first) / 3, last - (last - first) / 3}, d[2];
                 for (int l = 0; l < 2; ++l)
-                    d[l] = v3_norm2(v3_sub(p, v3_mad(v3_mad(v3_scale(a, 1 - u[k] - v[l]), u[k], b), v[l], c)));
+                    d[l] =
+                        v3_norm2(v3_sub(p, v3_mad(v3_mad(v3_scale(a, 1 - u[k] - v[l]), u[k], b), v[l], c)));
                 *(d[0] < d[1] ? &last : &first) = d[0] < d[1] ? v[1] : v[0];
                 least[k] = fmin(d[0], d[1]);
             }
@@ -67,7 +68,8 @@ static double point_area(const fct_simplifier *s, uint32_t point) {
     return area;
 }
 
-/* Squared distance from p to the remaining faces around a and b, with their corner at `at`; the nearest point. */
+/* Squared distance from p to the remaining faces around a and b, with their corner at `at`; the nearest
+ * point. */
 static double remaining_distance2(const fct_simplifier *s, uint32_t a, uint32_t b, v3 at, v3 p, v3 *nearest) {
     double best = v3_norm2(v3_sub(p, at));
     *nearest = at;
@@ -85,21 +87,22 @@ static double remaining_distance2(const fct_simplifier *s, uint32_t a, uint32_t 
 }
 
 /* The loss of a lost point that gathered `area`. */
-static double lost_cost(const fct_simplifier *s, uint32_t a, uint32_t b, const fct_candidate *c, v3 lost, double area,
-                        double *planes, v3 probe) {
+static double lost_cost(const fct_simplifier *s, uint32_t a, uint32_t b, const fct_candidate *c, v3 lost,
+                        double area, double *planes, v3 probe) {
     v3 nearest;
     double distance2 = remaining_distance2(s, a, b, c->at, lost, &nearest);
     if (distance2 <= 1e-14) return 0;
     v3 n = v3_scale(v3_sub(lost, nearest), 1 / sqrt(distance2));
     const double *r = c->resistance;
-    double held = r[0] * n.x * n.x + r[3] * n.y * n.y + r[5] * n.z * n.z + 2 * (r[1] * n.x * n.y + r[2] * n.x * n.z + r[4] * n.y * n.z);
+    double held = r[0] * n.x * n.x + r[3] * n.y * n.y + r[5] * n.z * n.z +
+                  2 * (r[1] * n.x * n.y + r[2] * n.x * n.z + r[4] * n.y * n.z);
     double weight = area * fmax(0, 1 - held / c->area), height = v3_dot(n, v3_sub(probe, lost));
     *planes += weight * height * height;
     return weight * distance2;
 }
 
-static double direct_loss(const fct_simplifier *s, uint32_t a, uint32_t b, const fct_candidate *c, double *planes,
-                          v3 probe) {
+static double direct_loss(const fct_simplifier *s, uint32_t a, uint32_t b, const fct_candidate *c,
+                          double *planes, v3 probe) {
     double cost = 0;
     *planes = 0;
     cost += lost_cost(s, a, b, c, point_position(s, a), point_area(s, a) / 3, planes, probe);
@@ -128,11 +131,12 @@ static double direct_loss(const fct_simplifier *s, uint32_t a, uint32_t b, const
 
 /* A rod of three sides with a tip, a fin of one triangle on a plate, and a lone triangle. */
 static fct_mesh make_spikes(unsigned arrays) {
-    const float p[][3] = {{0, 0, 0},  {.3f, .05f, 0}, {.1f, .3f, 0}, {0, 0, 2},     {.3f, 0, 2},    {.1f, .3f, 2.1f}, {.13f, .1f, 2.9f},
-                          {3, 0, 0},  {4, 0, .1f},    {3, 1, 0},     {4, 1.1f, .2f}, {3.5f, .4f, 1}, {5, 0, 0},        {6, .2f, 0},
-                          {5, .4f, .3f}};
-    const uint32_t t[][3] = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}, {2, 0, 3},   {2, 3, 5},  {3, 4, 6},
-                             {4, 5, 6}, {5, 3, 6}, {7, 8, 10}, {7, 10, 9}, {7, 10, 11}, {12, 13, 14}};
+    const float p[][3] = {{0, 0, 0},        {.3f, .05f, 0},    {.1f, .3f, 0}, {0, 0, 2},   {.3f, 0, 2},
+                          {.1f, .3f, 2.1f}, {.13f, .1f, 2.9f}, {3, 0, 0},     {4, 0, .1f}, {3, 1, 0},
+                          {4, 1.1f, .2f},   {3.5f, .4f, 1},    {5, 0, 0},     {6, .2f, 0}, {5, .4f, .3f}};
+    const uint32_t t[][3] = {{0, 1, 4},  {0, 4, 3},   {1, 2, 5},   {1, 5, 4}, {2, 0, 3},
+                             {2, 3, 5},  {3, 4, 6},   {4, 5, 6},   {5, 3, 6}, {7, 8, 10},
+                             {7, 10, 9}, {7, 10, 11}, {12, 13, 14}};
     fct_mesh mesh;
     assert_int_equal(fct_mesh_create(&env, 15, 13, arrays, &mesh), FCT_OK);
     memcpy(mesh.positions, p, sizeof p);
@@ -146,7 +150,8 @@ static void losses_are_distances_to_the_remaining_faces(void **state) {
     uint64_t seed = 33;
     double largest = 0;
     for (int kind = 0; kind < 4; ++kind) {
-        fct_mesh mesh = kind < 2 ? make_spikes(kind ? FCT_MESH_COLORS : 0) : make_sheet(&env, kind == 3 ? ALL_ARRAYS : 0, 9);
+        fct_mesh mesh = kind < 2 ? make_spikes(kind ? FCT_MESH_COLORS : 0)
+                                 : make_sheet(&env, kind == 3 ? ALL_ARRAYS : 0, 9);
         fct_simplify_def def = fct_simplify_def_default();
         def.boundary_weight = 0;
         fct_simplifier *s = open_simplifier(&env, &mesh, &def);
@@ -155,7 +160,8 @@ static void losses_are_distances_to_the_remaining_faces(void **state) {
             fct_candidate c;
             fct_loss loss;
             assert_true(fct_place(s, a, b, false, &c));
-            uint32_t count_a = fct_simplify_gather(s, a, s->ring_a), count_b = fct_simplify_gather(s, b, s->ring_b);
+            uint32_t count_a = fct_simplify_gather(s, a, s->ring_a),
+                     count_b = fct_simplify_gather(s, b, s->ring_b);
             double got = fct_loss_measure(s, a, b, count_a, count_b, &c, &loss), planes;
             v3 probe = random_vector(&seed);
             double want = direct_loss(s, a, b, &c, &planes, probe), q[POSITION_QUADRIC] = {0};

@@ -1,5 +1,5 @@
-/* Groups by brute force; positions, costs and attributes against one dense system over the position and the attributes
- * of all groups. */
+/* Groups by brute force; positions, costs and attributes against one dense system over the position and the
+ * attributes of all groups. */
 #include "oracle.h"
 #include "simplify/cost/placement.h"
 
@@ -7,7 +7,8 @@ static fct_env env;
 
 enum { MAX_UNKNOWNS = 3 + SIMPLIFY_MAX_CHANNELS * 16 };
 
-/* The sum that a contraction minimises: f(p, a_1 ... a_G) = sum over groups of Q_g(p, a_g) + ridge_g |a_g - mean_g|^2. */
+/* The sum that a contraction minimises: f(p, a_1 ... a_G) = sum over groups of Q_g(p, a_g) + ridge_g |a_g -
+ * mean_g|^2. */
 typedef struct problem {
     const fct_simplifier *s;
     uint32_t count, wedges[16], group_of[16], groups; /* groups numbered by their first wedge */
@@ -77,15 +78,15 @@ static double evaluate(const problem *p, const double *x) {
     uint32_t m = p->s->steering;
     double value = 0;
     for (uint32_t i = 0; i < p->count; ++i)
-        value += fct_quadric_value(p->s->quadrics + (size_t)p->s->quadric_size * p->wedges[i], m, (v3){x[0], x[1], x[2]},
-                                   x + 3 + m * p->group_of[i]);
+        value += fct_quadric_value(p->s->quadrics + (size_t)p->s->quadric_size * p->wedges[i], m,
+                                   (v3){x[0], x[1], x[2]}, x + 3 + m * p->group_of[i]);
     for (uint32_t g = 0; g < p->groups; ++g)
         for (uint32_t k = 0; k < m; ++k) value += p->ridge[g] * pow(x[3 + m * g + k] - p->mean[g][k], 2);
     return value;
 }
 
-/* Minimises f + ridge |position - middle|^2 over the unknowns from `first` on. f is quadratic, so differences give its
- * matrix exactly. */
+/* Minimises f + ridge |position - middle|^2 over the unknowns from `first` on. f is quadratic, so differences
+ * give its matrix exactly. */
 static void minimise(const problem *p, double ridge, v3 middle, uint32_t first, double *x) {
     uint32_t n = 3 + p->s->steering * p->groups, count = n - first;
     static double a[MAX_UNKNOWNS * MAX_UNKNOWNS], b[MAX_UNKNOWNS];
@@ -210,11 +211,12 @@ static double subset_error(const problem *p, uint32_t end, v3 at) {
     for (uint32_t g = 0; g < p->groups; ++g) {
         uint32_t chosen = FCT_NONE;
         for (uint32_t i = p->count; i-- > 0;)
-            if (p->group_of[i] == g && (chosen == FCT_NONE || p->second[i] == (end == 1) ||
-                                        p->second[chosen] != (end == 1)))
+            if (p->group_of[i] == g &&
+                (chosen == FCT_NONE || p->second[i] == (end == 1) || p->second[chosen] != (end == 1)))
                 chosen = i;
         for (uint32_t k = 0; k < p->s->steering; ++k)
-            x[3 + p->s->steering * g + k] = p->s->attributes[(size_t)p->s->channel_count * p->wedges[chosen] + k];
+            x[3 + p->s->steering * g + k] =
+                p->s->attributes[(size_t)p->s->channel_count * p->wedges[chosen] + k];
         plain.ridge[g] = 0;
     }
     return evaluate(&plain, x);

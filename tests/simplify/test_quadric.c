@@ -12,7 +12,8 @@ static void a_plane_measures_the_squared_distance(void **state) {
         double weights[3], value = 0, trace = 0;
         v3 slope = {0, 0, 0};
         for (int k = 0; k < 3; ++k) {
-            n[k] = v3_unit(random_vector(&seed)), p[k] = random_vector(&seed), weights[k] = between(&seed, .1, 9);
+            n[k] = v3_unit(random_vector(&seed)), p[k] = random_vector(&seed),
+            weights[k] = between(&seed, .1, 9);
             quadric_add_plane(q, n[k], p[k], weights[k]);
             double distance = v3_dot(n[k], v3_sub(v, p[k]));
             value += weights[k] * distance * distance, trace += weights[k];
@@ -84,8 +85,8 @@ static double regular_value(const sum *s, const double *v, const double *prior, 
     return value;
 }
 
-/* The best attributes by a dense solve: the matrix and the right side are differences of the function, which is
- * quadratic. */
+/* The best attributes by a dense solve: the matrix and the right side are differences of the function, which
+ * is quadratic. */
 static void solve_attributes(const sum *s, const double *prior, double ridge, double *v) {
     double a[MAX * MAX], b[MAX];
     uint32_t m = s->m;
@@ -116,7 +117,8 @@ static void elimination_leaves_the_best_attributes(void **state) {
     for (uint32_t m = 1; m <= QUADRIC_MAX_ATTRIBUTES; ++m)
         for (int round = 0; round < 10; ++round) {
             sum s = make_sum(m, 6, &seed);
-            double prior[QUADRIC_MAX_ATTRIBUTES], got[QUADRIC_MAX_ATTRIBUTES], v[MAX], ridge = round % 2 ? .3 : 1e-3;
+            double prior[QUADRIC_MAX_ATTRIBUTES], got[QUADRIC_MAX_ATTRIBUTES], v[MAX],
+                ridge = round % 2 ? .3 : 1e-3;
             for (uint32_t i = 0; i < m; ++i) prior[i] = between(&seed, -1, 1);
             fct_elimination e;
             fct_quadric_eliminate(s.q, m, prior, ridge, &e);

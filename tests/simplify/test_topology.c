@@ -1,4 +1,5 @@
-/* Points, wedges, classes, rings and edges of a mesh against comparisons of all pairs; welding against its rules. */
+/* Points, wedges, classes, rings and edges of a mesh against comparisons of all pairs; welding against its
+ * rules. */
 #include "oracle.h"
 
 static fct_env env;
@@ -117,7 +118,8 @@ static void apply_rules(rules *r, const fct_mesh *mesh) {
     }
 }
 
-/* A few faces on a lattice of 3 x 3 x 2 places, with several vertices per place: sides of every kind coincide. */
+/* A few faces on a lattice of 3 x 3 x 2 places, with several vertices per place: sides of every kind
+ * coincide. */
 static fct_mesh make_puzzle(uint64_t seed) {
     uint32_t copies = 2 + (uint32_t)(uniform(&seed) * 2), faces = 4 + (uint32_t)(uniform(&seed) * 24);
     fct_mesh mesh;
@@ -147,11 +149,13 @@ static void vertices_weld_by_the_rules(void **state) {
         for (uint32_t c = 0; c < 3 * mesh.face_count; ++c) used[mesh.triangles[c]] = true;
         for (uint32_t v = 0; v < mesh.vertex_count; ++v)
             if (!used[v]) r.points[v] = FCT_NONE;
-        for (uint32_t v = 0; v < mesh.vertex_count; ++v) assert_true((s->point_of[v] == FCT_NONE) == !used[v]);
+        for (uint32_t v = 0; v < mesh.vertex_count; ++v)
+            assert_true((s->point_of[v] == FCT_NONE) == !used[v]);
         assert_same_partition(s->point_of, r.points, mesh.vertex_count);
         for (uint32_t v = 0; v < mesh.vertex_count; ++v)
             for (uint32_t w = 0; w < v; ++w)
-                if (used[v] && used[w] && r.places[v] == r.places[w]) ++*(r.points[v] == r.points[w] ? &joined : &apart);
+                if (used[v] && used[w] && r.places[v] == r.places[w])
+                    ++*(r.points[v] == r.points[w] ? &joined : &apart);
         fct_simplifier_destroy(s);
         fct_mesh_release(&env, &mesh);
     }
@@ -201,7 +205,8 @@ static void wedges_are_distinct_attributes_at_points(void **state) {
                 if (mesh.colors && !equal_floats(mesh.colors + 3 * v, mesh.colors + 3 * w, 3)) continue;
                 if (mesh.normals && !equal_floats(mesh.normals + 3 * v, mesh.normals + 3 * w, 3)) continue;
                 classes[c] = classes[d];
-                if (mesh.texcoords && !equal_floats(mesh.texcoords + 2 * c, mesh.texcoords + 2 * d, 2)) continue;
+                if (mesh.texcoords && !equal_floats(mesh.texcoords + 2 * c, mesh.texcoords + 2 * d, 2))
+                    continue;
                 want[c] = want[d];
             }
             got_classes[c] = s->wedge_classes[s->corner_wedges[c]];
@@ -277,7 +282,8 @@ static void rings_and_edges_hold_every_live_corner(void **state) {
             for (int k = 0; k < 3; ++k) p[k] = s->point_of[mesh.triangles[3 * f + (uint32_t)k]];
             bool degenerate = p[0] == p[1] || p[1] == p[2] || p[2] == p[0];
             assert_true(degenerate == corner_dead(s, 3 * f));
-            for (int k = 0; k < 3 && !degenerate; ++k) assert_int_equal(s->triangles[3 * f + (uint32_t)k], p[k]);
+            for (int k = 0; k < 3 && !degenerate; ++k)
+                assert_int_equal(s->triangles[3 * f + (uint32_t)k], p[k]);
         }
         check_rings(s);
         check_edges(s);

@@ -1,0 +1,169 @@
+/* One pass of the refit against dense least-squares systems over all samples and all faces. */
+#include "oracle.h"
+#include "simplify/refit.h"
+
+static fct_env env;
+
+/* The nearest point of a triangle by its three sides and its inside; barycentrics in b. */
+static double nearest(const v3 t[3], v3 p, double b[3]) {
+    v3 ab = v3_sub(t[1], t[0]), ac = v3_sub(t[2], t[0]), ap = v3_sub(p, t[0]);
+    double m[4] = {v3_norm2(ab), v3_dot(ab, ac), v3_dot(ab, ac), v3_norm2(ac)},
+           x[2] = {v3_dot(ab, ap), v3_dot(ac, ap)};
+    solve_dense(2, m, x);
+    if (x[0] >= 0 && x[1] >= 0 && x[0] + x[1] <= 1) {
+        b[0] = 1 - x[0] - x[1], b[1] = x[0], b[2] = x[1];
+        return v3_norm2(v3_sub(ap, v3_add(v3_scale(ab, x[0]), v3_scale(ac, x[1]))));
+    }
+    double best = INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        v3 from = t[k], side = v3_sub(t[(k + 1) % 3], from);
+        double s = fmin(fmax(v3_dot(side, v3_sub(p, from)) / v3_norm2(side), 0), 1);
+        double d = v3_norm2(v3_sub(p, v3_mad(from, s, side)));
+        if (d >= best) continue;
+        best = d;
+        b[k] = 1 - s, b[(k + 1) % 3] = s, b[(k + 2) % 3] = 0;
+    }
+    return best;
+}
+
+typedef struct expected {
+    double systems[64][12]; /* per point: a 3 x 3 matrix and the right side */
+    double sums[96][SIMPLIFY_MAX_CHANNELS], weights[96];
+} expected;
+
+/* A sample: the mean position and attributes of `count` corners. */
+static void add_expected(const fct_simplifier *s, expected *x, const uint32_t *corners, uint32_t count,
+                         double weight) {
+    double v[3 + SIMPLIFY_MAX_CHANNELS] = {0}, part[3 + SIMPLIFY_MAX_CHANNELS], best = INFINITY, b[3] = {0};
+    uint32_t face = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+        corner_vector(s, corners[k], s->channel_count, part);
+        for (uint32_t i = 0; i < 3 + s->channel_count; ++i) v[i] += part[i] / count;
+    }
+    v3 p = {v[0], v[1], v[2]}, at = {0, 0, 0};
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
+        v3 t[3];
+        double own[3];
+        for (uint32_t k = 0; k < 3; ++k) t[k] = point_position(s, s->triangles[3 * f + k]);
+        double d = nearest(t, p, own);
+        if (d >= best) continue;
+        best = d, face = f;
+        memcpy(b, own, sizeof b);
+    }
+    for (uint32_t k = 0; k < 3; ++k) at = v3_mad(at, b[k], point_position(s, s->triangles[3 * face + k]));
+    double residual = sqrt(best), n[3];
+    v3_to_array(v3_scale(v3_sub(p, at), 1 / residual), n);
+    for (uint32_t k = 0; k < 3; ++k) {
+        double *system = x->systems[s->triangles[3 * face + k]];
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) system[3 * i + j] += weight * b[k] * b[k] * n[i] * n[j];
+            system[9 + i] += weight * b[k] * residual * n[i];
+        }
+        if (!s->corner_wedges) continue;
+        uint32_t w = s->corner_wedges[3 * face + k];
+        x->weights[w] += weight * b[k];
+        for (uint32_t i = 0; i < s->channel_count; ++i) {
+            double rest = v[3 + i];
+            for (uint32_t l = 0; l < 3; ++l)
+                rest -= b[l] * s->attributes[(size_t)s->channel_count * s->corner_wedges[3 * face + l] + i];
+            x->sums[w][i] += weight * b[k] * rest;
+        }
+    }
+}
+
+/* Moves the points of the sheet, as contractions would, and lets one pass move them back. */
+static void check_pass(unsigned arrays, double amount, uint64_t seed) {
+    fct_mesh mesh = make_sheet(&env, arrays & ~(unsigned)FCT_MESH_TEXCOORDS, 7);
+    for (uint32_t v = 25; v < 30; ++v) /* without seams, every attribute counts */
+        if (mesh.colors) memcpy(mesh.colors + 3 * v, mesh.colors + 3 * ((v - 25) * 5 + 2), 12);
+    fct_simplify_def def = fct_simplify_def_default();
+    def.refit_passes = 1;
+    fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+    static expected x;
+    memset(&x, 0, sizeof x);
+    assert_true(s->point_count <= 64 && s->wedge_count <= 96);
+    for (uint32_t i = 0; i < 3 * s->point_count; ++i) s->positions[i] += between(&seed, -amount, amount);
+    for (uint32_t i = 0; i < s->wedge_count * s->channel_count; ++i)
+        s->attributes[i] += between(&seed, -.02, .02);
+    for (uint32_t f = 0; f < mesh.face_count; ++f) {
+        uint32_t corners[3] = {3 * f, 3 * f + 1, 3 * f + 2};
+        v3 p[3];
+        for (int k = 0; k < 3; ++k) p[k] = scaled_vertex(&mesh, mesh.triangles[3 * f + (uint32_t)k]);
+        double area = .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+        add_expected(s, &x, corners, 3, .75 * area);
+        for (uint32_t k = 0; k < 3; ++k) add_expected(s, &x, corners + k, 1, area / 12);
+    }
+    v3 want[64];
+    for (uint32_t p = 0; p < s->point_count; ++p) {
+        double *system = x.systems[p], trace = system[0] + system[4] + system[8];
+        for (int i = 0; i < 3; ++i) system[4 * i] += .1 * trace;
+        solve_dense(3, system, system + 9);
+        want[p] = v3_mad(point_position(s, p), .5, (v3){system[9], system[10], system[11]});
+    }
+    double values[96][SIMPLIFY_MAX_CHANNELS];
+    for (uint32_t w = 0; w < s->wedge_count && s->channel_count; ++w)
+        for (uint32_t i = 0; i < s->channel_count; ++i) {
+            double value = s->attributes[(size_t)s->channel_count * w + i] + x.sums[w][i] / x.weights[w];
+            values[w][i] = fmin(fmax(value, s->channels[i].lower), s->channels[i].upper);
+        }
+    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    for (uint32_t p = 0; p < s->point_count; ++p)
+        assert_true(v3_norm(v3_sub(point_position(s, p), want[p])) < 1e-4 * amount);
+    for (uint32_t w = 0; w < s->wedge_count && s->channel_count; ++w)
+        for (uint32_t i = 0; i < s->channel_count; ++i)
+            assert_close(s->attributes[(size_t)s->channel_count * w + i], values[w][i], 1e-6);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &mesh);
+}
+
+static void points_and_attributes_take_a_damped_step(void **state) {
+    (void)state;
+    for (uint64_t seed = 1; seed <= 6; ++seed) {
+        check_pass(0, .02, seed);
+        check_pass(ALL_ARRAYS, .02, seed);
+    }
+}
+
+/* A short edge limits the step of its ends to half of its length. */
+static void steps_are_at_most_half_the_shortest_edge(void **state) {
+    (void)state;
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 6, 4, 0, &mesh), FCT_OK);
+    const float p[18] = {0, 0, 0, 2, 0, 0, 2, 2, 0, 0, 2, 0, 1, 1, 0, 1.02f, 1, 0};
+    const uint32_t t[12] = {0, 1, 4, 1, 5, 4, 2, 3, 5, 3, 4, 5};
+    memcpy(mesh.positions, p, sizeof p);
+    memcpy(mesh.triangles, t, sizeof t);
+    fct_simplify_def def = fct_simplify_def_default();
+    def.refit_passes = 1;
+    fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+    for (uint32_t k = 4; k < 6; ++k) s->positions[3 * s->point_of[k] + 2] += .05;
+    v3 from = point_position(s, s->point_of[4]);
+    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    double step = v3_norm(v3_sub(point_position(s, s->point_of[4]), from));
+    assert_ratio(step, .5 * .02 / 2, 1e-4); /* half of .02, in the unit cube */
+    assert_int_equal(s->sources[s->point_of[4]], FCT_NONE);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &mesh);
+}
+
+/* Points at their places do not move, not even by rounding: they keep the bits of the input. */
+static void nothing_moves_without_a_residual(void **state) {
+    (void)state;
+    fct_mesh mesh = make_sheet(&env, 0, 3);
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    for (uint32_t p = 0; p < s->point_count; ++p) assert_true(s->sources[p] != FCT_NONE);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &mesh);
+}
+
+int main(void) {
+    env = fct_env_default();
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points_and_attributes_take_a_damped_step),
+        cmocka_unit_test(steps_are_at_most_half_the_shortest_edge),
+        cmocka_unit_test(nothing_moves_without_a_residual),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
