@@ -112,7 +112,7 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
             for (uint32_t i = 0; i < groups.wedge_count; ++i) {
                 if (groups.group_of[i] != g) continue;
                 sum += value_at(old, groups.wedges[i], v);
-                kept = find_root(s->wedge_parents, groups.wedges[i]);
+                kept = fct_sets_find(s->wedge_parents, groups.wedges[i]);
             }
             for (uint32_t c = 0; c < corners; ++c) uses += !corner_dead(s, c) && wedge_of(s, c) == kept;
             assert_int_equal(s->wedge_uses[kept], uses);
@@ -129,10 +129,11 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
             for (uint32_t k = 0; k < s->channel_count; ++k)
                 assert_close(s->attributes[(size_t)s->channel_count * kept + k], want[k], 1e-15);
             /* All wedges of a group become one output vertex. */
-            uint32_t class = find_root(s->class_parents, s->wedge_classes[kept]);
+            uint32_t class = fct_sets_find(s->class_parents, s->wedge_classes[kept]);
             for (uint32_t i = 0; i < groups.wedge_count; ++i)
                 if (groups.group_of[i] == g)
-                    assert_int_equal(find_root(s->class_parents, s->wedge_classes[groups.wedges[i]]), class);
+                    assert_int_equal(fct_sets_find(s->class_parents, s->wedge_classes[groups.wedges[i]]),
+                                     class);
         }
     }
     fct_simplifier_destroy(s);
@@ -248,7 +249,7 @@ static void quadrics_of_remaining_points_are_sums(void **state) {
         v3 at = point_position(s, p), probe = random_vector(&seed);
         double sum = 0, area = 0, here = 0;
         for (uint32_t q = 0; q < s->point_count; ++q) {
-            if (find_root(s->point_parents, q) != p) continue;
+            if (fct_sets_find(s->point_parents, q) != p) continue;
             const double *part = old->quadrics + (size_t)POSITION_QUADRIC * q;
             sum += quadric_at(part, probe), here += quadric_at(part, at), area += part[10];
         }
