@@ -98,18 +98,19 @@ fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *ph
 
 /* --- By distance --- */
 
-/* An upper bound from the box, with room for the rounding of both sides. */
+/* An upper bound from the box. Its axes are orthonormal to float rounding only, so a vertex may lie a
+ * ten-millionth of the box's size farther than the half extents say. */
 static double box_distance(const fct_cluster *c) {
     fct_box box;
     fct_cluster_box(c, &box);
     v3 normal = v3_load(c->plane), center = v3_load(box.center);
     double reach = fabs(v3_dot(normal, center) + (double)c->plane[3]);
-    double size = fabs(center.x) + fabs(center.y) + fabs(center.z) + fabs((double)c->plane[3]);
+    double size = fabs(center.x) + fabs(center.y) + fabs(center.z) + fabs((double)c->plane[3]), halves = 0;
     for (int i = 0; i < 3; ++i) {
         reach += (double)box.half[i] * fabs(v3_dot(normal, v3_load(box.axes[i])));
-        size += (double)box.half[i];
+        halves += (double)box.half[i];
     }
-    return reach + 1e-14 * size;
+    return reach + 1e-6 * halves + 1e-14 * size;
 }
 
 /* The largest distance of a vertex, or the first one found that is above `enough`. */
