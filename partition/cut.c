@@ -15,7 +15,7 @@
 enum { WIDE = 1 << 10, GRAIN = 1 << 12 };
 
 typedef struct cutter {
-    const fct_tree_view *view;
+    const fct_tree *tree;
     fct_cut_test *test;
     void *user;
     uint32_t *nodes;    /* a place each; FCT_NONE where nothing is kept */
@@ -28,7 +28,7 @@ static void test_frontier(void *user, size_t begin, size_t end, size_t chunk, ui
     (void)chunk;
     cutter *c = user;
     for (size_t i = begin; i < end; ++i)
-        c->kept[i] = c->frontier[i] >= c->view->node_count || c->test(c->user, c->frontier[i], thread);
+        c->kept[i] = fct_node_is_leaf(c->tree, c->frontier[i]) || c->test(c->user, c->frontier[i], thread);
 }
 
 /* Opens the frontier until it is wide or empty. `next` holds twice WIDE. */
@@ -39,10 +39,10 @@ static void widen_frontier(const fct_env *env, cutter *c, uint32_t *next) {
         for (uint32_t i = 0; i < c->count; ++i) {
             uint32_t node = c->frontier[i];
             if (c->kept[i]) {
-                c->nodes[fct_node_first(c->view, node)] = node;
+                c->nodes[fct_node_first(c->tree, node)] = node;
             } else {
-                next[count++] = c->view->clusters[node].child[0];
-                next[count++] = c->view->clusters[node].child[1];
+                next[count++] = fct_node_child(c->tree, node, 0);
+                next[count++] = fct_node_child(c->tree, node, 1);
             }
         }
         uint32_t *swap = c->frontier;
@@ -56,16 +56,16 @@ static void cut_subtrees(void *user, size_t begin, size_t end, size_t chunk, uin
     (void)chunk;
     cutter *c = user;
     for (size_t i = begin; i < end; ++i) {
-        uint32_t root = c->frontier[i], count = fct_node_faces(c->view, root), top = count, kept = 0;
-        uint32_t *range = c->nodes + fct_node_first(c->view, root);
+        uint32_t root = c->frontier[i], count = fct_node_faces(c->tree, root), top = count, kept = 0;
+        uint32_t *range = c->nodes + fct_node_first(c->tree, root);
         range[--top] = root;
         while (top < count) {
             uint32_t node = range[top++];
-            if (node >= c->view->node_count || c->test(c->user, node, thread)) {
+            if (fct_node_is_leaf(c->tree, node) || c->test(c->user, node, thread)) {
                 range[kept++] = node;
             } else {
-                range[--top] = c->view->clusters[node].child[1];
-                range[--top] = c->view->clusters[node].child[0];
+                range[--top] = fct_node_child(c->tree, node, 1);
+                range[--top] = fct_node_child(c->tree, node, 0);
             }
         }
         while (kept < count) range[kept++] = FCT_NONE;
@@ -81,7 +81,7 @@ fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *ph
     fct_result result = FCT_OK;
     *count = 0;
     if (frontiers && kept) {
-        cutter c = {view, test, user, nodes, frontiers, view->root_count, kept};
+        cutter c = {tree, test, user, nodes, frontiers, view->root_count, kept};
         memcpy(frontiers, view->roots, view->root_count * sizeof *frontiers);
         memset(nodes, 0xFF, view->face_count * sizeof *nodes);
         widen_frontier(env, &c, frontiers + width);
@@ -134,7 +134,8 @@ typedef struct distance_cut {
 static bool near_plane(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
     const distance_cut *cut = user;
-    const fct_cluster *c = &cut->tree->view.clusters[node];
+    fct_cluster room;
+    const fct_cluster *c = fct_node_cluster(cut->tree, node, &room);
     return box_distance(c) <= cut->max_distance ||
            vertex_distance(&cut->tree->view, c, cut->max_distance) <= cut->max_distance;
 }
@@ -144,10 +145,10 @@ static void find_largest(void *user, size_t begin, size_t end, size_t chunk, uin
     distance_cut *cut = user;
     double largest = 0;
     for (size_t i = begin; i < end; ++i) {
-        fct_cluster c;
-        fct_tree_cluster(cut->tree, cut->nodes[i], &c);
-        if (box_distance(&c) > largest)
-            largest = fmax(largest, vertex_distance(&cut->tree->view, &c, INFINITY));
+        fct_cluster room;
+        const fct_cluster *c = fct_node_cluster(cut->tree, cut->nodes[i], &room);
+        if (box_distance(c) > largest)
+            largest = fmax(largest, vertex_distance(&cut->tree->view, c, INFINITY));
     }
     cut->largest[chunk] = largest;
 }

@@ -2,7 +2,7 @@
 #ifndef FCT_CLUSTER_CUT_H
 #define FCT_CLUSTER_CUT_H
 
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 
 /* Whether an inner node stays whole. A function of the node alone, called from several threads at once for
  * nodes without a common face; `thread` is for scratch space. Leaves always stay. */
@@ -12,12 +12,5 @@ typedef bool fct_cut_test(void *user, uint32_t node, uint32_t thread);
  * opened. `nodes` holds face_count. Each node is tested at most once. Errors: MEMORY, CANCELLED. */
 fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *phase, fct_cut_test *test,
                         void *user, uint32_t *nodes, uint32_t *count);
-
-static inline uint32_t fct_node_first(const fct_tree_view *view, uint32_t node) {
-    return node < view->node_count ? view->clusters[node].first : node - view->node_count;
-}
-static inline uint32_t fct_node_faces(const fct_tree_view *view, uint32_t node) {
-    return node < view->node_count ? view->clusters[node].count : 1;
-}
 
 #endif

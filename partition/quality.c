@@ -12,7 +12,7 @@
 #include "base/math/eigen.h"
 #include "base/parallel.h"
 #include "base/union_find.h"
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 #include "facetree/dual.h"
 #include "partition/labels.h"
 
@@ -135,9 +135,8 @@ static void judge_piece(const judge *j, uint32_t i) {
         out->box_area = fit_box(j, out, axes);
         return;
     }
-    fct_cluster cluster;
-    fct_tree_cluster(j->tree, j->nodes[i], &cluster);
-    const float *h = cluster.box_half;
+    fct_cluster room;
+    const float *h = fct_node_cluster(j->tree, j->nodes[i], &room)->box_half;
     out->box_area =
         8 * ((double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0]);
 }
@@ -227,10 +226,9 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
     j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
     if (labels && j.pieces) {
         for (uint32_t i = 0; i < count; ++i) {
-            bool leaf = nodes[i] >= view->node_count;
             piece *p = &j.pieces[i];
-            p->first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
-            p->count = leaf ? 1 : view->clusters[nodes[i]].count;
+            p->first = fct_node_first(tree, nodes[i]);
+            p->count = fct_node_faces(tree, nodes[i]);
             for (uint32_t place = p->first; place < p->first + p->count; ++place) labels[place] = i;
         }
         j.labels = labels;

@@ -14,7 +14,7 @@
 
 #include "base/heap.h"
 #include "base/key.h"
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 #include "partition/labels.h"
 #include "partition/units.h"
 
@@ -331,19 +331,16 @@ done:
     return result;
 }
 
-static uint32_t first_of(const fct_tree_view *view, uint32_t node) {
-    return node < view->node_count ? view->clusters[node].first : node - view->node_count;
-}
-
 /* Numbers the units by place that opening the clusters' nodes below `open` makes. Children have larger ids
  * than their parents, so no node within a unit is opened; children of nodes above the clusters begin where a
  * cluster does. Returns how many there are. */
-static uint32_t number_units(const fct_tree_view *view, const uint32_t *nodes, uint32_t count, uint32_t open,
+static uint32_t number_units(const fct_tree *tree, const uint32_t *nodes, uint32_t count, uint32_t open,
                              uint32_t *unit_of) {
+    const fct_tree_view *view = &tree->view;
     memset(unit_of, 0, (size_t)view->face_count * sizeof *unit_of);
-    for (uint32_t i = 0; i < count; ++i) unit_of[first_of(view, nodes[i])] = 1;
+    for (uint32_t i = 0; i < count; ++i) unit_of[fct_node_first(tree, nodes[i])] = 1;
     for (uint32_t node = 0; node < open && node < view->node_count; ++node)
-        for (int k = 0; k < 2; ++k) unit_of[first_of(view, view->clusters[node].child[k])] = 1;
+        for (int k = 0; k < 2; ++k) unit_of[fct_node_first(tree, fct_node_child(tree, node, k))] = 1;
     uint32_t units = 0;
     for (uint32_t place = 0; place < view->face_count; ++place) {
         units += unit_of[place];
@@ -369,14 +366,15 @@ static fct_result refine_cut(const fct_env *env, refiner *r, const fct_units *fa
 
 /* Cuts from COARSEST units a cluster on, then the faces. labels and scratch by place; scratch holds three
  * numbers a face. */
-static fct_result refine_cuts(const fct_env *env, refiner *r, const fct_tree_view *view,
-                              const fct_units *faces, const uint32_t *nodes, uint32_t *labels,
-                              uint32_t *scratch, const fct_refine_def *def, fct_refine_stats *stats) {
+static fct_result refine_cuts(const fct_env *env, refiner *r, const fct_tree *tree, const fct_units *faces,
+                              const uint32_t *nodes, uint32_t *labels, uint32_t *scratch,
+                              const fct_refine_def *def, fct_refine_stats *stats) {
+    const fct_tree_view *view = &tree->view;
     double from = 0;
     uint64_t target = (uint64_t)r->region_count * COARSEST;
     for (; target < view->face_count / 2; target *= COARSEST) {
         uint32_t open = target > view->root_count ? (uint32_t)target - view->root_count : 0;
-        uint32_t units = number_units(view, nodes, r->region_count, open, scratch);
+        uint32_t units = number_units(tree, nodes, r->region_count, open, scratch);
         double to = from + (1 - from) * 0.25;
         fct_result result = refine_cut(env, r, faces, scratch, units, scratch + view->face_count, labels, def,
                                        from, to, stats);
@@ -431,14 +429,14 @@ fct_result fct_tree_refine(const fct_env *env, const fct_tree *tree, const uint3
     result = r && !places ? fct_fail_memory(env, "refining a partition") : FCT_ERROR_MEMORY;
     if (!places) goto done;
     for (uint32_t i = 0; i < count; ++i) {
-        uint32_t first = first_of(view, nodes[i]);
-        uint32_t faces_in = nodes[i] < view->node_count ? view->clusters[nodes[i]].count : 1;
+        uint32_t first = fct_node_first(tree, nodes[i]);
+        uint32_t faces_in = fct_node_faces(tree, nodes[i]);
         for (uint32_t place = first; place < first + faces_in; ++place) places[place] = i;
     }
     memcpy(r->labels, places, (size_t)view->face_count * sizeof *places);
     set_weight(r, &options);
     done.seconds_dual = fct_seconds() - start;
-    result = refine_cuts(env, r, view, &faces, nodes, places, places + view->face_count, &options, &done);
+    result = refine_cuts(env, r, tree, &faces, nodes, places, places + view->face_count, &options, &done);
     done.seconds_sweeps = fct_seconds() - start - done.seconds_dual;
     if (result == FCT_OK)
         for (uint32_t place = 0; place < view->face_count; ++place)

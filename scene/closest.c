@@ -9,6 +9,7 @@
 #include <math.h>
 
 #include "bvh/near/triangle.h"
+#include "cluster/tree/node.h"
 #include "scene/scene.h"
 #include "scene/transform.h"
 
@@ -78,10 +79,10 @@ static void search_tree(search *s, const fct_scene *scene, uint32_t instance) {
             }
             pending child[2];
             for (int k = 0; k < 2; ++k) {
-                fct_cluster cluster;
-                child[k].child = view.clusters[next.child].child[k];
-                fct_tree_cluster(tree, child[k].child, &cluster);
-                child[k].bound = frame->shrink * box_distance(&cluster, local);
+                fct_cluster room;
+                child[k].child = fct_node_child(tree, next.child, k);
+                const fct_cluster *cluster = fct_node_cluster(tree, child[k].child, &room);
+                child[k].bound = frame->shrink * box_distance(cluster, local);
             }
             int near = child[1].bound < child[0].bound;
             if (child[!near].bound <= s->distance) stack[top++] = child[!near];

@@ -77,19 +77,20 @@ static uint32_t split(const box_tree *tree, item *items, uint32_t count, const v
     return left;
 }
 
-static uint32_t take_cut(const fct_tree_view *view, const box_tree *tree, uint32_t count, item *items) {
+static uint32_t take_cut(const fct_tree *clusters, const box_tree *tree, uint32_t count, item *items) {
     uint32_t found = 0;
-    for (uint32_t i = 0; i < count - 1; ++i)
+    for (uint32_t i = 0; i < count - 1; ++i) {
+        fct_cluster own, children[2];
+        bench_check(fct_tree_cluster(clusters, i, &own), "a cluster");
+        bench_check(fct_tree_children(clusters, i, children), "a cluster");
         for (int c = 0; c < 2; ++c) {
-            uint32_t node = view->clusters[i].child[c];
-            if (node < count - 1) continue;
-            bool inner = node < view->node_count;
-            items[found] = (item){.node = tree->child[i][c],
-                                  .first = inner ? view->clusters[node].first : node - view->node_count,
-                                  .count = inner ? view->clusters[node].count : 1};
+            if (own.child[c] < count - 1) continue;
+            items[found] =
+                (item){.node = tree->child[i][c], .first = children[c].first, .count = children[c].count};
             items[found].center = v3_load(tree->boxes[items[found].node].center);
             ++found;
         }
+    }
     return found;
 }
 
@@ -113,7 +114,7 @@ void box_tree_regroup(const fct_mesh *mesh, const fct_tree *tree, uint32_t count
     uint32_t *faces = bench_allocate(mesh->face_count, sizeof *faces);
     double *before = bench_allocate(count, sizeof *before);
     uint32_t top = 0, made = 1;
-    count = take_cut(&view, out, count, items);
+    count = take_cut(tree, out, count, items);
     stack[top++] = (task){0, count, out->root = 0};
     while (top > 0) {
         task t = stack[--top];

@@ -95,9 +95,11 @@ void box_tree_take(const fct_mesh *mesh, const fct_tree *tree, box_tree *out) {
     open_tree(mesh, out);
     out->root = view.roots[0];
     for (uint32_t i = 0; i < view.node_count; ++i) {
-        fct_cluster_box(&view.clusters[i], &out->boxes[i]);
+        fct_cluster cluster;
+        bench_check(fct_tree_cluster(tree, i, &cluster), "a cluster");
+        fct_cluster_box(&cluster, &out->boxes[i]);
         for (int c = 0; c < 2; ++c) {
-            uint32_t child = view.clusters[i].child[c];
+            uint32_t child = cluster.child[c];
             out->child[i][c] =
                 child < view.node_count ? child : out->inner_count + view.face_ids[child - view.node_count];
         }

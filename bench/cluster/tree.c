@@ -35,26 +35,12 @@ static fct_tree *build(const fct_mesh *mesh, const fct_env *env, const char *met
     return tree;
 }
 
-/* Node ids run backwards through the merges: what the last count - 1 merges have not yet joined. */
-static uint32_t cut(const fct_tree_view *view, uint32_t count, uint32_t *labels) {
-    uint32_t opened = count - view->root_count, found = 0;
-    const uint32_t inner = view->node_count;
-    for (uint32_t r = 0; r < view->root_count; ++r)
-        if (view->roots[r] >= opened) {
-            uint32_t node = view->roots[r], first = node < inner ? view->clusters[node].first : node - inner;
-            for (uint32_t k = 0; k < (node < inner ? view->clusters[node].count : 1); ++k)
-                labels[view->face_ids[first + k]] = found;
-            ++found;
-        }
-    for (uint32_t i = 0; i < opened; ++i)
-        for (int c = 0; c < 2; ++c) {
-            uint32_t node = view->clusters[i].child[c];
-            if (node < opened) continue;
-            uint32_t first = node < inner ? view->clusters[node].first : node - inner;
-            for (uint32_t k = 0; k < (node < inner ? view->clusters[node].count : 1); ++k)
-                labels[view->face_ids[first + k]] = found;
-            ++found;
-        }
+/* Labels of the partition into `count` clusters. Returns their number. */
+static uint32_t label_cut(const fct_env *env, const fct_tree *tree, uint32_t count, uint32_t *labels) {
+    uint32_t *nodes = bench_allocate(count, sizeof *nodes), found;
+    bench_check(fct_tree_partition(env, tree, count, nodes, &found), "the partition");
+    bench_check(fct_tree_labels(env, tree, nodes, found, labels), "the labels");
+    free(nodes);
     return found;
 }
 
@@ -63,14 +49,16 @@ static void judge(const fct_mesh *mesh, const fct_tree *tree, uint32_t count) {
     fct_tree_view view = fct_tree_get(tree);
     double diagonal = bench_diagonal(mesh), area = 0;
     for (uint32_t i = 0; i < view.node_count; ++i) {
-        const float *h = view.clusters[i].box_half;
+        fct_cluster cluster;
+        bench_check(fct_tree_cluster(tree, i, &cluster), "a cluster");
+        const float *h = cluster.box_half;
         double a = (double)h[0], b = (double)h[1], c = (double)h[2];
         area += 8 * (a * b + b * c + c * a);
     }
     if (count > view.face_count) count = view.face_count;
     if (count < view.root_count) count = view.root_count;
     uint32_t *labels = bench_allocate(view.face_count, sizeof *labels);
-    uint32_t found = cut(&view, count, labels);
+    uint32_t found = label_cut(&env, tree, count, labels);
     bench_quality q = bench_judge(&env, mesh, labels, found);
     printf(
         ", \"clusters\": %u, \"deviation\": %.6g, \"fit\": %.6g, \"irregularity\": %.6g, \"box_area\": %.6g",

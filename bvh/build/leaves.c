@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "cluster/tree/node.h"
 
 /* Vertices of a leaf in order of first use; returns how many, or more than the limit as soon as that is
  * known. corners receives 3 count indices. */
@@ -26,46 +27,34 @@ static uint32_t gather_vertices(const fct_tree_view *view, uint32_t first, uint3
     return vertex_count;
 }
 
-/* Places and count of a node's faces. */
-static void node_range(const fct_tree_view *view, uint32_t node, uint32_t *first, uint32_t *count) {
-    if (node < view->node_count) {
-        *first = view->clusters[node].first;
-        *count = view->clusters[node].count;
-    } else {
-        *first = node - view->node_count;
-        *count = 1;
-    }
-}
-
-static uint32_t leaf_octets(const fct_tree_view *view, uint32_t node) {
-    uint32_t vertices[FCT_LEAF_VERTICES], first, count;
+static uint32_t leaf_octets(const fct_tree *tree, uint32_t node) {
+    uint32_t vertices[FCT_LEAF_VERTICES], count = fct_node_faces(tree, node);
     uint8_t corners[3 * FCT_LEAF_FACES];
-    node_range(view, node, &first, &count);
     if (count > FCT_LEAF_FACES) return 0;
-    uint32_t vertex_count = gather_vertices(view, first, count, vertices, corners);
+    uint32_t vertex_count =
+        gather_vertices(&tree->view, fct_node_first(tree, node), count, vertices, corners);
     return vertex_count > FCT_LEAF_VERTICES ? 0 : (vertex_count + 7) / 8;
 }
 
 /* Descends from the roots, left child first, to the clusters that fit a leaf. With list->nodes NULL it only
  * counts. `stack` holds depth + root_count + 1 entries. */
-static void choose_leaves(const fct_tree_view *view, uint32_t *stack, fct_leaf_list *list, uint64_t *units) {
+static void choose_leaves(const fct_tree *tree, uint32_t *stack, fct_leaf_list *list, uint64_t *units) {
+    const fct_tree_view *view = &tree->view;
     uint32_t height = 0, found = 0;
     *units = 0;
     for (uint32_t r = view->root_count; r-- > 0;) stack[height++] = view->roots[r];
     while (height) {
-        uint32_t node = stack[--height], octets = leaf_octets(view, node);
+        uint32_t node = stack[--height], octets = leaf_octets(tree, node);
         if (octets == 0) {
-            stack[height++] = view->clusters[node].child[1];
-            stack[height++] = view->clusters[node].child[0];
+            stack[height++] = fct_node_child(tree, node, 1);
+            stack[height++] = fct_node_child(tree, node, 0);
             continue;
         }
         if (list->nodes) {
             list->nodes[found] = node;
             list->offsets[found] = (uint32_t)*units;
         }
-        uint32_t first, count;
-        node_range(view, node, &first, &count);
-        *units += fct_leaf_bytes(count, octets) / FCT_REF_UNIT;
+        *units += fct_leaf_bytes(fct_node_faces(tree, node), octets) / FCT_REF_UNIT;
         ++found;
     }
     list->count = found;
@@ -77,9 +66,9 @@ typedef struct pack_job {
 } pack_job;
 
 static void pack_leaf(const fct_bvh *bvh, uint32_t node, fct_leaf *leaf, float bounds[6]) {
-    uint32_t vertices[FCT_LEAF_VERTICES], first, count;
+    uint32_t vertices[FCT_LEAF_VERTICES];
+    uint32_t first = fct_node_first(bvh->tree, node), count = fct_node_faces(bvh->tree, node);
     uint8_t corners[3 * FCT_LEAF_FACES];
-    node_range(&bvh->view, node, &first, &count);
     uint32_t vertex_count = gather_vertices(&bvh->view, first, count, vertices, corners);
     *leaf = (fct_leaf){
         .first = first, .count = (uint8_t)count, .vertex_octets = (uint8_t)((vertex_count + 7) / 8)};
@@ -120,13 +109,13 @@ fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out) {
     fct_result result = FCT_ERROR_MEMORY;
     uint32_t *stack = fct_allocate(env, (size_t)bvh->view.depth + bvh->view.root_count + 2, sizeof *stack);
     if (!stack) return fct_fail_memory(env, "the leaves of a ray structure");
-    choose_leaves(&bvh->view, stack, &list, &units);
+    choose_leaves(bvh->tree, stack, &list, &units);
     list.nodes = fct_allocate(env, list.count, sizeof *list.nodes);
     list.offsets = fct_allocate(env, list.count, sizeof *list.offsets);
     list.bounds = fct_allocate(env, list.count, 6 * sizeof *list.bounds);
     bvh->leaves = units < FCT_REF_LEAF ? fct_allocate(env, (size_t)units, FCT_REF_UNIT) : NULL;
     if (list.nodes && list.offsets && list.bounds && bvh->leaves) {
-        choose_leaves(&bvh->view, stack, &list, &units);
+        choose_leaves(bvh->tree, stack, &list, &units);
         bvh->leaf_bytes = (size_t)units * FCT_REF_UNIT;
         pack_job job = {bvh, &list};
         fct_parallel_for(env, list.count, 1024, pack_range, &job);

@@ -9,6 +9,7 @@
 #include "bvh/build/nodes.h"
 
 #include "base/parallel.h"
+#include "cluster/tree/node.h"
 
 #define ORIENTED_RATIO .75
 
@@ -81,21 +82,25 @@ static void collapse(node_job *job, uint32_t *stack) {
 
 /* The smallest cluster whose places hold [first, last). FCT_NONE if no single cluster does, and in a tree cut
  * into many roots, where looking through them costs more than it brings. */
-static uint32_t enclosing_cluster(const fct_tree_view *view, uint32_t first, uint32_t last) {
+static bool holds_places(const fct_tree *tree, uint32_t node, uint32_t first, uint32_t last) {
+    uint32_t begin = fct_node_first(tree, node);
+    return begin <= first && last <= begin + fct_node_faces(tree, node);
+}
+
+static uint32_t enclosing_cluster(const fct_tree *tree, uint32_t first, uint32_t last) {
+    const fct_tree_view *view = &tree->view;
     uint32_t node = FCT_NONE;
     for (uint32_t r = 0; r < view->root_count && view->root_count <= 32 && node == FCT_NONE; ++r) {
         uint32_t root = view->roots[r];
         if (root >= view->node_count) continue;
-        const fct_cluster *c = &view->clusters[root];
-        if (c->first <= first && last <= c->first + c->count) node = root;
+        if (holds_places(tree, root, first, last)) node = root;
     }
     for (uint32_t next = node; next != FCT_NONE;) {
         node = next, next = FCT_NONE;
         for (int i = 0; i < 2; ++i) {
-            uint32_t child = view->clusters[node].child[i];
+            uint32_t child = fct_node_child(tree, node, i);
             if (child >= view->node_count) continue;
-            const fct_cluster *c = &view->clusters[child];
-            if (c->first <= first && last <= c->first + c->count) next = child;
+            if (holds_places(tree, child, first, last)) next = child;
         }
     }
     return node;
@@ -122,10 +127,9 @@ static void fit_slabs(const node_job *job, uint32_t begin, uint32_t end, slabs *
 }
 
 static void use_cluster_axes(const fct_bvh *bvh, uint32_t node, slabs *s) {
-    fct_cluster cluster;
+    fct_cluster room;
     fct_box box;
-    fct_tree_cluster(bvh->tree, node, &cluster);
-    fct_cluster_box(&cluster, &box);
+    fct_cluster_box(fct_node_cluster(bvh->tree, node, &room), &box);
     for (int k = 0; k < 3; ++k) s->axes[k] = v3_load(box.axes[k]);
 }
 
@@ -139,7 +143,6 @@ static slabs axis_slabs(const fct_bvh *bvh, const fct_top_node *node) {
 }
 
 static slabs best_slabs(const node_job *job, const fct_top_node *node) {
-    const fct_tree_view *view = &job->bvh->view;
     uint32_t first = FCT_NONE, last = 0, largest = 0;
     double largest_area = -1;
     for (uint32_t i = node->begin; i < node->end; ++i) {
@@ -147,17 +150,14 @@ static slabs best_slabs(const node_job *job, const fct_top_node *node) {
         const fct_leaf *leaf = fct_bvh_leaf(job->bvh, job->leaves->offsets[number]);
         if (leaf->first < first) first = leaf->first;
         if (leaf->first + leaf->count > last) last = leaf->first + leaf->count;
-        fct_cluster cluster;
+        fct_cluster room;
         uint32_t id = job->leaves->nodes[number];
-        if (id < view->node_count)
-            cluster = view->clusters[id];
-        else
-            fct_tree_cluster(job->bvh->tree, id, &cluster);
-        if ((double)cluster.area > largest_area) largest_area = (double)cluster.area, largest = id;
+        double area = (double)fct_node_cluster(job->bvh->tree, id, &room)->area;
+        if (area > largest_area) largest_area = area, largest = id;
     }
     slabs best = axis_slabs(job->bvh, node);
     double best_area = slabs_area(&best);
-    uint32_t candidates[2] = {largest, enclosing_cluster(view, first, last)};
+    uint32_t candidates[2] = {largest, enclosing_cluster(job->bvh->tree, first, last)};
     for (int i = 0; i < 2; ++i) {
         if (candidates[i] == FCT_NONE || (i == 1 && candidates[1] == candidates[0])) continue;
         slabs s;

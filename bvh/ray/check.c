@@ -11,6 +11,7 @@
 #include "bvh/near/triangle.h"
 #include "bvh/ray/embree.h"
 #include "bvh/ray/traverse.h"
+#include "cluster/tree/node.h"
 
 /* More than the float test moves a triangle by, in scaled units; see bvh.h. */
 #define ROUNDING ((double)FCT_AXIS_PAD)
@@ -86,8 +87,9 @@ typedef struct checker {
 
 /* Distance of a scaled point from a cluster's box, from below. */
 static double box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
+    fct_cluster room;
     fct_box box;
-    fct_cluster_box(&bvh->view.clusters[node], &box);
+    fct_cluster_box(fct_node_cluster(bvh->tree, node, &room), &box);
     v3 r = v3_sub(point, v3_scale(v3_load(box.center), bvh->scale));
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
@@ -143,8 +145,8 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         uint32_t node = c->stack[--height];
         if (node < view->node_count) {
             if (box_distance(bvh, node, point) > 4 * ROUNDING) continue;
-            c->stack[height++] = view->clusters[node].child[0];
-            c->stack[height++] = view->clusters[node].child[1];
+            c->stack[height++] = fct_node_child(bvh->tree, node, 0);
+            c->stack[height++] = fct_node_child(bvh->tree, node, 1);
             continue;
         }
         v3 p[3];

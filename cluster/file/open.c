@@ -79,7 +79,7 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
     view->bounds = h->bounds;
     view->material_count = h->material_count;
     view->roots = section_data(tree, h, FCT_SECTION_ROOTS);
-    view->clusters = section_data(tree, h, FCT_SECTION_NODES);
+    tree->nodes = section_data(tree, h, FCT_SECTION_NODES);
     view->face_ids = section_data(tree, h, FCT_SECTION_FACE_IDS);
     view->vertex_ids = section_data(tree, h, FCT_SECTION_VERTEX_IDS);
     view->triangles = section_data(tree, h, FCT_SECTION_TRIANGLES);

@@ -173,7 +173,7 @@ static fct_result check_geometry(const fct_env *env, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     size_t nodes = view->node_count, top = nodes < TOP ? nodes : TOP;
     size_t chunks = fct_chunk_count(nodes, GRAIN) + TOP;
-    verifier v = {.view = view, .clusters = view->clusters};
+    verifier v = {.view = view, .clusters = tree->nodes};
     v.faults = fct_allocate(env, chunks, sizeof *v.faults);
     v.nodes = fct_allocate(env, chunks, sizeof *v.nodes);
     fct_result result = v.faults && v.nodes ? FCT_OK : fct_fail_memory(env, "verifying");

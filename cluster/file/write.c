@@ -166,10 +166,8 @@ static fct_result describe_face(const fct_tree_writer *writer, uint32_t place, f
     if (result != FCT_OK) return result;
     const fct_tree_view view = {
         .face_count = 1, .vertex_count = 3, .positions = positions, .triangles = corners};
-    memset(out, 0, sizeof *out);
-    fct_cluster_describe_face(&view, 0, out);
+    fct_cluster_describe_leaf(&view, 0, out);
     out->first = place;
-    out->child[0] = out->child[1] = FCT_NONE;
     return FCT_OK;
 }
 
@@ -268,7 +266,7 @@ static fct_result put_section(fct_tree_writer *writer, int section, const void *
 fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path) {
     const fct_tree_view *view = &tree->view;
     const void *data[FCT_SECTION_COUNT] = {
-        [FCT_SECTION_ROOTS] = view->roots,         [FCT_SECTION_NODES] = view->clusters,
+        [FCT_SECTION_ROOTS] = view->roots,         [FCT_SECTION_NODES] = tree->nodes,
         [FCT_SECTION_FACE_IDS] = view->face_ids,   [FCT_SECTION_VERTEX_IDS] = view->vertex_ids,
         [FCT_SECTION_TRIANGLES] = view->triangles, [FCT_SECTION_POSITIONS] = view->positions,
         [FCT_SECTION_COLORS] = view->colors,       [FCT_SECTION_MATERIALS] = view->materials};

@@ -14,7 +14,7 @@
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "cluster/large/large.h"
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 
 typedef struct piece {
     fct_large *large;
@@ -364,9 +364,9 @@ static fct_result order_tops(piece *p) {
         fct_top *top = &tops[r];
         *top = (fct_top){.part = p->number,
                          .node = root,
-                         .first = leaf ? root - view.node_count : view.clusters[root].first,
-                         .count = leaf ? 1 : view.clusters[root].count,
-                         .cost = leaf ? 0 : view.clusters[root].cost,
+                         .first = fct_node_first(p->tree, root),
+                         .count = fct_node_faces(p->tree, root),
+                         .cost = leaf ? 0 : p->tree->nodes[root].cost,
                          .phase = leaf ? 0 : phase_of(p->part, root),
                          .material = FCT_NONE};
         if (view.materials && (leaf || top->phase == 0)) top->material = view.materials[top->first];
@@ -469,10 +469,10 @@ static fct_result put_tree(piece *p) {
     float *costs = fct_allocate(l->env, nodes, sizeof *costs);
     uint32_t *ids = p->tree->face_ids, *triangles = p->tree->triangles;
     if (!costs) return fct_fail_memory(l->env, "a part of a mesh");
-    for (size_t i = 0; i < nodes; ++i) costs[i] = view.clusters[i].cost;
+    for (size_t i = 0; i < nodes; ++i) costs[i] = p->tree->nodes[i].cost;
     for (size_t i = 0; i < faces; ++i) ids[i] = p->face_ids[ids[i]];
     for (size_t i = 0; i < 3 * faces; ++i) triangles[i] = p->vertex_ids[view.vertex_ids[triangles[i]]];
-    fct_result result = fct_spool_append(&l->nodes, view.clusters, nodes * sizeof *view.clusters);
+    fct_result result = fct_spool_append(&l->nodes, p->tree->nodes, nodes * sizeof *p->tree->nodes);
     if (result == FCT_OK) result = fct_spool_append(&l->costs, costs, nodes * sizeof *costs);
     if (result == FCT_OK) result = fct_spool_append(&l->face_ids, ids, faces * sizeof *ids);
     if (result == FCT_OK) result = fct_spool_append(&l->triangles, triangles, 3 * faces * sizeof *triangles);

@@ -56,7 +56,7 @@ void fct_points_describe(const fct_octet_row *points, uint32_t point_count, cons
     fct_octet_store(&o, 0, out);
 }
 
-void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
+void fct_cluster_describe_leaf(const fct_tree_view *view, uint32_t place, fct_cluster *out) {
     const uint32_t *triangle = view->triangles + 3 * (size_t)place;
     const float *corners[3][4];
     float points[3][4] = {{0}}, normals[4][4];
@@ -68,7 +68,9 @@ void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cl
         for (int i = 0; i < 4; ++i) corners[k][i] = points[k];
     }
     fct_sums_four((const float *const(*)[4])corners, sums, normals);
+    memset(out, 0, sizeof *out);
     fct_points_describe(rows, 3, normals[0], 1, sums, out);
+    out->child[0] = out->child[1] = FCT_NONE;
     out->first = place, out->count = 1;
 }
 
@@ -351,7 +353,7 @@ static fct_result prepare(const fct_env *env, describer *d) {
     d->scratch = fct_allocate(env, fct_env_threads(env), sizeof *d->scratch);
     if (!d->tree->clusters)
         d->tree->clusters = fct_allocate(env, d->tree->view.node_count, sizeof *d->tree->clusters);
-    d->tree->view.clusters = d->tree->clusters;
+    d->tree->nodes = d->tree->clusters;
     if (!o->upper || !o->blocks || !o->sums || !o->caps || !o->introduced || !d->scratch ||
         !d->tree->clusters)
         return fct_fail_memory(env, "boxes");

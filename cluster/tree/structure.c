@@ -18,6 +18,7 @@ typedef struct fault {
 } fault;
 
 typedef struct checker {
+    const fct_tree *tree;
     const fct_tree_view *view;
     fault *faults;
     uint32_t *seen; /* bits */
@@ -27,26 +28,27 @@ static bool is_finite(const float p[3]) {
     return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
 }
 
-static const char *node_fault(const fct_tree_view *view, uint32_t i) {
-    const fct_cluster *c = &view->clusters[i];
+static const char *node_fault(const fct_tree *tree, uint32_t i) {
+    const fct_tree_view *view = &tree->view;
+    const fct_cluster *c = &tree->nodes[i];
     const char *own = fct_tree_node_fault(view, i, c);
     if (own) return own;
-    if (!(c->cost <= (i ? view->clusters[i - 1].cost : INFINITY))) return "cost above that of a later merge";
+    if (!(c->cost <= (i ? tree->nodes[i - 1].cost : INFINITY))) return "cost above that of a later merge";
     uint32_t first[2], count[2];
     for (int k = 0; k < 2; ++k) {
         bool leaf = c->child[k] >= view->node_count;
-        first[k] = leaf ? c->child[k] - view->node_count : view->clusters[c->child[k]].first;
-        count[k] = leaf ? 1 : view->clusters[c->child[k]].count;
+        first[k] = leaf ? c->child[k] - view->node_count : tree->nodes[c->child[k]].first;
+        count[k] = leaf ? 1 : tree->nodes[c->child[k]].count;
     }
     return fct_tree_parts_fault(c, first, count);
 }
 
 /* Children lie anywhere: asked for a few nodes ahead, they are there in time. */
-static void fetch_children(const fct_tree_view *view, size_t i) {
-    if (i >= view->node_count) return;
+static void fetch_children(const fct_tree *tree, size_t i) {
+    if (i >= tree->view.node_count) return;
     for (int k = 0; k < 2; ++k) {
-        uint32_t child = view->clusters[i].child[k];
-        if (child < view->node_count) __builtin_prefetch(&view->clusters[child].first);
+        uint32_t child = tree->nodes[i].child[k];
+        if (child < tree->view.node_count) __builtin_prefetch(&tree->nodes[child].first);
     }
 }
 
@@ -54,8 +56,8 @@ static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint
     (void)thread;
     checker *check = user;
     for (size_t i = begin; i < end && !check->faults[chunk].what; ++i) {
-        fetch_children(check->view, i + 16);
-        check->faults[chunk] = (fault){node_fault(check->view, (uint32_t)i), (uint32_t)i};
+        fetch_children(check->tree, i + 16);
+        check->faults[chunk] = (fault){node_fault(check->tree, (uint32_t)i), (uint32_t)i};
     }
 }
 
@@ -106,18 +108,19 @@ static fct_result check_permutation(const fct_env *env, const char *name, const 
     return FCT_OK;
 }
 
-static fct_result check_roots(const fct_env *env, const char *name, const fct_tree_view *view) {
+static fct_result check_roots(const fct_env *env, const char *name, const fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
     uint32_t place = 0;
     for (uint32_t r = 0; r < view->root_count; ++r) {
         uint32_t root = view->roots[r];
         if (root >= view->node_count + view->face_count || (r && root <= view->roots[r - 1]))
             return fct_fail(env, FCT_ERROR_DATA, "%s: root %u is out of order", name, r);
         bool leaf = root >= view->node_count;
-        uint32_t first = leaf ? root - view->node_count : view->clusters[root].first;
+        uint32_t first = leaf ? root - view->node_count : tree->nodes[root].first;
         if (first != place)
             return fct_fail(env, FCT_ERROR_DATA, "%s: root %u does not begin where the one before it ends",
                             name, r);
-        place += leaf ? 1 : view->clusters[root].count;
+        place += leaf ? 1 : tree->nodes[root].count;
     }
     if (place == view->face_count) return FCT_OK;
     return fct_fail(env, FCT_ERROR_DATA, "%s: the roots hold %u of %u faces", name, place, view->face_count);
@@ -132,17 +135,18 @@ static fct_result check_cut(const fct_env *env, const char *name, const fct_tree
         const fct_cluster *c = &tree->cut[i];
         bool right =
             id >= opened && id < view->node_count + view->face_count && (i == 0 || id > tree->cut_ids[i - 1]);
-        if (right && id < view->node_count) right = !memcmp(c, &view->clusters[id], sizeof *c);
+        if (right && id < view->node_count) right = !memcmp(c, &tree->nodes[id], sizeof *c);
         if (!right || fct_tree_node_fault(view, id, c))
             return fct_fail(env, FCT_ERROR_DATA, "%s: entry %u of the cut is not that of its node", name, i);
     }
     return FCT_OK;
 }
 
-static fct_result check_depth(const fct_env *env, const char *name, const fct_tree_view *view) {
+static fct_result check_depth(const fct_env *env, const char *name, const fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
     uint32_t depth;
     double mean;
-    fct_result result = fct_tree_find_depth(env, view, &depth, &mean);
+    fct_result result = fct_tree_find_depth(env, tree, &depth, &mean);
     if (result != FCT_OK) return result;
     if (view->face_count > 1 && depth > 3 * log2(view->face_count))
         return fct_fail(env, FCT_ERROR_DATA, "%s: the tree is %u deep, more than 3 log2 of its %u faces",
@@ -157,7 +161,7 @@ static fct_result check_depth(const fct_env *env, const char *name, const fct_tr
 static fct_result check_all(const fct_env *env, const char *name, const fct_tree *tree, checker *check) {
     const fct_tree_view *view = &tree->view;
     fct_result result = run(env, name, "node", view->node_count, check, check_nodes);
-    if (result == FCT_OK) result = check_roots(env, name, view);
+    if (result == FCT_OK) result = check_roots(env, name, tree);
     if (result == FCT_OK) result = check_cut(env, name, tree);
     if (result == FCT_OK) result = run(env, name, "face at place", view->face_count, check, check_triangles);
     if (result == FCT_OK) result = run(env, name, "vertex", view->vertex_count, check, check_positions);
@@ -166,13 +170,13 @@ static fct_result check_all(const fct_env *env, const char *name, const fct_tree
     if (result == FCT_OK)
         result =
             check_permutation(env, name, "the vertex", view->vertex_ids, view->vertex_count, check->seen);
-    return result == FCT_OK ? check_depth(env, name, view) : result;
+    return result == FCT_OK ? check_depth(env, name, tree) : result;
 }
 
 fct_result fct_tree_check_structure(const fct_env *env, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     size_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count;
-    checker check = {.view = view};
+    checker check = {.tree = tree, .view = view};
     check.faults = fct_allocate(env, fct_chunk_count(most, GRAIN), sizeof *check.faults);
     check.seen = fct_allocate(env, most / 32 + 1, sizeof *check.seen);
     fct_result result = check.faults && check.seen

@@ -38,14 +38,15 @@ fct_tree_view fct_tree_get(const fct_tree *tree) {
     return tree->view;
 }
 
-fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean) {
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean) {
+    const fct_tree_view *view = &tree->view;
     *depth = 0, *mean = 0;
     uint8_t *depths = fct_allocate_zero(env, view->node_count, 1);
     if (!depths) return fct_fail_memory(env, "the tree");
     uint64_t total = 0;
     for (uint32_t i = 0; i < view->node_count; ++i)
         for (int k = 0; k < 2; ++k) {
-            uint32_t child = view->clusters[i].child[k], below = depths[i] + 1u;
+            uint32_t child = tree->nodes[i].child[k], below = depths[i] + 1u;
             if (child < view->node_count) {
                 depths[child] = (uint8_t)(below < 255 ? below : 255);
             } else {
@@ -115,8 +116,8 @@ fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint3
     if (result != FCT_OK) return result;
     for (uint32_t i = 0; i < count; ++i) {
         bool leaf = nodes[i] >= view->node_count;
-        uint32_t first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
-        uint32_t faces = leaf ? 1 : view->clusters[nodes[i]].count;
+        uint32_t first = leaf ? nodes[i] - view->node_count : tree->nodes[nodes[i]].first;
+        uint32_t faces = leaf ? 1 : tree->nodes[nodes[i]].count;
         for (uint32_t place = first; place < first + faces; ++place) labels[view->face_ids[place]] = i;
     }
     return FCT_OK;

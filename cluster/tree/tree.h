@@ -18,7 +18,8 @@ typedef struct fct_node_link {
 struct fct_tree {
     const fct_env *env;
     fct_tree_view view;
-    /* What view points to and the tree owns; NULL where it points into the mapped file. */
+    const fct_cluster *nodes; /* view.node_count records; code outside cluster/ reads them by node.h */
+    /* What `view` and `nodes` point to and the tree owns; NULL where they point into the mapped file. */
     fct_cluster *clusters;
     fct_node_link *links; /* by id */
     uint32_t *roots, *face_ids, *vertex_ids, *triangles, *materials;
@@ -60,11 +61,11 @@ static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *o
     out->first = link->first, out->count = link->count;
 }
 
-/* The attributes of the leaf at a place, but for cost and links. */
-void fct_cluster_describe_face(const fct_tree_view *view, uint32_t place, fct_cluster *out);
+/* The record of the leaf at a place. */
+void fct_cluster_describe_leaf(const fct_tree_view *view, uint32_t place, fct_cluster *out);
 
 /* Largest and mean depth of the leaves, from the children links. Errors: MEMORY. */
-fct_result fct_tree_find_depth(const fct_env *env, const fct_tree_view *view, uint32_t *depth, double *mean);
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean);
 /* view->bounds from the positions. */
 void fct_tree_measure_bounds(fct_tree *tree);
 

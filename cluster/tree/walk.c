@@ -59,19 +59,13 @@ static const fct_cluster *find_in_cut(const fct_tree *tree, uint32_t node) {
 static const fct_cluster *find(const fct_tree *tree, uint32_t node) {
     const fct_cluster *record = NULL;
     if (tree->cut_count && node >= tree->cut_count - tree->view.root_count) record = find_in_cut(tree, node);
-    return record || node >= tree->view.node_count ? record : tree->view.clusters + node;
+    return record || node >= tree->view.node_count ? record : tree->nodes + node;
 }
 
 static void find_range(const fct_tree *tree, uint32_t node, uint32_t *first, uint32_t *count) {
     const fct_cluster *record = find(tree, node);
     *first = record ? record->first : node - tree->view.node_count;
     *count = record ? record->count : 1;
-}
-
-static void describe_leaf(const fct_tree *tree, uint32_t place, fct_cluster *out) {
-    memset(out, 0, sizeof *out);
-    fct_cluster_describe_face(&tree->view, place, out);
-    out->child[0] = out->child[1] = FCT_NONE;
 }
 
 /* Whether the corners of the face at a place are there. */
@@ -93,7 +87,7 @@ static const char *read_unchecked(const fct_tree *tree, uint32_t node, fct_clust
     } else {
         uint32_t place = node - tree->view.node_count;
         fault = corners_fault(&tree->view, place);
-        if (!fault) describe_leaf(tree, place, out);
+        if (!fault) fct_cluster_describe_leaf(&tree->view, place, out);
     }
     if (fault) {
         memset(out, 0, sizeof *out);
@@ -109,9 +103,9 @@ fct_result fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *ou
         return fault ? fail(tree->env, tree, node, fault) : FCT_OK;
     }
     if (node < view->node_count)
-        *out = view->clusters[node];
+        *out = tree->nodes[node];
     else
-        describe_leaf(tree, node - view->node_count, out);
+        fct_cluster_describe_leaf(view, node - view->node_count, out);
     return FCT_OK;
 }
 
@@ -175,7 +169,7 @@ static fct_result cut(const fct_env *env, const fct_tree *tree, bool unchecked, 
             const char *fault = open_unchecked(tree, node, child);
             if (fault) return fail(env, tree, node, fault);
         } else {
-            memcpy(child, view->clusters[node].child, sizeof child);
+            memcpy(child, tree->nodes[node].child, sizeof child);
         }
         nodes[--top] = child[1];
         nodes[--top] = child[0];
@@ -203,7 +197,7 @@ uint32_t fct_tree_count_at_cost(const fct_tree *tree, double max_cost) {
     uint32_t low = 0, high = view->node_count; /* nodes from `low` on are done */
     while (low < high) {
         uint32_t middle = low + (high - low) / 2;
-        if ((double)view->clusters[middle].cost <= max_cost)
+        if ((double)tree->nodes[middle].cost <= max_cost)
             high = middle;
         else
             low = middle + 1;

@@ -87,15 +87,14 @@ typedef struct fct_tree_view {
     /* Of the mesh, by its dual graph: edges with one face, with three or more, and parts that edges connect.
      */
     uint32_t boundary_edges, nonmanifold_edges, component_count;
-    fct_bounds bounds;           /* of all vertices; empty where there are none */
-    const fct_cluster *clusters; /* node_count inner nodes */
-    const uint32_t *roots;       /* root_count node ids, ascending */
-    const uint32_t *face_ids;    /* place -> input face */
-    const uint32_t *vertex_ids;  /* vertex of the tree's order -> input vertex */
-    const float *positions;      /* vertex_count x 3, in the tree's vertex order */
-    const uint32_t *triangles;   /* face_count x 3, by place, indices in the tree's vertex order */
-    const float *colors;         /* vertex_count x 3 or NULL, in the tree's vertex order */
-    const uint32_t *materials;   /* face_count or NULL, by place */
+    fct_bounds bounds;          /* of all vertices; empty where there are none */
+    const uint32_t *roots;      /* root_count node ids, ascending */
+    const uint32_t *face_ids;   /* place -> input face */
+    const uint32_t *vertex_ids; /* vertex of the tree's order -> input vertex */
+    const float *positions;     /* vertex_count x 3, in the tree's vertex order */
+    const uint32_t *triangles;  /* face_count x 3, by place, indices in the tree's vertex order */
+    const float *colors;        /* vertex_count x 3 or NULL, in the tree's vertex order */
+    const uint32_t *materials;  /* face_count or NULL, by place */
     uint32_t material_count;
     const char *const *material_names; /* material_count strings or NULL */
     const char *source;                /* never NULL */

@@ -79,7 +79,8 @@ static bool is_disk(const opener *o, const fct_cluster *c) {
 static bool is_chart(void *user, uint32_t node, uint32_t thread) {
     const opener *o = user;
     const fct_charter *charter = o->charter;
-    const fct_cluster *c = &charter->view->clusters[node];
+    fct_cluster room;
+    const fct_cluster *c = fct_node_cluster(charter->tree, node, &room);
     if (!within_angle(charter->view, c, charter->def.max_angle)) {
         ++o->opened[thread].angle;
         return false;
@@ -122,7 +123,7 @@ static fct_result open_nodes(const fct_env *env, const fct_tree *tree, fct_chart
     }
     if (result == FCT_OK) {
         for (uint32_t i = 0; i < c->count; ++i) {
-            uint32_t first = fct_node_first(view, nodes[i]), faces = fct_node_faces(view, nodes[i]);
+            uint32_t first = fct_node_first(tree, nodes[i]), faces = fct_node_faces(tree, nodes[i]);
             for (uint32_t p = first; p < first + faces; ++p) c->labels[p] = i;
         }
         for (uint32_t t = 0; t < threads; ++t) {
@@ -155,7 +156,7 @@ static fct_result check_def(const fct_env *env, const fct_chart_def *def) {
 fct_result fct_tree_charts(const fct_env *env, const fct_tree *tree, const fct_chart_def *def,
                            uint32_t *labels, fct_chart_stats *stats) {
     const fct_tree_view *view = &tree->view;
-    fct_charter c = {.view = view, .def = def ? *def : fct_chart_def_default()};
+    fct_charter c = {.tree = tree, .view = view, .def = def ? *def : fct_chart_def_default()};
     fct_chart_stats found = {0};
     fct_result result = check_def(env, &c.def);
     if (result == FCT_OK) result = fct_tree_check(env, tree);

@@ -3,14 +3,15 @@
 #define FCT_CLUSTER_CHART_H
 
 #include "base/math/vec.h"
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 #include "facetree/partition.h"
 #include "partition/sides.h"
 
 #define FCT_HALF_TURN 3.14159265358979323846
 
 typedef struct fct_charter {
-    const fct_tree_view *view;
+    const fct_tree *tree;
+    const fct_tree_view *view; /* of the tree */
     fct_chart_def def;
     fct_sides sides;  /* by place */
     uint32_t *labels; /* chart of each place; charts are numbered by first place */

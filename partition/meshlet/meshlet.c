@@ -22,29 +22,28 @@ fct_meshlet_def fct_meshlet_def_default(void) {
 static bool fits(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
     const fct_packer *p = user;
-    const fct_cluster *c = &p->view->clusters[node];
-    if (c->count > p->def.max_triangles) return false;
-    uint32_t vertices = 0;
-    for (uint32_t f = c->first; f < c->first + c->count; ++f) {
+    uint32_t first = fct_node_first(p->tree, node), count = fct_node_faces(p->tree, node), vertices = 0;
+    if (count > p->def.max_triangles) return false;
+    for (uint32_t f = first; f < first + count; ++f) {
         const uint32_t *before = p->vertex_before + 3 * (size_t)f, *t = p->view->triangles + 3 * (size_t)f;
         for (int k = 0; k < 3; ++k) {
             bool repeated = (k > 0 && t[k] == t[0]) || (k > 1 && t[k] == t[1]);
-            vertices += !repeated && (before[k] == FCT_NONE || before[k] < c->first);
+            vertices += !repeated && (before[k] == FCT_NONE || before[k] < first);
         }
-        if (p->view->materials && p->view->materials[f] != p->view->materials[c->first]) return false;
+        if (p->view->materials && p->view->materials[f] != p->view->materials[first]) return false;
     }
     return vertices <= p->def.max_vertices;
 }
 
 typedef struct size_test {
-    const fct_tree_view *view;
+    const fct_tree *tree;
     uint32_t most;
 } size_test;
 
 static bool is_small(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
     const size_test *test = user;
-    return test->view->clusters[node].count <= test->most;
+    return fct_node_faces(test->tree, node) <= test->most;
 }
 
 static void link_corners(const fct_tree_view *view, uint32_t *last, uint32_t *vertex_before) {
@@ -76,12 +75,12 @@ static void release_packer(const fct_env *env, fct_packer *p) {
 static fct_result cut_runs(const fct_env *env, const fct_tree *tree, uint32_t most, uint32_t *bounds,
                            uint32_t *count) {
     const fct_tree_view *view = &tree->view;
-    size_test test = {view, most};
+    size_test test = {tree, most};
     uint32_t nodes, place = 0, runs = 0;
     fct_result result = fct_cut_tree(env, tree, "meshlets", is_small, &test, bounds, &nodes);
     if (result != FCT_OK) return result;
     for (uint32_t i = 0, begin = 0; i < nodes; ++i) { /* there are never more runs than nodes read */
-        uint32_t faces = fct_node_faces(view, bounds[i]);
+        uint32_t faces = fct_node_faces(tree, bounds[i]);
         if (place > begin && place + faces - begin > most) {
             bounds[runs++] = begin;
             begin = place;
@@ -103,10 +102,10 @@ static fct_result read_scales(const fct_env *env, const fct_tree *tree, fct_pack
         for (uint32_t f = scratch[i]; f < scratch[i + 1]; ++f) p->home[f] = i;
     if (result == FCT_OK) result = fct_cut_tree(env, tree, "meshlets", fits, p, scratch, &count);
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
-        fct_cluster c;
-        fct_tree_cluster(tree, scratch[i], &c);
-        float reach = (float)v3_norm(v3_load(c.box_half));
-        for (uint32_t f = c.first; f < c.first + c.count; ++f) p->reach[f] = reach;
+        fct_cluster room;
+        const fct_cluster *c = fct_node_cluster(tree, scratch[i], &room);
+        float reach = (float)v3_norm(v3_load(c->box_half));
+        for (uint32_t f = c->first; f < c->first + c->count; ++f) p->reach[f] = reach;
     }
     return result;
 }
@@ -265,7 +264,7 @@ static fct_result check_def(const fct_env *env, const fct_meshlet_def *def) {
 
 fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct_meshlet_def *def,
                              fct_meshlets *out) {
-    fct_packer p = {.view = &tree->view, .def = def ? *def : fct_meshlet_def_default()};
+    fct_packer p = {.tree = tree, .view = &tree->view, .def = def ? *def : fct_meshlet_def_default()};
     *out = (fct_meshlets){0};
     fct_result result = check_def(env, &p.def);
     if (result == FCT_OK) result = fct_tree_check(env, tree);

@@ -2,7 +2,7 @@
 #ifndef FCT_CLUSTER_MESHLET_H
 #define FCT_CLUSTER_MESHLET_H
 
-#include "cluster/tree/tree.h"
+#include "cluster/tree/node.h"
 #include "facetree/partition.h"
 #include "partition/sides.h"
 
@@ -10,7 +10,8 @@ enum { FCT_MESHLET_VERTICES = 256, FCT_MESHLET_TRIANGLES = 512 }; /* the largest
 
 /* Faces in pieces: each piece lists its faces and the vertices they use with how many faces use each. */
 typedef struct fct_packer {
-    const fct_tree_view *view;
+    const fct_tree *tree;
+    const fct_tree_view *view; /* of the tree */
     fct_meshlet_def def;
     fct_sides sides;         /* by place */
     uint32_t *vertex_before; /* per corner: place of the face before its own at its vertex, or FCT_NONE */

@@ -8,6 +8,7 @@
 #include "radiosity/light/lamp.h"
 
 #include "base/env.h"
+#include "cluster/tree/node.h"
 #include "radiosity/light/lamp_cut.h"
 #include "radiosity/sample.h"
 #include "scene/transform.h"
@@ -205,10 +206,10 @@ static double instance_area(const fct_scene_view *view, uint32_t instance, doubl
     v3 sum = {0, 0, 0};
     if (placed->uniform_scale > 0) {
         for (uint32_t i = 0; i < model.root_count; ++i) {
-            fct_cluster c;
-            fct_tree_cluster(tree, model.roots[i], &c);
-            area += c.area;
-            sum = v3_add(sum, v3_load(c.area_vector));
+            fct_cluster room;
+            const fct_cluster *c = fct_node_cluster(tree, model.roots[i], &room);
+            area += c->area;
+            sum = v3_add(sum, v3_load(c->area_vector));
         }
         double scale2 = (double)placed->uniform_scale * placed->uniform_scale;
         *vector = scale2 * v3_norm(sum);

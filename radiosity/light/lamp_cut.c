@@ -10,6 +10,7 @@
 #include "radiosity/light/lamp_cut.h"
 
 #include "base/parallel.h"
+#include "cluster/tree/node.h"
 #include "radiosity/light/polygon.h"
 #include "scene/transform.h"
 
@@ -198,7 +199,8 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
             fits = cut_leaf(lamp, rec, node, reference, cut) && fits;
             continue;
         }
-        const fct_cluster *c = lamp->view.clusters + node;
+        fct_cluster room;
+        const fct_cluster *c = fct_node_cluster(lamp->tree, node, &room);
         outlook o = cluster_outlook(lamp, rec, c);
         if (o.upper <= 0) continue;
         bool full = depth + 2 > STACK_SIZE || cut->count + depth + 1 > FCT_CUT_SIZE;
@@ -206,8 +208,8 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
             if (o.whole) o.light *= 1 + fmin(fmax(cluster_correction(rec, c), -.1), .1);
             fits = cut_add(cut, node, 1, o.light) && !full && fits;
         } else {
-            stack[depth++] = c->child[1];
-            stack[depth++] = c->child[0];
+            stack[depth++] = fct_node_child(lamp->tree, node, 1);
+            stack[depth++] = fct_node_child(lamp->tree, node, 0);
         }
     }
     return fits;
@@ -293,7 +295,10 @@ static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, cons
 /* How much of the light below an inner node comes through one of its children, roughly; positive unless
  * nothing does. */
 static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node) {
-    if (node < lamp->view.node_count) return cluster_weight(lamp, rec, lamp->view.clusters + node);
+    if (node < lamp->view.node_count) {
+        fct_cluster room;
+        return cluster_weight(lamp, rec, fct_node_cluster(lamp->tree, node, &room));
+    }
     v3 p[3];
     triangle_corners(&lamp->view, node - lamp->view.node_count, p);
     for (int k = 0; k < 3; ++k) p[k] = v3_sub(p[k], rec->x);
@@ -311,7 +316,7 @@ static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_
 static uint32_t descend(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double *u,
                         double *chance) {
     while (node < lamp->view.node_count) {
-        const uint32_t *child = lamp->view.clusters[node].child;
+        const uint32_t child[2] = {fct_node_child(lamp->tree, node, 0), fct_node_child(lamp->tree, node, 1)};
         double left = node_weight(lamp, rec, child[0]), right = node_weight(lamp, rec, child[1]);
         if (!(left + right > 0)) return FCT_NONE;
         double p = left / (left + right);
@@ -424,10 +429,10 @@ static fct_result make_table(const fct_env *env, fct_lamp *lamp) {
     result = fct_tree_partition(env, lamp->tree, count, nodes, &work.count);
     if (result != FCT_OK) goto done;
     for (uint32_t i = 0; i < work.count; ++i) {
-        fct_cluster c;
-        fct_tree_cluster(lamp->tree, nodes[i], &c);
-        facets[i] = (facet){.vector = v3_load(c.area_vector), .area = c.area};
-        for (int k = 0; k < 6; ++k) facets[i].moment[k] = c.moment[k];
+        fct_cluster room;
+        const fct_cluster *c = fct_node_cluster(lamp->tree, nodes[i], &room);
+        facets[i] = (facet){.vector = v3_load(c->area_vector), .area = c->area};
+        for (int k = 0; k < 6; ++k) facets[i].moment[k] = c->moment[k];
     }
     fct_parallel_for(env, FCT_LAMP_TABLE, 8, table_body, &work);
 done:
@@ -440,22 +445,22 @@ done:
 static void measure(fct_lamp *lamp) {
     double area = 0, largest = 0;
     v3 center = {0, 0, 0}, vector = {0, 0, 0};
-    fct_cluster c;
+    fct_cluster room;
     for (uint32_t i = 0; i < lamp->view.root_count; ++i) {
-        fct_tree_cluster(lamp->tree, lamp->view.roots[i], &c);
-        area += c.area;
-        center = v3_mad(center, c.area, v3_load(c.centroid));
-        vector = v3_add(vector, v3_load(c.area_vector));
+        const fct_cluster *c = fct_node_cluster(lamp->tree, lamp->view.roots[i], &room);
+        area += c->area;
+        center = v3_mad(center, c->area, v3_load(c->centroid));
+        vector = v3_add(vector, v3_load(c->area_vector));
     }
     lamp->area = area;
     lamp->vector = vector;
     lamp->center = area > 0 ? v3_scale(center, 1 / area) : center;
     for (uint32_t i = 0; i < lamp->view.root_count; ++i) {
-        fct_tree_cluster(lamp->tree, lamp->view.roots[i], &c);
-        v3 middle = v3_load(c.box_center);
-        double half2 = v3_norm2(v3_load(c.box_half)), away2 = v3_norm2(v3_sub(middle, lamp->center));
+        const fct_cluster *c = fct_node_cluster(lamp->tree, lamp->view.roots[i], &room);
+        v3 middle = v3_load(c->box_center);
+        double half2 = v3_norm2(v3_load(c->box_half)), away2 = v3_norm2(v3_sub(middle, lamp->center));
         lamp->radius = fmax(lamp->radius, sqrt(half2) + sqrt(away2));
-        lamp->rms2 += area > 0 ? c.area / area * (half2 / 3 + away2) : 0;
+        lamp->rms2 += area > 0 ? c->area / area * (half2 / 3 + away2) : 0;
         largest = fmax(largest, v3_norm(middle) + sqrt(half2));
     }
     lamp->rounding = 4e-7 * largest;

@@ -8,6 +8,7 @@
 
 #include <string.h>
 
+#include "cluster/tree/node.h"
 #include "scene/transform.h"
 
 /* Light of neighbours that differs by less, as a share of its sum, may be one light and noise. */
@@ -258,12 +259,12 @@ fct_site fct_output_site(const fct_scene *scene, const float point[3], const flo
             const fct_tree *tree = view.models[in->model].tree;
             fct_tree_view t = fct_tree_get(tree);
             site.place = closest.place;
-            fct_cluster c;
-            fct_tree_cluster(tree, t.node_count + site.place, &c);
+            fct_cluster room;
+            const fct_cluster *c = fct_node_cluster(tree, t.node_count + site.place, &room);
             double facing = 0;
             for (int r = 0; r < 3; ++r)
                 for (int k = 0; k < 3; ++k)
-                    facing += (double)in->normal_matrix[3 * r + k] * c.area_vector[k] * normal[r];
+                    facing += (double)in->normal_matrix[3 * r + k] * c->area_vector[k] * normal[r];
             if (in->mirrored) facing = -facing;
             bool two_sided = view.materials[in->material].two_sided;
             if (facing > 0 || two_sided) {

@@ -8,6 +8,7 @@
 #include "radiosity/output/surface.h"
 
 #include "base/parallel.h"
+#include "cluster/tree/node.h"
 #include "radiosity/output/split.h"
 #include "radiosity/output/surface_vertex.h"
 #include "scene/transform.h"
@@ -57,13 +58,13 @@ static bool tree_near(const fct_tree *tree, v3 p, double distance) {
         stack[0] = view.roots[r];
         while (top) {
             uint32_t node = stack[--top];
-            fct_cluster c;
-            fct_tree_cluster(tree, node, &c);
-            if (box_distance2(&c, p) > d2) continue;
-            if (node >= view.node_count || v3_norm2(v3_load(c.box_half)) < small2 || top + 2 > STACK_SIZE)
+            fct_cluster room;
+            const fct_cluster *c = fct_node_cluster(tree, node, &room);
+            if (box_distance2(c, p) > d2) continue;
+            if (node >= view.node_count || v3_norm2(v3_load(c->box_half)) < small2 || top + 2 > STACK_SIZE)
                 return true;
-            stack[top++] = c.child[1];
-            stack[top++] = c.child[0];
+            stack[top++] = fct_node_child(tree, node, 1);
+            stack[top++] = fct_node_child(tree, node, 0);
         }
     }
     return false;

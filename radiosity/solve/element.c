@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "cluster/tree/node.h"
 #include "scene/transform.h"
 
 enum { PAGE = 4096 };
@@ -140,21 +141,20 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     const fct_instance *in = &set->view.instances[instance];
     const fct_tree *tree = set->view.models[in->model].tree;
     const fct_material *material = &set->view.materials[in->material];
-    fct_cluster c;
-    fct_result r = fct_tree_cluster(tree, node, &c);
-    if (r != FCT_OK) return r;
+    fct_cluster room;
+    const fct_cluster *c = fct_node_cluster(tree, node, &room);
     fct_element e = {
         .parent = parent, .instance = instance, .node = node, .back = back, .triangle = FCT_NONE};
     double sign = back ? -1 : 1;
-    if (c.count == 1) {
+    if (c->count == 1) {
         v3 p[3];
-        place_corners(set, in, c.first, p);
+        place_corners(set, in, c->first, p);
         set_triangle(&e, p, in->mirrored ? -sign : sign);
-        r = add_corners(set, p, &e.triangle);
+        fct_result r = add_corners(set, p, &e.triangle);
         if (r != FCT_OK) return r;
     } else {
         touch(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
-        set_cluster(set, in, &c, sign, &e);
+        set_cluster(set, in, c, sign, &e);
     }
     for (int k = 0; k < 3; ++k) {
         e.reflectance[k] = material->reflectance[k];
@@ -162,7 +162,7 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
         e.radiosity[k] = e.emission[k];
         e.power[k] = v3_scale(e.vector, e.radiosity[k]);
     }
-    set->ranges[set->count] = (fct_element_range){.first = c.first, .count = c.count};
+    set->ranges[set->count] = (fct_element_range){.first = c->first, .count = c->count};
     set->items[set->count++] = e;
     return FCT_OK;
 }
@@ -223,10 +223,9 @@ fct_result fct_elements_split(fct_elements *set, uint32_t id) {
     if (e.kind == FCT_ELEMENT_TRIANGLE) {
         r = quarter(set, id);
     } else {
-        fct_cluster c;
-        r = fct_tree_cluster(set->view.models[set->view.instances[e.instance].model].tree, e.node, &c);
-        if (r == FCT_OK) r = add_node(set, id, e.instance, c.child[0], e.back);
-        if (r == FCT_OK) r = add_node(set, id, e.instance, c.child[1], e.back);
+        const fct_tree *tree = set->view.models[set->view.instances[e.instance].model].tree;
+        r = add_node(set, id, e.instance, fct_node_child(tree, e.node, 0), e.back);
+        if (r == FCT_OK) r = add_node(set, id, e.instance, fct_node_child(tree, e.node, 1), e.back);
     }
     if (r != FCT_OK) return r;
     link_children(set, id, first);
@@ -335,22 +334,16 @@ static uint32_t face_by_area(const fct_elements *set, const fct_instance *in, ui
     fct_tree_view view = fct_tree_get(tree);
     while (node < view.node_count) {
         touch(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
-        const fct_cluster *c = &view.clusters[node];
         double area[2];
         for (int k = 0; k < 2; ++k) {
-            fct_cluster leaf;
-            const fct_cluster *kid = &view.clusters[c->child[k] < view.node_count ? c->child[k] : 0];
-            if (c->child[k] >= view.node_count) {
-                fct_tree_cluster(tree, c->child[k], &leaf);
-                kid = &leaf;
-            }
-            area[k] = kid->area;
+            fct_cluster room;
+            area[k] = fct_node_cluster(tree, fct_node_child(tree, node, k), &room)->area;
         }
         double share = area[0] + area[1] > 0 ? area[0] / (area[0] + area[1]) : .5;
         int k = *t < share ? 0 : 1;
         *t = k == 0 ? *t / share : (*t - share) / (1 - share);
         *t = fmin(fmax(*t, 0), 1 - 1e-12);
-        node = c->child[k];
+        node = fct_node_child(tree, node, k);
     }
     return node - view.node_count;
 }

@@ -5,7 +5,7 @@
 #include "support.h"
 
 #include "base/math/vec.h"
-#include "facetree/cluster.h"
+#include "cluster/tree/tree.h"
 
 static inline void check_node_geometry(const fct_tree_view *view, const fct_cluster *c) {
     fct_box box;
@@ -49,20 +49,21 @@ static inline uint32_t cut_tree(const fct_tree *tree, uint32_t count, uint32_t *
     return written;
 }
 
-static inline void check_links(const fct_tree_view *view) {
+static inline void check_links(const fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
     uint8_t *parents = calloc((size_t)view->node_count + view->face_count, 1);
     for (uint32_t i = 0; i < view->node_count; ++i) {
-        const fct_cluster *c = &view->clusters[i];
-        if (i > 0) assert_true(view->clusters[i - 1].cost >= c->cost);
+        const fct_cluster *c = &tree->nodes[i];
+        if (i > 0) assert_true(tree->nodes[i - 1].cost >= c->cost);
         uint32_t place = c->first, faces = 0;
         for (int k = 0; k < 2; ++k) {
             uint32_t child = c->child[k];
             assert_true(child > i && child < view->node_count + view->face_count);
             ++parents[child];
             bool leaf = child >= view->node_count;
-            assert_int_equal(leaf ? child - view->node_count : view->clusters[child].first, place);
-            place += leaf ? 1 : view->clusters[child].count;
-            faces += leaf ? 1 : view->clusters[child].count;
+            assert_int_equal(leaf ? child - view->node_count : tree->nodes[child].first, place);
+            place += leaf ? 1 : tree->nodes[child].count;
+            faces += leaf ? 1 : tree->nodes[child].count;
         }
         assert_int_equal(faces, c->count);
     }
@@ -100,11 +101,11 @@ static inline void check_mesh(const fct_tree_view *view, const fct_mesh *mesh) {
 static inline void check_tree(const fct_tree *tree, const fct_mesh *mesh) {
     fct_tree_view view = fct_tree_get(tree);
     check_mesh(&view, mesh);
-    check_links(&view);
+    check_links(tree);
     assert_int_equal(view.node_count, view.face_count - view.root_count);
     if (view.root_count == 1 && view.face_count > 1)
         assert_true(view.depth <= (uint32_t)(3 * log2(view.face_count)));
-    for (uint32_t i = 0; i < view.node_count; ++i) check_node_geometry(&view, &view.clusters[i]);
+    for (uint32_t i = 0; i < view.node_count; ++i) check_node_geometry(&view, &tree->nodes[i]);
     for (uint32_t p = 0; p < view.face_count; p += 1 + view.face_count / 1000) {
         fct_cluster leaf;
         fct_tree_cluster(tree, view.node_count + p, &leaf);

@@ -110,12 +110,12 @@ static void roots_and_costs(void **state) {
             fct_cluster root;
             fct_tree_cluster(tree, nodes[i], &root);
             if (roots > 1)
-                assert_true(nodes[i] >= fct_tree_get(tree).node_count || root.cost <= all.clusters[0].cost);
+                assert_true(nodes[i] >= fct_tree_get(tree).node_count || root.cost <= whole->nodes[0].cost);
         }
         fct_tree_destroy(tree);
     }
     def.root_count = 1;
-    def.max_cost = (double)all.clusters[20].cost;
+    def.max_cost = (double)whole->nodes[20].cost;
     fct_tree *cut = build(&env, &mesh, &def);
     uint32_t expected = fct_tree_count_at_cost(whole, def.max_cost);
     assert_in_range(expected, 2, 21);
@@ -146,7 +146,7 @@ static void materials_come_first(void **state) {
         uint32_t nodes[3];
         assert_int_equal(cut_tree(tree, 3, nodes), 3);
         for (int i = 0; i < 3; ++i) {
-            const fct_cluster *c = &view.clusters[nodes[i]];
+            const fct_cluster *c = &tree->nodes[nodes[i]];
             for (uint32_t p = c->first; p < c->first + c->count; ++p)
                 assert_int_equal(view.materials[p], view.materials[c->first]);
         }
@@ -174,7 +174,7 @@ static void same_for_every_thread_count(void **state) {
             for (int t = 1; t < 3; ++t) {
                 fct_tree_view b = fct_tree_get(trees[t]);
                 assert_int_equal(a.node_count, b.node_count);
-                assert_memory_equal(a.clusters, b.clusters, a.node_count * sizeof *a.clusters);
+                assert_memory_equal(trees[0]->nodes, trees[t]->nodes, a.node_count * sizeof(fct_cluster));
                 assert_memory_equal(a.face_ids, b.face_ids, 4 * (size_t)a.face_count);
             }
             for (int t = 0; t < 3; ++t) fct_tree_destroy(trees[t]);

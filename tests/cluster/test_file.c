@@ -41,7 +41,7 @@ static void same_trees(const fct_tree *a, const fct_tree *b) {
     assert_int_equal(p.component_count, q.component_count);
     assert_memory_equal(&p.bounds, &q.bounds, sizeof p.bounds);
     assert_true(p.mean_depth == q.mean_depth);
-    assert_memory_equal(p.clusters, q.clusters, p.node_count * sizeof *p.clusters);
+    assert_memory_equal(a->nodes, b->nodes, p.node_count * sizeof *a->nodes);
     assert_memory_equal(p.roots, q.roots, 4 * p.root_count);
     assert_memory_equal(p.face_ids, q.face_ids, 4 * p.face_count);
     assert_memory_equal(p.vertex_ids, q.vertex_ids, 4 * p.vertex_count);
@@ -270,7 +270,7 @@ static void shared_children_end(void **state) {
     fct_tree *tree = build_small(&env, 8, &mesh);
     fct_tree_view view = fct_tree_get(tree);
     unsigned char *at = bytes;
-    while (memcmp(at, view.clusters, view.node_count * sizeof *view.clusters) != 0) ++at;
+    while (memcmp(at, tree->nodes, view.node_count * sizeof *tree->nodes) != 0) ++at;
     for (uint32_t i = 0; i < view.node_count; ++i) {
         const uint32_t links[4] = {i + 1, i + 1, 0, view.face_count};
         memcpy(at + i * sizeof(fct_cluster) + offsetof(fct_cluster, child), links, sizeof links);
@@ -376,7 +376,7 @@ static void endless_numbers_do_not_pass(void **state) {
     assert_int_equal(fct_file_open(&env, path, &file), FCT_OK);
     unsigned char *bytes = malloc(file.size);
     memcpy(bytes, file.data, file.size);
-    const void *section[2] = {view.clusters, view.positions};
+    const void *section[2] = {tree->nodes, view.positions};
     size_t floats[2] = {view.node_count * sizeof(fct_cluster) / 4, 3 * (size_t)view.vertex_count};
     const float wrong[3] = {NAN, INFINITY, -INFINITY};
     for (size_t s = 0; s < 2; ++s) {

@@ -74,7 +74,7 @@ static fct_tree *build(const fct_env *env, const fct_mesh *mesh, const fct_tree_
     assert_int_equal(stats->depth, view.depth);
     assert_int_equal(stats->root_count, view.root_count);
     for (uint32_t i = 0; i < view.node_count; ++i) /* ids go by cost */
-        assert_true(i == 0 || view.clusters[i].cost <= view.clusters[i - 1].cost);
+        assert_true(i == 0 || tree->nodes[i].cost <= tree->nodes[i - 1].cost);
     return tree;
 }
 
@@ -186,10 +186,10 @@ static void colors_and_materials(void **state) {
     assert_int_equal(fct_tree_mesh(&env, tree, &back), FCT_OK);
     assert_memory_equal(back.colors, mesh.colors, 12 * (size_t)mesh.vertex_count);
     assert_memory_equal(back.materials, mesh.materials, 4 * (size_t)mesh.face_count);
-    const fct_cluster *first = &view.clusters[0];
+    const fct_cluster *first = &tree->nodes[0];
     for (int k = 0; k < 2; ++k) /* the last merge is between the materials */
-        for (uint32_t p = view.clusters[first->child[k]].first, i = 0;
-             i < view.clusters[first->child[k]].count; ++i)
+        for (uint32_t p = tree->nodes[first->child[k]].first, i = 0; i < tree->nodes[first->child[k]].count;
+             ++i)
             assert_int_equal(view.materials[p + i], view.materials[p]);
     fct_mesh_release(&env, &back);
     fct_tree_destroy(tree);
@@ -213,7 +213,7 @@ static void several_roots(void **state) {
         uint32_t count;
         assert_int_equal(fct_tree_partition(&env, one, roots[i], nodes, &count), FCT_OK);
         assert_int_equal(fct_tree_labels(&env, one, nodes, count, labels), FCT_OK);
-        double cost = count < 1800 ? (double)fct_tree_get(one).clusters[count - 1].cost : -1;
+        double cost = count < 1800 ? (double)one->nodes[count - 1].cost : -1;
         fct_tree *tree = build(&env, &mesh, &def, 300, &stats);
         fct_tree_view view = fct_tree_get(tree);
         assert_int_equal(view.root_count, roots[i]);
@@ -229,7 +229,7 @@ static void several_roots(void **state) {
         def.max_cost = cost;
         tree = build(&env, &mesh, &def, 300, &stats);
         view = fct_tree_get(tree);
-        assert_true(view.root_count <= roots[i] && (double)view.clusters[0].cost <= cost);
+        assert_true(view.root_count <= roots[i] && (double)tree->nodes[0].cost <= cost);
         fct_tree_destroy(tree);
     }
     free(nodes);
@@ -243,7 +243,7 @@ static double sum_of_boxes(const fct_tree *tree) {
     fct_tree_view view = fct_tree_get(tree);
     double sum = 0;
     for (uint32_t i = 0; i < view.node_count; ++i) {
-        const float *h = view.clusters[i].box_half;
+        const float *h = tree->nodes[i].box_half;
         sum += (double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0];
     }
     return sum;

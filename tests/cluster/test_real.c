@@ -8,14 +8,15 @@ typedef struct figures {
     double deviation, irregularity, box_areas; /* at 1000 clusters: upper bounds; boxes of the whole tree */
 } figures;
 
-static double box_areas(const fct_tree_view *view) {
+static double box_areas(const fct_tree *tree) {
+    const fct_tree_view *view = &tree->view;
     double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY}, sum = 0;
     for (size_t i = 0; i < 3 * (size_t)view->vertex_count; ++i) {
         lower[i % 3] = fmin(lower[i % 3], (double)view->positions[i]);
         upper[i % 3] = fmax(upper[i % 3], (double)view->positions[i]);
     }
     for (uint32_t i = 0; i < view->node_count; ++i) {
-        const float *h = view->clusters[i].box_half;
+        const float *h = tree->nodes[i].box_half;
         sum += 8 * (double)(h[0] * h[1] + h[1] * h[2] + h[2] * h[0]);
     }
     v3 d = {upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]};
@@ -37,7 +38,7 @@ static void check_model(const figures *expected) {
         check_tree(tree, &mesh);
         fct_tree_view view = fct_tree_get(tree);
         assert_int_equal(view.root_count, 1);
-        assert_true(box_areas(&view) <= expected->box_areas);
+        assert_true(box_areas(tree) <= expected->box_areas);
         uint32_t *nodes = malloc(4 * (size_t)view.face_count);
         const uint32_t counts[] = {1, 2, 3, 10, 100, 1000, view.face_count / 2};
         for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {

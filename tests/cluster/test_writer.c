@@ -63,9 +63,10 @@ static const struct {
 enum { PARTS = sizeof parts / sizeof *parts };
 
 /* Writes all sections of a tree without colours by turns, `piece` bytes each, to be finished. */
-static fct_result write_by_turns(const fct_env *env, const fct_tree_view *view, size_t piece,
+static fct_result write_by_turns(const fct_env *env, const fct_tree *tree, size_t piece,
                                  fct_tree_writer **writer) {
-    const void *data[PARTS] = {view->triangles, view->clusters,   view->positions,
+    const fct_tree_view *view = &tree->view;
+    const void *data[PARTS] = {view->triangles, tree->nodes,      view->positions,
                                view->roots,     view->vertex_ids, view->face_ids};
     const uint32_t counts[PARTS] = {view->face_count, view->node_count,   view->vertex_count,
                                     view->root_count, view->vertex_count, view->face_count};
@@ -96,7 +97,7 @@ static void pieces_make_the_same_file(void **state) {
     for (size_t i = 0; i < sizeof pieces / sizeof *pieces; ++i) {
         env.thread_count = (uint32_t)(1 + 2 * (i % 2));
         fct_tree_writer *writer;
-        assert_int_equal(write_by_turns(&env, &view, pieces[i], &writer), FCT_OK);
+        assert_int_equal(write_by_turns(&env, tree, pieces[i], &writer), FCT_OK);
         assert_int_equal(fct_tree_writer_finish(writer, &view), FCT_OK);
         bytes written = read_bytes(path);
         assert_int_equal(written.size, saved.size);
@@ -119,7 +120,7 @@ static void an_abandoned_file_was_never_there(void **state) {
     int before = count_files();
     assert_int_equal(fct_tree_writer_open(&env, path, &view, 0, &writer), FCT_OK);
     assert_int_equal(count_files(), before + 1);
-    assert_int_equal(fct_tree_writer_put(writer, FCT_SECTION_NODES, view.clusters, 1000), FCT_OK);
+    assert_int_equal(fct_tree_writer_put(writer, FCT_SECTION_NODES, tree->nodes, 1000), FCT_OK);
     fct_tree_writer_abandon(writer);
     assert_int_equal(count_files(), before);
     assert_int_equal(fct_tree_writer_open(&env, "no_such_folder/x.fct", &view, 0, &writer), FCT_ERROR_OUTPUT);
@@ -155,7 +156,7 @@ static void no_memory_leaves_the_old_file(void **state) {
     for (r.fail_at = 1;; ++r.fail_at) {
         fct_tree_writer *writer;
         r.allocations = 0;
-        fct_result result = write_by_turns(&env, &view, 1000, &writer);
+        fct_result result = write_by_turns(&env, tree, 1000, &writer);
         if (result == FCT_OK)
             result = fct_tree_writer_finish(writer, &view);
         else

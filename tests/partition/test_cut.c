@@ -29,8 +29,10 @@ static uint32_t search(const fct_tree *tree, double limit, uint32_t *nodes, doub
             nodes[count++] = node;
             *largest = fmax(*largest, distance);
         } else {
-            stack[top++] = view.clusters[node].child[1];
-            stack[top++] = view.clusters[node].child[0];
+            fct_cluster own;
+            fct_tree_cluster(tree, node, &own);
+            stack[top++] = own.child[1];
+            stack[top++] = own.child[0];
         }
     }
     free(stack);
