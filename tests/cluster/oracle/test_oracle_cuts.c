@@ -3,25 +3,28 @@
 #include "meshes.h"
 #include "oracle.h"
 
+#include "cluster/tree/tree.h"
 #include "facetree/partition.h"
 
 /* The partition into `count` clusters: all merges but the last ones are done. labels: per place, the last
  * node made. */
-static void apply_merges(const fct_tree_view *view, uint32_t count, uint32_t *labels) {
+static void apply_merges(const fct_tree *tree, uint32_t count, uint32_t *labels) {
+    const fct_tree_view *view = &tree->view;
     for (uint32_t p = 0; p < view->face_count; ++p) labels[p] = view->node_count + p;
     for (uint32_t id = view->node_count, left = view->face_count; left > count; --left) {
-        const fct_cluster *c = &view->clusters[--id];
+        const fct_cluster *c = &tree->nodes[--id];
         for (uint32_t p = c->first; p < c->first + c->count; ++p) labels[p] = id;
     }
 }
 
-static void check_partition(const char *name, const fct_tree_view *view, uint32_t wanted,
-                            const uint32_t *labels, const uint32_t *nodes, uint32_t count) {
+static void check_partition(const char *name, const fct_tree *tree, uint32_t wanted, const uint32_t *labels,
+                            const uint32_t *nodes, uint32_t count) {
+    const fct_tree_view *view = &tree->view;
     uint32_t place = 0;
     for (uint32_t i = 0; i < count; ++i) {
         bool leaf = nodes[i] >= view->node_count;
-        uint32_t first = leaf ? nodes[i] - view->node_count : view->clusters[nodes[i]].first;
-        uint32_t faces = leaf ? 1 : view->clusters[nodes[i]].count;
+        uint32_t first = leaf ? nodes[i] - view->node_count : tree->nodes[nodes[i]].first;
+        uint32_t faces = leaf ? 1 : tree->nodes[nodes[i]].count;
         if (first != place)
             fail_msg("%s: of %u clusters, node %u begins at %u, not at %u", name, wanted, nodes[i], first,
                      place);
@@ -46,8 +49,8 @@ static void check_counts(const char *name, const fct_tree *tree) {
                                                     : count;
         assert_int_equal(fct_tree_partition(&env, tree, count, nodes, &written), FCT_OK);
         if (written != wanted) fail_msg("%s: %u clusters instead of %u", name, written, wanted);
-        apply_merges(&view, wanted, labels);
-        check_partition(name, &view, wanted, labels, nodes, written);
+        apply_merges(tree, wanted, labels);
+        check_partition(name, tree, wanted, labels, nodes, written);
     }
     free(labels), free(nodes);
 }
@@ -56,12 +59,12 @@ static void check_costs(const char *name, const fct_tree *tree) {
     fct_tree_view view = fct_tree_get(tree);
     for (uint32_t i = 0; i < view.node_count; ++i)
         for (int side = -1; side <= 1; ++side) {
-            float cost = view.clusters[i].cost;
+            float cost = tree->nodes[i].cost;
             double limit = (double)(side < 0   ? nextafterf(cost, -INFINITY)
                                     : side > 0 ? nextafterf(cost, INFINITY)
                                                : cost);
             uint32_t count = view.face_count;
-            for (uint32_t k = 0; k < view.node_count; ++k) count -= (double)view.clusters[k].cost <= limit;
+            for (uint32_t k = 0; k < view.node_count; ++k) count -= (double)tree->nodes[k].cost <= limit;
             uint32_t found = fct_tree_count_at_cost(tree, limit);
             if (found != count)
                 fail_msg("%s: %u clusters at a cost of %.9g, should be %u", name, found, limit, count);
@@ -84,14 +87,14 @@ static double measure_node(const fct_tree *tree, uint32_t node) {
 }
 
 /* The highest nodes within the distance, in order of places. Distances: per node; leaves always pass. */
-static uint32_t cut_below(const fct_tree_view *view, uint32_t node, const double *distances, double limit,
+static uint32_t cut_below(const fct_tree *tree, uint32_t node, const double *distances, double limit,
                           uint32_t *nodes, uint32_t count) {
-    if (node >= view->node_count || distances[node] <= limit) {
+    if (node >= tree->view.node_count || distances[node] <= limit) {
         nodes[count] = node;
         return count + 1;
     }
     for (int k = 0; k < 2; ++k)
-        count = cut_below(view, view->clusters[node].child[k], distances, limit, nodes, count);
+        count = cut_below(tree, tree->nodes[node].child[k], distances, limit, nodes, count);
     return count;
 }
 
@@ -107,7 +110,7 @@ static void check_distances(const char *name, const fct_tree *tree) {
             double limit = distances[i] * (1 + 1e-6 * side) + (side > 0 ? 1e-12 : 0), most = 0;
             uint32_t number = 0;
             for (uint32_t r = 0; r < view.root_count; ++r)
-                number = cut_below(&view, view.roots[r], distances, limit, wanted, number);
+                number = cut_below(tree, view.roots[r], distances, limit, wanted, number);
             for (uint32_t k = 0; k < number; ++k) most = fmax(most, distances[wanted[k]]);
             assert_int_equal(fct_tree_cut_at_distance(&env, tree, limit, nodes, &count, &largest), FCT_OK);
             if (count != number)
@@ -129,7 +132,7 @@ static void check_mesh_cuts(const char *name, const fct_mesh *mesh, uint32_t roo
     def.root_count = roots, def.max_cost = max_cost;
     assert_int_equal(fct_tree_build(&env, mesh, &def, NULL, &tree), FCT_OK);
     fct_tree_view view = fct_tree_get(tree);
-    for (uint32_t i = 0; i < view.node_count; ++i) assert_true((double)view.clusters[i].cost <= max_cost);
+    for (uint32_t i = 0; i < view.node_count; ++i) assert_true((double)tree->nodes[i].cost <= max_cost);
     assert_true(view.root_count == roots || (max_cost < INFINITY && view.root_count >= roots));
     check_counts(name, tree);
     check_costs(name, tree);
