@@ -3,6 +3,7 @@
 #define FCT_DUAL_LISTS_H
 
 #include "base/env.h"
+#include "base/variant.h"
 #include "facetree/dual.h"
 
 enum { FCT_LISTS_SLACK = 8 };
@@ -19,7 +20,10 @@ typedef struct fct_lists {
 
 /* As fct_dual_build, each edge once at either end; lengths and perimeters times `scale`. Errors: MEMORY,
  * CANCELLED; then *out is all zero. */
-fct_result fct_lists_build(const fct_env *env, const fct_mesh *mesh, double scale, fct_lists *out);
-void fct_lists_release(const fct_env *env, fct_lists *lists);
+#define fct_lists_build FCT_KERNEL(fct_lists_build)
+FCT_DECLARE_KERNEL(fct_result, fct_lists_build,
+                   (const fct_env *env, const fct_mesh *mesh, double scale, fct_lists *out));
+#define fct_lists_release FCT_KERNEL(fct_lists_release)
+FCT_DECLARE_KERNEL(void, fct_lists_release, (const fct_env *env, fct_lists *lists));
 
 #endif

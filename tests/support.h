@@ -13,7 +13,20 @@
 #include <cmocka.h>
 
 #include "base/env.h"
+#include "base/variant.h"
 #include "facetree/mesh.h"
+
+/* Exit code of a test that cannot run here: CTest shows it as skipped. */
+enum { SKIPPED = 77 };
+
+/* A test that includes base/math/simd.h is built once per variant. Its main calls this first. */
+static inline void skip_unless_variant_runs(void) {
+#ifdef FCT_VARIANT_AVX2
+    if (fct_use_avx2) return;
+    puts("skipped: avx2 is not in use");
+    exit(SKIPPED);
+#endif
+}
 
 /* Instrumented code is ten times slower: tests of figures skip their large cases. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

@@ -102,7 +102,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         t->code = print_overview();
         break;
     case 'V':
-        printf("facetree %s\n", fct_version());
+        printf("facetree %s (%s)\n", fct_version(), fct_simd_variant());
         t->code = fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
         break;
     case ARGP_KEY_ARG:
@@ -123,7 +123,15 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     return ECANCELED; /* argp has nothing more to do */
 }
 
+static void print_message(void *user, fct_severity severity, const char *text) {
+    (void)user, (void)severity;
+    fprintf(stderr, "facetree: %s\n", text);
+}
+
 int main(int argc, char **argv) {
+    fct_env env = fct_env_default();
+    env.message = print_message;
+    if (fct_simd_check(&env) != FCT_OK) return TOOL_USAGE;
     static const struct argp_option options[] = {
         {"help", 'h', NULL, 0, NULL, 0}, {"version", 'V', NULL, 0, NULL, 0}, {0}};
     const struct argp argp = {.options = options, .parser = parse};

@@ -10,6 +10,8 @@
  */
 #include "base/math/eigen.h"
 
+#include "base/math/simd_d8.h"
+
 /* Eight vectors. */
 typedef struct w3 {
     d8 x, y, z;

@@ -1,16 +1,20 @@
-/* base/math/simd.h: eight floats or four doubles at a time. The only file with intrinsics: AVX2 where the
- * compiler offers it, else (or with FCT_SCALAR) plain loops, which the compiler turns into whatever the
- * target has.
+/* base/math/simd.h: eight floats or four doubles at a time. The only file with intrinsics. The AVX2 variant
+ * of a kernel file uses them; the baseline uses plain loops, which the compiler turns into what the target
+ * has.
  *
- * Both forms round every operation on its own (no fused multiply-add) and treat NaN alike: min(a, b) is a < b
- * ? a : b, comparisons with NaN are false. So a kernel gives the same bits in both.
+ * Both forms round each operation separately (no fused multiply-add) and treat NaN alike: min(a, b) is
+ * a < b ? a : b, and a comparison with NaN is false. So both variants of a kernel give the same bits.
  */
 #ifndef FCT_BASE_SIMD_H
 #define FCT_BASE_SIMD_H
 
 #include <stdint.h>
 
-#if defined(__AVX2__) && !defined(FCT_SCALAR)
+#ifndef FCT_KERNEL_FILE
+#error "this file is not compiled as a kernel file: see base/variant.h, then run cmake again"
+#endif
+
+#ifdef FCT_VARIANT_AVX2
 #include <immintrin.h>
 
 typedef __m256d d4;

@@ -2,6 +2,7 @@
 #ifndef FCT_BVH_NEAREST_H
 #define FCT_BVH_NEAREST_H
 
+#include "base/variant.h"
 #include "bvh/model.h"
 
 typedef struct fct_near {
@@ -19,7 +20,9 @@ typedef struct fct_near {
  *
  * Returns false if no face is that near, if the point or max_distance is not a number, or for the Embree
  * backend, and then leaves *out unchanged. visits may be NULL. */
-bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
-                        fct_visits *visits);
+#define fct_nearest_search FCT_KERNEL(fct_nearest_search)
+FCT_DECLARE_KERNEL(bool, fct_nearest_search,
+                   (const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
+                    fct_visits *visits));
 
 #endif

@@ -2,11 +2,15 @@
 #ifndef FCT_BVH_TRAVERSE_H
 #define FCT_BVH_TRAVERSE_H
 
+#include "base/variant.h"
 #include "bvh/ray/ray.h"
 
 /* Return whether the ray hits. *hit is set in every case. visits may be NULL. */
-bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit,
-                          fct_visits *visits);
-bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits);
+#define fct_traverse_closest FCT_KERNEL(fct_traverse_closest)
+FCT_DECLARE_KERNEL(bool, fct_traverse_closest,
+                   (const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit, fct_visits *visits));
+#define fct_traverse_any FCT_KERNEL(fct_traverse_any)
+FCT_DECLARE_KERNEL(bool, fct_traverse_any,
+                   (const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits));
 
 #endif

@@ -8,6 +8,7 @@
 #define FCT_CLUSTER_METRIC_H
 
 #include "base/math/vec.h"
+#include "base/variant.h"
 #include "facetree/cluster.h"
 
 typedef struct fct_record {
@@ -35,7 +36,8 @@ typedef struct fct_metric {
 } fct_metric;
 
 /* Weights below zero in def become the defaults of its cost. */
-fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds);
+#define fct_metric_make FCT_KERNEL(fct_metric_make)
+FCT_DECLARE_KERNEL(fct_metric, fct_metric_make, (const fct_tree_def *def, const fct_bounds *bounds));
 
 /* Two clusters, by their records' numbers, and the border they share (unit model). */
 typedef struct fct_pair {
@@ -46,19 +48,27 @@ typedef struct fct_pair {
 enum { FCT_LANES = 8 }; /* pairs or triangles worked on at once */
 
 /* The records of count <= FCT_LANES triangles; perimeters in the unit model. */
-void fct_metric_faces(const fct_metric *metric, const float *positions, const uint32_t *triangles,
-                      const float *perimeters, uint32_t count, fct_record *records);
+#define fct_metric_faces FCT_KERNEL(fct_metric_faces)
+FCT_DECLARE_KERNEL(void, fct_metric_faces,
+                   (const fct_metric *metric, const float *positions, const uint32_t *triangles,
+                    const float *perimeters, uint32_t count, fct_record *records));
 /* What MEAN needs of one triangle besides. */
-void fct_metric_direction(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
-                          fct_direction *direction);
+#define fct_metric_direction FCT_KERNEL(fct_metric_direction)
+FCT_DECLARE_KERNEL(void, fct_metric_direction,
+                   (const fct_metric *metric, const float *positions, const uint32_t triangle[3],
+                    fct_direction *direction));
 
 /* Costs of merging count <= FCT_LANES pairs. The same for (a, b) as for (b, a) but for rounding. directions
  * only for MEAN. A NaN is never returned. */
-void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
-                      const fct_pair *pairs, uint32_t count, float *costs);
+#define fct_metric_costs FCT_KERNEL(fct_metric_costs)
+FCT_DECLARE_KERNEL(void, fct_metric_costs,
+                   (const fct_metric *metric, const fct_record *records, const fct_direction *directions,
+                    const fct_pair *pairs, uint32_t count, float *costs));
 
 /* In each of count <= FCT_LANES pairs of different clusters, a becomes the union. */
-void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direction *directions,
-                       const fct_pair *pairs, uint32_t count);
+#define fct_metric_merges FCT_KERNEL(fct_metric_merges)
+FCT_DECLARE_KERNEL(void, fct_metric_merges,
+                   (const fct_metric *metric, fct_record *records, fct_direction *directions,
+                    const fct_pair *pairs, uint32_t count));
 
 #endif

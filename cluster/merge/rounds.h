@@ -6,6 +6,7 @@
 
 #include <stdatomic.h>
 
+#include "base/variant.h"
 #include "cluster/merge/work.h"
 
 enum {
@@ -56,6 +57,8 @@ typedef struct fct_rounds {
 #define FCT_MERGED 0x80000000u
 
 /* Chunk body over the live clusters of `now`: writes the lists of their unions. */
-void fct_rounds_join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
+#define fct_rounds_join_lists FCT_KERNEL(fct_rounds_join_lists)
+FCT_DECLARE_KERNEL(void, fct_rounds_join_lists,
+                   (void *user, size_t begin, size_t end, size_t chunk, uint32_t thread));
 
 #endif

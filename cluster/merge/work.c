@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#include "base/math/simd.h"
 #include "base/parallel.h"
+#include "cluster/merge/bound.h"
 
 enum { GRAIN = 1 << 13 };
 
@@ -23,23 +23,7 @@ uint32_t fct_height_limit(uint32_t count, bool mild) {
 static void bound_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     face_job *job = user;
-    d4 lower[3], upper[3], points[3];
-    for (int k = 0; k < 3; ++k) lower[k] = d4_set(INFINITY), upper[k] = d4_set(-INFINITY);
-    for (size_t corner = 3 * begin, last = 3 * end - 1; corner <= last; corner += 4) {
-        const float *p[4];
-        for (size_t i = 0; i < 4; ++i)
-            p[i] = job->mesh->positions +
-                   3 * (size_t)job->mesh->triangles[corner + i < last ? corner + i : last];
-        d4_load_points(p, points);
-        for (int k = 0; k < 3; ++k)
-            lower[k] = d4_min(lower[k], points[k]), upper[k] = d4_max(upper[k], points[k]);
-    }
-    for (int k = 0; k < 3; ++k) {
-        float low[4], high[4];
-        d4_store_floats(low, lower[k]), d4_store_floats(high, upper[k]);
-        job->bounds[chunk].lower[k] = fminf(fminf(low[0], low[1]), fminf(low[2], low[3]));
-        job->bounds[chunk].upper[k] = fmaxf(fmaxf(high[0], high[1]), fmaxf(high[2], high[3]));
-    }
+    fct_bound_faces(job->mesh, begin, end, &job->bounds[chunk]);
 }
 
 /* Of the vertices that faces use. */

@@ -8,6 +8,7 @@
 #define FCT_CLUSTER_WORK_H
 
 #include "base/env.h"
+#include "base/variant.h"
 #include "cluster/merge/metric.h"
 #include "dual/lists.h"
 
@@ -83,11 +84,13 @@ fct_result fct_work_list_edges(fct_work *work);
 fct_result fct_work_greedy(fct_work *work, bool across);
 /* The same, but merging all mutually cheapest pairs at once as long as that pays. Errors: MEMORY, CANCELLED.
  */
-fct_result fct_work_rounds(fct_work *work, bool across);
+#define fct_work_rounds FCT_KERNEL(fct_work_rounds)
+FCT_DECLARE_KERNEL(fct_result, fct_work_rounds, (fct_work * work, bool across));
 /* Hangs clusters that edges still lead to, but heights forbid to merge, into their neighbours' trees; see
  * graft.c. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh);
 /* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
-fct_result fct_work_join(fct_work *work, const fct_mesh *mesh);
+#define fct_work_join FCT_KERNEL(fct_work_join)
+FCT_DECLARE_KERNEL(fct_result, fct_work_join, (fct_work * work, const fct_mesh *mesh));
 
 #endif

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "base/math/eigen.h"
+#include "base/math/simd_d8.h"
 #include "cluster/shape/cone.h"
 
 enum {

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "base/variant.h"
 #include "cluster/shape/sums.h"
 #include "facetree/cluster.h"
 
@@ -32,16 +33,22 @@ typedef struct fct_octet_normals {
 } fct_octet_normals;
 
 /* Area, moment, centroid, plane and frame. */
-void fct_octet_sum(fct_octet *octet, const fct_sums *const sums[8]);
+#define fct_octet_sum FCT_KERNEL(fct_octet_sum)
+FCT_DECLARE_KERNEL(void, fct_octet_sum, (fct_octet * octet, const fct_sums *const sums[8]));
 /* The cone, after the sums. */
-void fct_octet_cone(fct_octet *octet, const fct_octet_normals *normals);
+#define fct_octet_cone FCT_KERNEL(fct_octet_cone)
+FCT_DECLARE_KERNEL(void, fct_octet_cone, (fct_octet * octet, const fct_octet_normals *normals));
 /* The rotation of the frame, which is turned about its normal so that the box of at most 64 of the points has
  * the least area. */
-void fct_octet_turn(fct_octet *octet, const fct_octet_row *points, uint32_t count);
+#define fct_octet_turn FCT_KERNEL(fct_octet_turn)
+FCT_DECLARE_KERNEL(void, fct_octet_turn, (fct_octet * octet, const fct_octet_row *points, uint32_t count));
 /* The box for the rotation. Where it would leave the range of a float it is that of the world's axes. */
-void fct_octet_fit(fct_octet *octet, const fct_octet_row *points, uint32_t count);
+#define fct_octet_fit FCT_KERNEL(fct_octet_fit)
+FCT_DECLARE_KERNEL(void, fct_octet_fit, (fct_octet * octet, const fct_octet_row *points, uint32_t count));
 /* Writes the words of a lane. */
-void fct_octet_store(const fct_octet *octet, uint32_t lane, fct_cluster *out);
-void fct_octet_store_all(const fct_octet *octet, fct_cluster *const out[8]);
+#define fct_octet_store FCT_KERNEL(fct_octet_store)
+FCT_DECLARE_KERNEL(void, fct_octet_store, (const fct_octet *octet, uint32_t lane, fct_cluster *out));
+#define fct_octet_store_all FCT_KERNEL(fct_octet_store_all)
+FCT_DECLARE_KERNEL(void, fct_octet_store_all, (const fct_octet *octet, fct_cluster *const out[8]));
 
 #endif

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "base/math/vec.h"
+#include "base/variant.h"
 
 /* Centre and covariance about it by `weight`. Twenty doubles, which four clusters' sums are turned on their
  * side by. */
@@ -15,8 +16,12 @@ typedef struct fct_sums {
 
 /* Of four triangles, whose corners are rows of four floats, x y z and one more; their unit normals too, in
  * such rows: NaN where a triangle has no area. */
-void fct_sums_four(const float *const corners[3][4], fct_sums *out, float (*normals)[4]);
-void fct_sums_face(const float *positions, const uint32_t triangle[3], fct_sums *out);
-void fct_sums_join(const fct_sums *a, const fct_sums *b, fct_sums *out);
+#define fct_sums_four FCT_KERNEL(fct_sums_four)
+FCT_DECLARE_KERNEL(void, fct_sums_four,
+                   (const float *const corners[3][4], fct_sums *out, float (*normals)[4]));
+#define fct_sums_face FCT_KERNEL(fct_sums_face)
+FCT_DECLARE_KERNEL(void, fct_sums_face, (const float *positions, const uint32_t triangle[3], fct_sums *out));
+#define fct_sums_join FCT_KERNEL(fct_sums_join)
+FCT_DECLARE_KERNEL(void, fct_sums_join, (const fct_sums *a, const fct_sums *b, fct_sums *out));
 
 #endif

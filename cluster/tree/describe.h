@@ -2,6 +2,7 @@
 #ifndef FCT_CLUSTER_DESCRIBE_H
 #define FCT_CLUSTER_DESCRIBE_H
 
+#include "base/variant.h"
 #include "cluster/shape/octet.h"
 #include "cluster/tree/tree.h"
 
@@ -37,14 +38,19 @@ typedef struct fct_outline {
 } fct_outline;
 
 /* How many vertices are used by faces before a place; they are the first of the tree's order. */
-uint32_t fct_vertices_before(const fct_tree *tree, const fct_outline *outline, size_t place);
+#define fct_vertices_before FCT_KERNEL(fct_vertices_before)
+FCT_DECLARE_KERNEL(uint32_t, fct_vertices_before,
+                   (const fct_tree *tree, const fct_outline *outline, size_t place));
 
 /* One cluster alone, which is in all lanes of the rows: all but cost and links. The normals are rows of four
  * floats. */
-void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
-                         uint32_t normal_count, const fct_sums *sums, fct_cluster *out);
+#define fct_points_describe FCT_KERNEL(fct_points_describe)
+FCT_DECLARE_KERNEL(void, fct_points_describe,
+                   (const fct_octet_row *points, uint32_t point_count, const float *normals,
+                    uint32_t normal_count, const fct_sums *sums, fct_cluster *out));
 
 /* Describes the upper clusters of a tree whose blocks are done. Errors: MEMORY, CANCELLED. */
-fct_result fct_tree_describe_upper(fct_tree *tree, fct_outline *outline);
+#define fct_tree_describe_upper FCT_KERNEL(fct_tree_describe_upper)
+FCT_DECLARE_KERNEL(fct_result, fct_tree_describe_upper, (fct_tree * tree, fct_outline *outline));
 
 #endif

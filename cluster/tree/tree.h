@@ -6,6 +6,7 @@
 
 #include "base/env.h"
 #include "base/io/file.h"
+#include "base/variant.h"
 #include "cluster/merge/work.h"
 
 /* What an inner node's record will hold of other nodes, between ordering and description. */
@@ -53,7 +54,8 @@ fct_result fct_tree_check_def(const fct_env *env, const fct_tree_def *def);
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree);
 
 /* Writes the records of all inner nodes; the links are released. Errors: MEMORY, CANCELLED. */
-fct_result fct_tree_describe(fct_tree *tree);
+#define fct_tree_describe FCT_KERNEL(fct_tree_describe)
+FCT_DECLARE_KERNEL(fct_result, fct_tree_describe, (fct_tree * tree));
 /* A node's links and cost into its record. */
 static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *out) {
     out->cost = link->cost;
@@ -62,7 +64,9 @@ static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *o
 }
 
 /* The record of the leaf at a place. */
-void fct_cluster_describe_leaf(const fct_tree_view *view, uint32_t place, fct_cluster *out);
+#define fct_cluster_describe_leaf FCT_KERNEL(fct_cluster_describe_leaf)
+FCT_DECLARE_KERNEL(void, fct_cluster_describe_leaf,
+                   (const fct_tree_view *view, uint32_t place, fct_cluster *out));
 
 /* Largest and mean depth of the leaves, from the children links. Errors: MEMORY. */
 fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean);

@@ -66,6 +66,14 @@ FCT_API fct_env fct_env_default(void);
 /* "major.minor.patch" of the library that is linked. */
 FCT_API const char *fct_version(void);
 
+/* The SIMD variant in use: "baseline" or "avx2". The library chooses it when it is loaded: AVX2 if the
+ * processor supports it. The environment variable FACETREE_SIMD forces one of the two. Results do not depend
+ * on it. */
+FCT_API const char *fct_simd_variant(void);
+/* Checks FACETREE_SIMD. Errors: DATA for an unknown value or for a variant that the processor does not
+ * support; the library then uses the best variant that the processor supports. */
+FCT_API fct_result fct_simd_check(const fct_env *env);
+
 /* An axis-aligned box; empty when lower > upper in any coordinate. */
 typedef struct fct_bounds {
     float lower[3], upper[3];

@@ -3,6 +3,7 @@
 #include "support.h"
 
 #include "base/math/eigen.h"
+#include "base/math/simd_d8.h"
 
 static double next(uint64_t *state) {
     *state = *state * 6364136223846793005u + 1442695040888963407u;
@@ -163,6 +164,7 @@ static void eight_are_each_as_one(void **state) {
 }
 
 int main(void) {
+    skip_unless_variant_runs();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_matrices),       cmocka_unit_test(special_spectra),
         cmocka_unit_test(huge_and_tiny),         cmocka_unit_test(nearly_diagonal),

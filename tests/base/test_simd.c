@@ -181,6 +181,7 @@ static void double_fours(void **state) {
 }
 
 int main(void) {
+    skip_unless_variant_runs();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(floats),       cmocka_unit_test(transposing),  cmocka_unit_test(small_matrices),
         cmocka_unit_test(some_lanes),   cmocka_unit_test(integers),     cmocka_unit_test(choosing),

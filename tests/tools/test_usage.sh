@@ -3,7 +3,7 @@ source "$(dirname "$0")/support.sh"
 commands="bake boxes closest cluster compare info make partition raycast render simplify"
 
 expect 0 --version
-check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+$' out
+check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+ \((baseline|avx2)\)$' out
 expect 0 --help
 for command in $commands; do check "--help lists $command" grep -q "^  $command " out; done
 expect 0 help
