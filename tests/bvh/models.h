@@ -74,6 +74,22 @@ static inline void face_corners(const fct_mesh *mesh, uint32_t face, v3 p[3]) {
     for (int c = 0; c < 3; ++c) p[c] = v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * face + c]);
 }
 
+/* The nearest point of a triangle by cases: its plane inside, else the nearest of its sides. */
+static inline v3 plain_closest(v3 p, const v3 t[3]) {
+    v3 best = t[0], e = v3_sub(t[1], t[0]), f = v3_sub(t[2], t[0]), r = v3_sub(p, t[0]);
+    double ee = v3_dot(e, e), ef = v3_dot(e, f), ff = v3_dot(f, f), det = ee * ff - ef * ef;
+    double u = (ff * v3_dot(e, r) - ef * v3_dot(f, r)) / det,
+           v = (ee * v3_dot(f, r) - ef * v3_dot(e, r)) / det;
+    if (det > 1e-12 * ee * ff && u > 0 && v > 0 && u + v < 1) return v3_mad(v3_mad(t[0], u, e), v, f);
+    for (int i = 0; i < 3; ++i) {
+        v3 a = t[i], side = v3_sub(t[(i + 1) % 3], a);
+        double length2 = v3_dot(side, side), s = length2 > 0 ? v3_dot(v3_sub(p, a), side) / length2 : 0;
+        v3 q = v3_mad(a, fmin(fmax(s, 0), 1), side);
+        if (v3_norm(v3_sub(q, p)) < v3_norm(v3_sub(best, p))) best = q;
+    }
+    return best;
+}
+
 static inline fct_ray make_ray(v3 origin, v3 direction, double t_min, double t_max) {
     fct_ray ray = {.t_min = (float)t_min, .t_max = (float)t_max};
     v3_store(ray.origin, origin);

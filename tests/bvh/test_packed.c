@@ -1,0 +1,294 @@
+/* The packed structure against the mesh: scale, leaves, boxes and their padding, kinds of nodes, splits. */
+#include "packed.h"
+
+#include "bvh/build/top.h"
+
+/* The documented padding of axis and oriented boxes: 64 and 256 times u = 2^-24. */
+#define U ldexp(1, -24)
+
+static v3 scaled_corner(const fct_bvh *bvh, uint32_t place, uint32_t c) {
+    const fct_tree_view *view = &bvh->view;
+    return v3_scale(v3_load(view->positions + 3 * (size_t)view->triangles[3 * (size_t)place + c]),
+                    bvh->scale);
+}
+
+/* Widens the values that each row takes over the vertices of all leaves below `ref`. */
+static void span_rows(const fct_bvh *bvh, uint32_t ref, const plain_box *box, double low[3], double high[3]) {
+    if (!is_leaf(ref)) {
+        for (uint32_t i = 0; i < child_count(bvh, ref); ++i)
+            span_rows(bvh, child_of(bvh, ref, i), box, low, high);
+        return;
+    }
+    const fct_leaf *leaf = fct_bvh_leaf(bvh, ref);
+    for (uint32_t t = leaf->first; t < leaf->first + leaf->count; ++t)
+        for (uint32_t c = 0; c < 3; ++c) {
+            v3 p = scaled_corner(bvh, t, c);
+            for (int k = 0; k < 3; ++k) {
+                double at = v3_dot(box->row[k], p) + box->offset[k];
+                low[k] = fmin(low[k], at), high[k] = fmax(high[k], at);
+            }
+        }
+}
+
+typedef struct tally {
+    uint32_t axis, oriented, leaves, small_nodes;
+} tally;
+
+/* Each side of each box stands off the outermost vertex by the padding, no less and hardly more. */
+static void check_boxes(const fct_bvh *bvh, uint32_t ref, tally *found) {
+    if (is_leaf(ref)) {
+        ++found->leaves;
+        return;
+    }
+    *(is_oriented(ref) ? &found->oriented : &found->axis) += 1;
+    uint32_t count = child_count(bvh, ref);
+    bool inner = false;
+    assert_true(count >= 2 && count <= 8);
+    for (uint32_t i = 0; i < count; ++i) {
+        plain_box box = box_of(bvh, ref, i);
+        double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+        uint32_t child = child_of(bvh, ref, i);
+        span_rows(bvh, child, &box, low, high);
+        double pad = is_oriented(ref) ? 256 * U : 64 * U, slack = is_oriented(ref) ? 40 * U : 4 * U;
+        for (int k = 0; k < 3; ++k) {
+            double half = 1 / v3_norm(box.row[k]);
+            double below = (low[k] + 1) * half, above = (1 - high[k]) * half;
+            assert_true(below > pad - slack && below < pad + slack);
+            assert_true(above > pad - slack && above < pad + slack);
+            v3 next = box.row[(k + 1) % 3];
+            assert_true(fabs(v3_dot(box.row[k], next)) < 1e-5 * v3_norm(box.row[k]) * v3_norm(next));
+        }
+        inner = inner || !is_leaf(child);
+        check_boxes(bvh, child, found);
+    }
+    /* A node with room for more children has none that could be opened. */
+    if (count < 8) {
+        ++found->small_nodes;
+        assert_false(inner);
+    }
+}
+
+/* Exact: products of differences of floats fit into a long double's 64 bits for such coordinates. */
+static bool has_no_area(const fct_bvh *bvh, uint32_t place) {
+    v3 a = scaled_corner(bvh, place, 0), b = scaled_corner(bvh, place, 1), c = scaled_corner(bvh, place, 2);
+    v3 e = v3_sub(b, a), f = v3_sub(c, a);
+    return (long double)e.x * (long double)f.y == (long double)e.y * (long double)f.x &&
+           (long double)e.y * (long double)f.z == (long double)e.z * (long double)f.y &&
+           (long double)e.z * (long double)f.x == (long double)e.x * (long double)f.z;
+}
+
+static uint32_t distinct_vertices(const fct_tree_view *view, uint32_t first, uint32_t count) {
+    uint32_t distinct = 0;
+    for (uint32_t i = 3 * first; i < 3 * (first + count); ++i) {
+        uint32_t j = 3 * first;
+        while (view->triangles[j] != view->triangles[i]) ++j;
+        distinct += j == i;
+    }
+    return distinct;
+}
+
+static fct_cluster cluster_of(const fct_bvh *bvh, uint32_t node) {
+    fct_cluster cluster;
+    assert_int_equal(fct_tree_cluster(bvh->tree, node, &cluster), FCT_OK);
+    return cluster;
+}
+
+/* Marks the faces of each leaf, and compares its packed corners with the mesh. */
+static void check_leaves(const fct_bvh *bvh, uint32_t ref, unsigned char *seen) {
+    if (!is_leaf(ref)) {
+        for (uint32_t i = 0; i < child_count(bvh, ref); ++i) check_leaves(bvh, child_of(bvh, ref, i), seen);
+        return;
+    }
+    const fct_leaf *leaf = fct_bvh_leaf(bvh, ref);
+    uint32_t vertices = distinct_vertices(&bvh->view, leaf->first, leaf->count);
+    assert_true(leaf->count >= 1 && leaf->count <= 16 && vertices <= 16);
+    assert_int_equal(leaf->vertex_octets, vertices > 8 ? 2 : 1);
+    for (uint32_t i = 0; i < leaf->count; ++i) {
+        v3 p[3];
+        fct_leaf_triangle(leaf, i, p);
+        assert_int_equal(seen[leaf->first + i]++, 0);
+        assert_int_equal(leaf->mask >> i & 1, !has_no_area(bvh, leaf->first + i));
+        for (uint32_t c = 0; c < 3; ++c)
+            assert_true(v3_norm(v3_sub(p[c], scaled_corner(bvh, leaf->first + i, c))) == 0);
+    }
+    assert_int_equal(leaf->mask >> leaf->count, 0);
+    /* The smallest cluster that holds more than this leaf does not fit one. */
+    const fct_tree_view *view = &bvh->view;
+    fct_cluster smallest = {.count = UINT32_MAX};
+    for (uint32_t n = 0; n < view->node_count; ++n) {
+        fct_cluster c = cluster_of(bvh, n);
+        bool holds = c.first <= leaf->first && c.first + c.count >= leaf->first + leaf->count;
+        if (holds && c.count > leaf->count && c.count < smallest.count) smallest = c;
+    }
+    if (smallest.count == UINT32_MAX) return;
+    assert_true(smallest.count > 16 || distinct_vertices(view, smallest.first, smallest.count) > 16);
+}
+
+/* Half the surface of the oriented box in the axes of the leaf's cluster, or of its axis box if that is
+ * smaller, with padding. */
+static double leaf_area(const fct_bvh *bvh, uint32_t ref, bool oriented) {
+    const fct_leaf *leaf = fct_bvh_leaf(bvh, ref);
+    const fct_tree_view *view = &bvh->view;
+    fct_cluster cluster = cluster_of(bvh, view->node_count + leaf->first);
+    fct_box fitted;
+    for (uint32_t n = 0; n < view->node_count && leaf->count > 1; ++n) {
+        fct_cluster c = cluster_of(bvh, n);
+        if (c.first == leaf->first && c.count == leaf->count) cluster = c;
+    }
+    fct_cluster_box(&cluster, &fitted);
+    double best = INFINITY, pad = 2 * (oriented ? 256 * U : 64 * U);
+    for (int turned = 0; turned < 1 + oriented; ++turned) {
+        plain_box box = {.offset = {0, 0, 0}};
+        double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (int k = 0; k < 3; ++k)
+            box.row[k] = turned ? v3_load(fitted.axes[k]) : v3_make(k == 0, k == 1, k == 2);
+        span_rows(bvh, ref, &box, low, high);
+        double x = high[0] - low[0] + pad, y = high[1] - low[1] + pad, z = high[2] - low[2] + pad;
+        best = fmin(best, x * y + y * z + z * x);
+    }
+    return best;
+}
+
+/* A node is oriented exactly if its oriented boxes have less than .75 of the area of its axis boxes. Checked
+ * where all children are leaves, because their axes are known. */
+static void check_kinds(const fct_bvh *bvh, uint32_t ref, uint32_t checked[2]) {
+    if (is_leaf(ref)) return;
+    double axis = 0, oriented = 0;
+    bool bottom = true;
+    for (uint32_t i = 0; i < child_count(bvh, ref); ++i) {
+        uint32_t child = child_of(bvh, ref, i);
+        check_kinds(bvh, child, checked);
+        if (!is_leaf(child)) {
+            bottom = false;
+            continue;
+        }
+        axis += leaf_area(bvh, child, false), oriented += leaf_area(bvh, child, true);
+    }
+    if (!bottom || fabs(oriented / axis - .75) < 1e-3) return;
+    assert_int_equal(is_oriented(ref), oriented < .75 * axis);
+    ++checked[is_oriented(ref)];
+}
+
+static void check_packed(const fct_env *env, fct_mesh mesh, bool must_orient) {
+    model m = model_make(env, mesh, FCT_BACKEND_OBB);
+    const fct_bvh *bvh = m.bvh;
+    tally found = {0};
+    uint32_t checked[2] = {0, 0};
+    unsigned char *seen = calloc(mesh.face_count, 1);
+    double largest = 0;
+    fct_bounds b = fct_bvh_bounds(bvh);
+    for (int k = 0; k < 3; ++k) {
+        double low = INFINITY, high = -INFINITY;
+        for (uint32_t i = 0; i < 3 * mesh.face_count; ++i) {
+            double x = mesh.positions[3 * (size_t)mesh.triangles[i] + (size_t)k];
+            low = fmin(low, x), high = fmax(high, x);
+        }
+        assert_true(b.lower[k] == low && b.upper[k] == high);
+        largest = fmax(largest, bvh->scale * (high - low) / 2);
+        assert_true(fabs(bvh->center[k] - bvh->scale * (low + high) / 2) <= 1e-7);
+        /* Rays from afar enter here: beyond every padded box, and within their reach. */
+        assert_true(bvh->lower[k] < bvh->scale * low - 512 * U && bvh->lower[k] > bvh->scale * low - .02);
+        assert_true(bvh->upper[k] > bvh->scale * high + 512 * U && bvh->upper[k] < bvh->scale * high + .02);
+    }
+    assert_true(largest >= .5 && largest < 1);
+    assert_true(frexp(bvh->scale, &(int){0}) == .5);
+    check_boxes(bvh, bvh->root, &found);
+    check_leaves(bvh, bvh->root, seen);
+    check_kinds(bvh, bvh->root, checked);
+    for (uint32_t f = 0; f < mesh.face_count; ++f) assert_int_equal(seen[f], 1);
+    assert_true(found.leaves > 20 && found.axis + found.oriented > 4);
+    assert_true(must_orient ? checked[1] > 10 : checked[0] > 3);
+    free(seen);
+    model_release(env, &m);
+}
+
+static void boxes_hold_their_vertices_with_the_documented_padding(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    check_packed(&env, make_pebble(&env, 16, 4), false);
+    check_packed(&env, make_soup(&env, 900, 2), false);
+    check_packed(&env, make_grid(&env, 20), false);
+    check_packed(&env, make_bars(&env, 30, 6), true);
+}
+
+/* ---- The binary top over leaves ---- */
+
+static double area_of(const float *b) {
+    double x = (double)b[3] - (double)b[0], y = (double)b[4] - (double)b[1], z = (double)b[5] - (double)b[2];
+    return x * y + y * z + z * x;
+}
+
+static void join_bounds(float *to, const float *from) {
+    for (int k = 0; k < 3; ++k) to[k] = fminf(to[k], from[k]), to[3 + k] = fmaxf(to[3 + k], from[3 + k]);
+}
+
+/* Area times count on both sides of every plane between 16 equal bins of each axis: the least. */
+static double best_binned_cost(const float *bounds, const uint32_t *order, uint32_t begin, uint32_t end) {
+    double best = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+        double low = INFINITY, high = -INFINITY;
+        for (uint32_t i = begin; i < end; ++i) {
+            const float *b = bounds + 6 * (size_t)order[i];
+            double center = (double)b[axis] + (double)b[3 + axis];
+            low = fmin(low, center), high = fmax(high, center);
+        }
+        for (int plane = 1; plane < 16 && high > low; ++plane) {
+            float side[2][6];
+            uint32_t count[2] = {0, 0};
+            for (uint32_t i = begin; i < end; ++i) {
+                const float *b = bounds + 6 * (size_t)order[i];
+                int right = ((double)b[axis] + (double)b[3 + axis] - low) / (high - low) * 16 >= plane;
+                if (count[right]++)
+                    join_bounds(side[right], b);
+                else
+                    memcpy(side[right], b, sizeof side[right]);
+            }
+            if (!count[0] || !count[1]) continue;
+            best = fmin(best, area_of(side[0]) * count[0] + area_of(side[1]) * count[1]);
+        }
+    }
+    return best;
+}
+
+static void splits_of_the_top_have_the_least_binned_cost(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    enum { COUNT = 500 };
+    float bounds[6 * COUNT];
+    uint64_t seed = 12;
+    for (uint32_t i = 0; i < COUNT; ++i)
+        for (int k = 0; k < 3; ++k) {
+            double at = random_unit(&seed) * (k + 1), size = .2 * random_unit(&seed) * random_unit(&seed);
+            bounds[6 * i + (uint32_t)k] = (float)at, bounds[6 * i + 3 + (uint32_t)k] = (float)(at + size);
+        }
+    fct_leaf_list leaves = {.count = COUNT, .bounds = bounds};
+    fct_top top;
+    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    assert_int_equal(top.node_count, 2 * COUNT - 1);
+    for (uint32_t n = 0; n < top.node_count; ++n) {
+        const fct_top_node *node = top.nodes + n;
+        float all[6];
+        memcpy(all, bounds + 6 * top.order[node->begin], sizeof all);
+        for (uint32_t i = node->begin; i < node->end; ++i) join_bounds(all, bounds + 6 * top.order[i]);
+        assert_memory_equal(all, node->bounds, sizeof all);
+        if (node->left == FCT_NONE) {
+            assert_int_equal(node->end, node->begin + 1);
+            continue;
+        }
+        const fct_top_node *left = top.nodes + node->left, *right = top.nodes + node->right;
+        assert_true(left->begin == node->begin && left->end == right->begin && right->end == node->end);
+        if (node->end - node->begin == 2) continue;
+        double cost = area_of(left->bounds) * (left->end - left->begin) +
+                      area_of(right->bounds) * (right->end - right->begin);
+        assert_true(cost <= best_binned_cost(bounds, top.order, node->begin, node->end) * (1 + 1e-5));
+    }
+    fct_top_release(&env, &top);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(boxes_hold_their_vertices_with_the_documented_padding),
+        cmocka_unit_test(splits_of_the_top_have_the_least_binned_cost),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
