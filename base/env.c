@@ -72,10 +72,10 @@ fct_result fct_allocate_all(const fct_env *env, const fct_array *arrays, size_t 
     for (size_t i = 0; i < count; ++i) {
         const fct_array *a = arrays + i;
         void *memory = NULL;
-        if (complete)
+        if (complete && !a->absent)
             memory =
                 a->zero ? fct_allocate_zero(env, a->count, a->size) : fct_allocate(env, a->count, a->size);
-        complete = complete && memory;
+        complete = complete && (memory || a->absent);
         set_pointer(a, memory);
     }
     if (complete) return FCT_OK;

@@ -11,16 +11,19 @@ void *fct_allocate_zero(const fct_env *env, size_t count, size_t size);
 /* NULL is allowed. */
 void fct_release(const fct_env *env, void *memory);
 
-/* One array of a group: where its pointer is stored, its length, and the size of an element. */
+/* One array of a group: where its pointer is stored, its length, and the size of an element. An absent array
+ * gets the pointer NULL. */
 typedef struct fct_array {
     void *pointer; /* address of the pointer */
     size_t count, size;
-    bool zero;
+    bool zero, absent;
 } fct_array;
 #define FCT_ARRAY(pointer, count)                                                                            \
-    { &(pointer), (count), sizeof *(pointer), false }
+    { &(pointer), (count), sizeof *(pointer), false, false }
 #define FCT_ARRAY_ZERO(pointer, count)                                                                       \
-    { &(pointer), (count), sizeof *(pointer), true }
+    { &(pointer), (count), sizeof *(pointer), true, false }
+#define FCT_ARRAY_IF(wanted, pointer, count)                                                                 \
+    { &(pointer), (count), sizeof *(pointer), false, !(wanted) }
 #define FCT_LENGTH(array) (sizeof(array) / sizeof *(array))
 
 /* Allocates all arrays of the table. On failure it releases them, sets every pointer to NULL and fails with

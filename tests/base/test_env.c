@@ -69,16 +69,17 @@ static void groups_are_allocated_whole_or_not_at_all(void **state) {
         fct_env env = recorder_env(&r);
         double *numbers;
         uint8_t *flags;
-        uint32_t(*pairs)[2];
+        uint32_t(*pairs)[2], *none;
         const fct_array arrays[] = {FCT_ARRAY(numbers, 100), FCT_ARRAY_ZERO(flags, 1000),
-                                    FCT_ARRAY(pairs, 7)};
+                                    FCT_ARRAY_IF(true, pairs, 7), FCT_ARRAY_IF(false, none, 7)};
         assert_int_equal(fct_allocate_all(&env, arrays, FCT_LENGTH(arrays), "a group"),
                          fail_at ? FCT_ERROR_MEMORY : FCT_OK);
         assert_int_equal(r.alive, fail_at ? 0 : 3);
         if (fail_at) {
-            assert_true(!numbers && !flags && !pairs);
+            assert_true(!numbers && !flags && !pairs && !none);
             assert_string_equal(r.text, "out of memory for a group");
         } else {
+            assert_null(none);
             memset(numbers, 0xAB, 100 * sizeof *numbers); /* a sanitizer sees when it is short */
             memset(pairs, 0xAB, 7 * sizeof *pairs);
             for (int i = 0; i < 1000; ++i) assert_int_equal(flags[i], 0);
