@@ -140,14 +140,12 @@ static fct_result renumber(grafter *g) {
     fct_work *work = g->work;
     const fct_env *env = work->env;
     uint32_t faces = work->face_count, count = work->merge_count, next = count, top = 0;
-    uint32_t(*children)[2] = fct_allocate(env, faces, sizeof *children);
-    float *costs = fct_allocate(env, faces, sizeof *costs);
+    uint32_t(*children)[2];
+    float *costs;
+    const fct_array arrays[] = {FCT_ARRAY(children, faces), FCT_ARRAY(costs, faces)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
+    if (result != FCT_OK) return result;
     uint32_t *numbers = g->parents; /* of merges: the new number, by the old */
-    if (!children || !costs) {
-        fct_release(env, children);
-        fct_release(env, costs);
-        return fct_fail_memory(env, "clustering");
-    }
     for (uint32_t s = 0; s < faces; ++s) {
         if (work->nodes[s] == FCT_NONE || work->nodes[s] < faces) continue;
         g->stack[top++] = work->nodes[s] - faces;
@@ -222,25 +220,15 @@ fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh) {
     const fct_env *env = work->env;
     size_t faces = work->face_count, live = faces - work->merge_count;
     grafter g = {.work = work};
-    g.parents = fct_allocate(env, 2 * faces, sizeof *g.parents);
-    g.slots = fct_allocate(env, 2 * faces, sizeof *g.slots);
-    g.heights = fct_allocate(env, 2 * faces, sizeof *g.heights);
-    g.starts = fct_allocate(env, faces + 2, sizeof *g.starts);
-    g.stack = fct_allocate(env, faces, sizeof *g.stack);
-    uint64_t *keys = fct_allocate(env, live, sizeof *keys);
-    uint32_t *order = fct_allocate(env, live, sizeof *order);
-    fct_result result;
-    if (!g.parents || !g.slots || !g.heights || !g.starts || !g.stack || !keys || !order)
-        result = fct_fail_memory(env, "clustering");
-    else
-        result = run(&g, mesh, keys, order);
-    fct_release(env, g.parents);
-    fct_release(env, g.slots);
-    fct_release(env, g.heights);
-    fct_release(env, g.starts);
+    uint64_t *keys;
+    uint32_t *order;
+    const fct_array arrays[] = {FCT_ARRAY(g.parents, 2 * faces), FCT_ARRAY(g.slots, 2 * faces),
+                                FCT_ARRAY(g.heights, 2 * faces), FCT_ARRAY(g.starts, faces + 2),
+                                FCT_ARRAY(g.stack, faces),       FCT_ARRAY(keys, live),
+                                FCT_ARRAY(order, live)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
+    if (result == FCT_OK) result = run(&g, mesh, keys, order);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     fct_release(env, g.neighbors);
-    fct_release(env, g.stack);
-    fct_release(env, keys);
-    fct_release(env, order);
     return result;
 }

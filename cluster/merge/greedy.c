@@ -159,23 +159,15 @@ fct_result fct_work_greedy(fct_work *work, bool across) {
     if (result != FCT_OK || work->edge_count == 0) return result;
     if (work->edge_count >= UINT32_MAX / 2) return fct_fail_memory(env, "so many dual edges");
     greedy g = {.work = work, .edges = work->edges, .across = across};
-    g.costs = fct_allocate(env, work->edge_count, sizeof *g.costs);
-    g.next = fct_allocate(env, work->edge_count, sizeof *g.next);
-    g.heads = fct_allocate(env, work->face_count, sizeof *g.heads);
-    g.seen = fct_allocate(env, work->face_count, sizeof *g.seen);
-    result = fct_heap_create(env, work->edge_count, &g.heap);
+    const fct_array arrays[] = {FCT_ARRAY(g.costs, work->edge_count), FCT_ARRAY(g.next, work->edge_count),
+                                FCT_ARRAY(g.heads, work->face_count), FCT_ARRAY(g.seen, work->face_count)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
+    if (result == FCT_OK) result = fct_heap_create(env, work->edge_count, &g.heap);
     if (result == FCT_OK) {
-        if (!g.costs || !g.next || !g.heads || !g.seen) {
-            result = fct_fail_memory(env, "clustering");
-        } else {
-            link_edges(&g);
-            result = run(&g);
-        }
+        link_edges(&g);
+        result = run(&g);
     }
     fct_heap_release(env, &g.heap);
-    fct_release(env, g.costs);
-    fct_release(env, g.next);
-    fct_release(env, g.heads);
-    fct_release(env, g.seen);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }

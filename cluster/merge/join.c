@@ -404,21 +404,12 @@ fct_result fct_work_join(fct_work *work, const fct_mesh *mesh) {
     uint32_t count = work->face_count - work->merge_count;
     if (count < 2) return FCT_OK;
     joiner j = {.work = work, .mesh = mesh, .part_count = count};
-    j.parts = fct_allocate(env, count, sizeof *j.parts);
-    j.scratch = fct_allocate(env, count, sizeof *j.scratch);
-    j.portions = fct_allocate(env, PORTIONS, sizeof *j.portions);
-    j.children = fct_allocate(env, count - 1, sizeof *j.children);
-    j.ordered = fct_allocate(env, count - 1, sizeof *j.ordered);
-    j.slots = fct_allocate(env, count - 1, sizeof *j.slots);
-    j.levels = fct_allocate(env, count - 1, sizeof *j.levels);
-    bool complete = j.parts && j.scratch && j.portions && j.children && j.ordered && j.slots && j.levels;
-    fct_result result = complete ? join_parts(&j) : fct_fail_memory(env, "joining parts");
-    fct_release(env, j.parts);
-    fct_release(env, j.scratch);
-    fct_release(env, j.portions);
-    fct_release(env, j.children);
-    fct_release(env, j.ordered);
-    fct_release(env, j.slots);
-    fct_release(env, j.levels);
+    const fct_array arrays[] = {FCT_ARRAY(j.parts, count),       FCT_ARRAY(j.scratch, count),
+                                FCT_ARRAY(j.portions, PORTIONS), FCT_ARRAY(j.children, count - 1),
+                                FCT_ARRAY(j.ordered, count - 1), FCT_ARRAY(j.slots, count - 1),
+                                FCT_ARRAY(j.levels, count - 1)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "joining parts");
+    if (result == FCT_OK) result = join_parts(&j);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }

@@ -59,15 +59,11 @@ static void make_records(void *user, size_t begin, size_t end, size_t chunk, uin
 static fct_result allocate_clusters(fct_work *work, bool directions) {
     const fct_env *env = work->env;
     size_t faces = work->face_count;
-    work->records = fct_allocate(env, faces, sizeof *work->records);
-    if (directions) work->directions = fct_allocate(env, faces, sizeof *work->directions);
-    work->heights = fct_allocate(env, faces, sizeof *work->heights);
-    work->nodes = fct_allocate(env, faces, sizeof *work->nodes);
-    work->children = fct_allocate(env, faces, sizeof *work->children);
-    work->costs = fct_allocate(env, faces, sizeof *work->costs);
-    bool complete = work->records && (!directions || work->directions) && work->heights && work->nodes &&
-                    work->children && work->costs;
-    return complete ? FCT_OK : fct_fail_memory(env, "clustering");
+    const fct_array arrays[] = {
+        FCT_ARRAY(work->records, faces),  FCT_ARRAY_IF(directions, work->directions, faces),
+        FCT_ARRAY(work->heights, faces),  FCT_ARRAY(work->nodes, faces),
+        FCT_ARRAY(work->children, faces), FCT_ARRAY(work->costs, faces)};
+    return fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
 }
 
 fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, const fct_bounds *bounds,
