@@ -207,14 +207,13 @@ static fct_result write_cut(fct_tree_writer *writer) {
     const fct_env *env = writer->env;
     uint32_t count = writer->header.cut_count;
     if (!count) return FCT_OK;
-    fct_cluster *top = fct_allocate(env, count, sizeof *top);
-    fct_cluster *records = fct_allocate(env, count, sizeof *records);
-    uint32_t *ids = fct_allocate(env, count, sizeof *ids);
-    fct_result result = top && records && ids ? put_cut(writer, top, records, ids)
-                                              : fct_fail_memory(env, "writing a hierarchy file");
-    fct_release(env, top);
-    fct_release(env, records);
-    fct_release(env, ids);
+    fct_cluster *top;
+    fct_cluster *records;
+    uint32_t *ids;
+    const fct_array arrays[] = {FCT_ARRAY(top, count), FCT_ARRAY(records, count), FCT_ARRAY(ids, count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "writing a hierarchy file");
+    if (result == FCT_OK) result = put_cut(writer, top, records, ids);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 

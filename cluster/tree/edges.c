@@ -56,10 +56,8 @@ static void count_runs(side_list *list, size_t count, fct_edge_counts *out) {
 }
 
 static fct_result count_lots(const fct_env *env, side_list *list, size_t most, fct_edge_counts *out) {
-    list->keys = fct_allocate(env, most, sizeof *list->keys);
-    list->faces = fct_allocate(env, most, sizeof *list->faces);
-    fct_result result =
-        list->keys && list->faces && list->parents ? FCT_OK : fct_fail_memory(env, "counting edges");
+    const fct_array arrays[] = {FCT_ARRAY(list->keys, most), FCT_ARRAY(list->faces, most)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "counting edges");
     if (result == FCT_OK) fct_sets_create(list->parents, list->view->face_count);
     for (uint32_t lot = 0; result == FCT_OK && lot < list->lots; ++lot) {
         size_t count = list_sides(list, lot);

@@ -111,24 +111,23 @@ static void copy_faces(void *user, size_t begin, size_t end, size_t chunk, uint3
     }
 }
 
-static bool allocate(const fct_env *env, sorter *s) {
+static fct_result allocate_sorter(const fct_env *env, sorter *s) {
     const fct_mesh *from = s->from;
     fct_local_mesh *to = s->to;
     size_t faces = from->face_count, vertices = from->vertex_count;
     to->mesh = (fct_mesh){.vertex_count = from->vertex_count,
                           .face_count = from->face_count,
-                          .positions = fct_allocate(env, vertices, 3 * sizeof(float)),
-                          .triangles = fct_allocate(env, faces, 3 * sizeof(uint32_t)),
                           .material_count = from->material_count,
                           .material_names = from->material_names};
-    if (from->colors) to->mesh.colors = fct_allocate(env, vertices, 3 * sizeof(float));
-    if (from->materials) to->mesh.materials = fct_allocate(env, faces, sizeof(uint32_t));
-    to->faces = fct_allocate(env, faces, sizeof *to->faces);
-    to->vertices = fct_allocate(env, vertices, sizeof *to->vertices);
-    s->items = fct_allocate(env, faces > vertices ? faces : vertices, sizeof *s->items);
-    s->ranks = fct_allocate(env, vertices, sizeof *s->ranks);
-    return to->mesh.positions && to->mesh.triangles && (!from->colors || to->mesh.colors) &&
-           (!from->materials || to->mesh.materials) && to->faces && to->vertices && s->items && s->ranks;
+    const fct_array arrays[] = {FCT_ARRAY(to->mesh.positions, 3 * vertices),
+                                FCT_ARRAY(to->mesh.triangles, 3 * faces),
+                                FCT_ARRAY_IF(from->colors, to->mesh.colors, 3 * vertices),
+                                FCT_ARRAY_IF(from->materials, to->mesh.materials, faces),
+                                FCT_ARRAY(to->faces, faces),
+                                FCT_ARRAY(to->vertices, vertices),
+                                FCT_ARRAY(s->items, faces > vertices ? faces : vertices),
+                                FCT_ARRAY(s->ranks, vertices)};
+    return fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "sorting the mesh");
 }
 
 static fct_result sort_mesh(const fct_env *env, sorter *s) {
@@ -149,7 +148,8 @@ fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, fct_l
     /* with more vertices than faces few are shared: nothing to be near to, three times the work */
     bool loose = mesh->vertex_count > mesh->face_count;
     if (loose || mesh->face_count < LEAST_FACES || !is_scattered(&s)) return FCT_OK;
-    fct_result result = allocate(env, &s) ? sort_mesh(env, &s) : fct_fail_memory(env, "sorting the mesh");
+    fct_result result = allocate_sorter(env, &s);
+    if (result == FCT_OK) result = sort_mesh(env, &s);
     fct_release(env, s.items);
     fct_release(env, s.ranks);
     if (result != FCT_OK) fct_local_mesh_release(env, out);

@@ -262,16 +262,14 @@ static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_tree 
 
 static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint32_t kept, fct_tree *tree) {
     uint32_t faces = mesh->face_count, vertices = mesh->vertex_count;
-    tree->roots = fct_allocate(env, faces - kept, sizeof *tree->roots);
-    tree->face_ids = fct_allocate(env, faces, sizeof *tree->face_ids);
-    tree->vertex_ids = fct_allocate(env, vertices, sizeof *tree->vertex_ids);
-    tree->triangles = fct_allocate(env, faces, 3 * sizeof *tree->triangles);
-    tree->positions = fct_allocate(env, vertices, 3 * sizeof *tree->positions);
-    if (mesh->colors) tree->colors = fct_allocate(env, vertices, 3 * sizeof *tree->colors);
-    if (mesh->materials) tree->materials = fct_allocate(env, faces, sizeof *tree->materials);
-    if (!tree->roots || !tree->face_ids || !tree->vertex_ids || !tree->triangles || !tree->positions ||
-        (mesh->colors && !tree->colors) || (mesh->materials && !tree->materials))
-        return fct_fail_memory(env, "the tree");
+    const fct_array arrays[] = {FCT_ARRAY(tree->roots, faces - kept),
+                                FCT_ARRAY(tree->face_ids, faces),
+                                FCT_ARRAY(tree->vertex_ids, vertices),
+                                FCT_ARRAY(tree->triangles, 3 * (size_t)faces),
+                                FCT_ARRAY(tree->positions, 3 * (size_t)vertices),
+                                FCT_ARRAY_IF(mesh->colors, tree->colors, 3 * (size_t)vertices),
+                                FCT_ARRAY_IF(mesh->materials, tree->materials, faces)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the tree") != FCT_OK) return FCT_ERROR_MEMORY;
     fct_tree_view *view = &tree->view;
     view->face_count = faces, view->vertex_count = vertices, view->node_count = kept;
     view->roots = tree->roots, view->face_ids = tree->face_ids;
@@ -282,10 +280,10 @@ static fct_result allocate_arrays(const fct_env *env, const fct_mesh *mesh, uint
 
 static fct_result rank_merges(const fct_env *env, orderer *o) {
     size_t merges = o->work->merge_count;
-    o->counts = fct_allocate(env, merges, sizeof *o->counts);
-    o->sorted = fct_allocate(env, merges, sizeof *o->sorted);
-    o->ranks = fct_allocate(env, merges, sizeof *o->ranks);
-    if (!o->counts || !o->sorted || !o->ranks) return fct_fail_memory(env, "ordering the tree");
+    const fct_array arrays[] = {FCT_ARRAY(o->counts, merges), FCT_ARRAY(o->sorted, merges),
+                                FCT_ARRAY(o->ranks, merges)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "ordering the tree") != FCT_OK)
+        return FCT_ERROR_MEMORY;
     sum_merges(o);
     fct_parallel_for(env, merges, GRAIN, list_costs, o);
     fct_result result = fct_sort_items(env, o->sorted, merges);
@@ -297,18 +295,19 @@ static fct_result rank_merges(const fct_env *env, orderer *o) {
 static fct_result place(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, merges = o->work->merge_count;
     fct_tree *tree = o->tree;
-    uint8_t *held = fct_allocate(env, faces + merges, sizeof *held);
-    o->firsts = fct_allocate(env, merges, sizeof *o->firsts);
-    o->depths = fct_allocate(env, merges, sizeof *o->depths);
+    uint8_t *held;
+    const fct_array arrays[] = {FCT_ARRAY(held, faces + merges), FCT_ARRAY(o->firsts, merges),
+                                FCT_ARRAY(o->depths, merges)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "ordering the tree");
     tree->links = fct_allocate(tree->env, o->kept, sizeof *tree->links);
-    bool complete = held && o->firsts && o->depths && tree->links;
-    if (complete) {
+    if (result == FCT_OK && !tree->links) result = fct_fail_memory(env, "ordering the tree");
+    if (result == FCT_OK) {
         place_roots(o, held);
         place_faces(o);
         fct_parallel_for(env, merges, GRAIN, link_nodes, o);
     }
     fct_release(env, held);
-    return complete ? FCT_OK : fct_fail_memory(env, "ordering the tree");
+    return result;
 }
 
 static void release_merges(const fct_env *env, orderer *o) {
@@ -322,15 +321,12 @@ static void release_merges(const fct_env *env, orderer *o) {
 
 static fct_result order_vertices(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, vertices = o->mesh->vertex_count;
-    o->first_uses = fct_allocate(env, vertices, sizeof *o->first_uses);
-    o->renamed = fct_allocate(env, vertices, sizeof *o->renamed);
-    o->places = fct_allocate(env, fct_chunk_count(faces, GRAIN), sizeof *o->places);
-    bool complete = o->first_uses && o->renamed && o->places;
-    if (complete) copy_mesh(env, o);
-    fct_release(env, (void *)o->first_uses);
-    fct_release(env, o->renamed);
-    fct_release(env, o->places);
-    return complete ? FCT_OK : fct_fail_memory(env, "ordering the tree");
+    const fct_array arrays[] = {FCT_ARRAY(o->first_uses, vertices), FCT_ARRAY(o->renamed, vertices),
+                                FCT_ARRAY(o->places, fct_chunk_count(faces, GRAIN))};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "ordering the tree");
+    if (result == FCT_OK) copy_mesh(env, o);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    return result;
 }
 
 fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_def *def, fct_tree *tree) {
