@@ -90,10 +90,9 @@ static void list_links(void *user, size_t begin, size_t end, size_t chunk, uint3
 static fct_result sum_links(const fct_env *env, const lister *l, uint32_t link_count, fct_adjacency *out) {
     uint32_t pairs = 0;
     for (uint32_t i = 0; i < link_count; ++i) pairs += i == 0 || l->keys[i] != l->keys[i - 1];
-    out->pairs = fct_allocate(env, pairs, 2 * sizeof *out->pairs);
-    out->lengths = fct_allocate(env, pairs, sizeof *out->lengths);
-    out->edges = fct_allocate(env, pairs, sizeof *out->edges);
-    if (!out->pairs || !out->lengths || !out->edges) return fct_fail_memory(env, "neighbours");
+    const fct_array arrays[] = {FCT_ARRAY(out->pairs, 2 * (size_t)pairs), FCT_ARRAY(out->lengths, pairs),
+                                FCT_ARRAY(out->edges, pairs)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "neighbours") != FCT_OK) return FCT_ERROR_MEMORY;
     for (uint32_t i = 0; i < link_count; ++i) {
         const link *item = &l->links[l->order[i]];
         if (i == 0 || l->keys[i] != l->keys[i - 1]) {
@@ -119,10 +118,9 @@ static fct_result list_and_sum(const fct_env *env, lister *l, fct_adjacency *out
         l->places[i] = total;
         total += count;
     }
-    l->keys = fct_allocate(env, total, sizeof *l->keys);
-    l->order = fct_allocate(env, total, sizeof *l->order);
-    l->links = fct_allocate(env, total, sizeof *l->links);
-    if (!l->keys || !l->order || !l->links) return fct_fail_memory(env, "neighbours");
+    const fct_array arrays[] = {FCT_ARRAY(l->keys, total), FCT_ARRAY(l->order, total),
+                                FCT_ARRAY(l->links, total)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "neighbours") != FCT_OK) return FCT_ERROR_MEMORY;
     fct_parallel_for(env, sides, GRAIN, list_links, l);
     fct_result result = fct_sort_pairs(env, l->keys, l->order, total);
     return result == FCT_OK ? sum_links(env, l, total, out) : result;
@@ -144,10 +142,9 @@ fct_result fct_adjacency_pairs(const fct_env *env, const fct_mesh *mesh, const f
 static fct_result list_neighbours(const fct_env *env, uint32_t label_count, fct_adjacency *out) {
     size_t ends = 2 * (size_t)out->pair_count;
     out->label_count = label_count;
-    out->first = fct_allocate_zero(env, (size_t)label_count + 1, sizeof *out->first);
-    out->others = fct_allocate(env, ends, sizeof *out->others);
-    out->other_pairs = fct_allocate(env, ends, sizeof *out->other_pairs);
-    if (!out->first || !out->others || !out->other_pairs) return fct_fail_memory(env, "neighbours");
+    const fct_array arrays[] = {FCT_ARRAY_ZERO(out->first, (size_t)label_count + 1),
+                                FCT_ARRAY(out->others, ends), FCT_ARRAY(out->other_pairs, ends)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "neighbours") != FCT_OK) return FCT_ERROR_MEMORY;
     for (size_t i = 0; i < ends; ++i) ++out->first[out->pairs[i]];
     uint32_t total = 0;
     for (uint32_t a = 0; a <= label_count; ++a) {

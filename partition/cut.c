@@ -76,11 +76,12 @@ fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *ph
                         void *user, uint32_t *nodes, uint32_t *count) {
     const fct_tree_view *view = &tree->view;
     size_t width = view->root_count > 2 * WIDE ? view->root_count : 2 * WIDE;
-    uint32_t *frontiers = fct_allocate(env, width, 2 * sizeof *frontiers);
-    bool *kept = fct_allocate(env, width, sizeof *kept);
-    fct_result result = FCT_OK;
+    uint32_t *frontiers;
+    bool *kept;
+    const fct_array arrays[] = {FCT_ARRAY(frontiers, 2 * (size_t)width), FCT_ARRAY(kept, width)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "cutting a tree");
     *count = 0;
-    if (frontiers && kept) {
+    if (result == FCT_OK) {
         cutter c = {tree, test, user, nodes, frontiers, view->root_count, kept};
         memcpy(frontiers, view->roots, view->root_count * sizeof *frontiers);
         memset(nodes, 0xFF, view->face_count * sizeof *nodes);
@@ -88,11 +89,8 @@ fct_result fct_cut_tree(const fct_env *env, const fct_tree *tree, const char *ph
         result = fct_parallel_for_progress(env, phase, c.count, 1, cut_subtrees, &c);
         for (uint32_t p = 0; p < view->face_count; ++p)
             if (nodes[p] != FCT_NONE) nodes[(*count)++] = nodes[p];
-    } else {
-        result = fct_fail_memory(env, "cutting a tree");
     }
-    fct_release(env, frontiers);
-    fct_release(env, kept);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 

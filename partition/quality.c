@@ -222,9 +222,10 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
     judge j = {.mesh = &mesh, .tree = tree, .nodes = nodes, .count = count};
     fct_result result = fct_tree_check(env, tree);
     if (result != FCT_OK) return result;
-    uint32_t *labels = fct_allocate(env, view->face_count, sizeof *labels);
-    j.pieces = fct_allocate_zero(env, count, sizeof *j.pieces);
-    if (labels && j.pieces) {
+    uint32_t *labels;
+    const fct_array arrays[] = {FCT_ARRAY(labels, view->face_count), FCT_ARRAY_ZERO(j.pieces, count)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "measuring a partition");
+    if (result == FCT_OK) {
         for (uint32_t i = 0; i < count; ++i) {
             piece *p = &j.pieces[i];
             p->first = fct_node_first(tree, nodes[i]);
@@ -233,11 +234,8 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
         }
         j.labels = labels;
         result = measure(env, &j, out);
-    } else {
-        result = fct_fail_memory(env, "measuring a partition");
     }
-    fct_release(env, labels);
-    fct_release(env, j.pieces);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 
@@ -253,9 +251,10 @@ fct_result fct_labels_check(const fct_env *env, const fct_mesh *mesh, const uint
 
 /* Groups the faces by label. The judge has mesh, labels and count. Errors: MEMORY. */
 static fct_result group_faces(const fct_env *env, judge *j) {
-    j->faces = fct_allocate(env, j->mesh->face_count, sizeof *j->faces);
-    j->pieces = fct_allocate_zero(env, j->count, sizeof *j->pieces);
-    if (!j->faces || !j->pieces) return fct_fail_memory(env, "measuring a partition");
+    const fct_array arrays[] = {FCT_ARRAY(j->faces, j->mesh->face_count),
+                                FCT_ARRAY_ZERO(j->pieces, j->count)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "measuring a partition") != FCT_OK)
+        return FCT_ERROR_MEMORY;
     uint32_t end = 0;
     for (uint32_t f = 0; f < j->mesh->face_count; ++f) ++j->pieces[j->labels[f]].count;
     for (uint32_t i = 0; i < j->count; ++i) {

@@ -257,21 +257,20 @@ static void release(const fct_env *env, refiner *r) {
 /* Labels are not set yet. */
 static refiner *create(const fct_env *env, const fct_units *faces, uint32_t count) {
     refiner *r = fct_allocate_zero(env, 1, sizeof *r);
-    if (!r) goto failed;
+    if (!r) {
+        fct_fail_memory(env, "refining a partition");
+        return NULL;
+    }
     r->units = faces;
     r->region_count = count;
-    r->labels = fct_allocate(env, faces->count, sizeof *r->labels);
-    r->regions = fct_allocate(env, count, sizeof *r->regions);
-    r->seen = fct_allocate_zero(env, faces->count, sizeof *r->seen);
-    r->wanted = fct_allocate_zero(env, faces->count, sizeof *r->wanted);
-    r->moved = fct_allocate_zero(env, faces->count, sizeof *r->moved);
-    if (!r->labels || !r->regions || !r->seen || !r->wanted || !r->moved) goto failed;
-    if (fct_heap_create(env, faces->count, &r->heap) == FCT_OK) return r;
+    const fct_array arrays[] = {FCT_ARRAY(r->labels, faces->count), FCT_ARRAY(r->regions, count),
+                                FCT_ARRAY_ZERO(r->seen, faces->count),
+                                FCT_ARRAY_ZERO(r->wanted, faces->count),
+                                FCT_ARRAY_ZERO(r->moved, faces->count)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "refining a partition") == FCT_OK &&
+        fct_heap_create(env, faces->count, &r->heap) == FCT_OK)
+        return r;
     release(env, r);
-    return NULL; /* the heap has told */
-failed:
-    release(env, r);
-    fct_fail_memory(env, "refining a partition");
     return NULL;
 }
 

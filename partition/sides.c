@@ -60,12 +60,10 @@ fct_result fct_sides_build(const fct_env *env, const uint32_t *triangles, uint32
     builder b = {.triangles = triangles, .bits = 1, .count = 3 * (size_t)face_count, .out = out};
     while (vertex_count >> b.bits) ++b.bits;
     b.none = ((uint64_t)1 << 2 * b.bits) - 1; /* no vertex has id 2^bits - 1 on both ends */
-    b.keys = fct_allocate(env, b.count, sizeof *b.keys);
-    b.order = fct_allocate(env, b.count, sizeof *b.order);
-    out->before = fct_allocate(env, b.count, sizeof *out->before);
-    out->after = fct_allocate(env, b.count, sizeof *out->after);
-    bool complete = b.keys && b.order && out->before && out->after;
-    fct_result result = complete ? sort_and_link(env, &b) : fct_fail_memory(env, "the sides of faces");
+    const fct_array arrays[] = {FCT_ARRAY(b.keys, b.count), FCT_ARRAY(b.order, b.count),
+                                FCT_ARRAY(out->before, b.count), FCT_ARRAY(out->after, b.count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the sides of faces");
+    if (result == FCT_OK) result = sort_and_link(env, &b);
     fct_release(env, b.keys);
     fct_release(env, b.order);
     if (result != FCT_OK) fct_sides_release(env, out);

@@ -71,13 +71,10 @@ fct_result fct_units_of_faces(const fct_env *env, const fct_mesh *mesh, const ui
                           "%zu sides of faces have neighbours, at most %u can be refined", ends, UINT32_MAX);
         goto failed;
     }
-    out->first = fct_allocate(env, (size_t)out->count + 2, sizeof *out->first);
-    out->neighbours = fct_allocate(env, ends, sizeof *out->neighbours);
-    out->face_lengths = fct_allocate(env, ends, sizeof *out->face_lengths);
-    if (!out->first || !out->neighbours || !out->face_lengths) {
-        result = fct_fail_memory(env, "refining a partition");
-        goto failed;
-    }
+    const fct_array arrays[] = {FCT_ARRAY(out->first, (size_t)out->count + 2),
+                                FCT_ARRAY(out->neighbours, ends), FCT_ARRAY(out->face_lengths, ends)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "refining a partition");
+    if (result != FCT_OK) goto failed;
     list_faces(out);
     fct_release(env, out->dual.edges);
     fct_release(env, out->dual.lengths);
@@ -137,20 +134,18 @@ static void list_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t 
 fct_result fct_units_of_runs(const fct_env *env, const fct_units *faces, const uint32_t *unit_of,
                              uint32_t count, uint32_t *scratch, fct_units *out) {
     *out = (fct_units){.count = count};
-    out->first = fct_allocate(env, (size_t)count + 1, sizeof *out->first);
-    out->vectors = fct_allocate(env, count, sizeof *out->vectors);
-    out->perimeters = fct_allocate(env, count, sizeof *out->perimeters);
-    out->materials = fct_allocate(env, count, sizeof *out->materials);
-    if (!out->first || !out->vectors || !out->perimeters || !out->materials) goto failed;
+    const fct_array arrays[] = {FCT_ARRAY(out->first, (size_t)count + 1), FCT_ARRAY(out->vectors, count),
+                                FCT_ARRAY(out->perimeters, count), FCT_ARRAY(out->materials, count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "refining a partition");
+    if (result != FCT_OK) return result;
     sum_runs(faces, unit_of, scratch, scratch + faces->count, out);
     list_runs(faces, unit_of, scratch, out);
     size_t ends = out->first[count];
-    out->lengths = fct_allocate(env, ends, sizeof *out->lengths);
-    out->neighbours = fct_allocate(env, ends, sizeof *out->neighbours);
-    if (!out->lengths || !out->neighbours) goto failed;
-    list_runs(faces, unit_of, scratch, out);
-    return FCT_OK;
-failed:
-    fct_units_release(env, out);
-    return fct_fail_memory(env, "refining a partition");
+    const fct_array ends_arrays[] = {FCT_ARRAY(out->lengths, ends), FCT_ARRAY(out->neighbours, ends)};
+    result = fct_allocate_all(env, ends_arrays, FCT_LENGTH(ends_arrays), "refining a partition");
+    if (result == FCT_OK)
+        list_runs(faces, unit_of, scratch, out);
+    else
+        fct_units_release(env, out);
+    return result;
 }

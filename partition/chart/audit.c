@@ -107,24 +107,16 @@ static void audit(auditor *a, fct_chart_stats *stats) {
 fct_result fct_charts_audit(const fct_env *env, const fct_charter *c, fct_chart_stats *stats) {
     size_t faces = c->view->face_count;
     auditor a = {.charter = c};
-    a.places = fct_allocate(env, faces, sizeof *a.places);
-    a.first = fct_allocate(env, (size_t)c->count + 1, sizeof *a.first);
-    a.edges = fct_allocate(env, faces, 3 * sizeof *a.edges);
-    a.parents = fct_allocate(env, faces, sizeof *a.parents);
-    a.vertex_chart = fct_allocate(env, c->view->vertex_count, sizeof *a.vertex_chart);
-    a.edge_chart = fct_allocate(env, faces, 3 * sizeof *a.edge_chart);
-    a.edge_face = fct_allocate(env, faces, 3 * sizeof *a.edge_face);
-    a.edge_uses = fct_allocate(env, faces, 3 * sizeof *a.edge_uses);
-    bool complete = a.places && a.first && a.edges && a.parents && a.vertex_chart && a.edge_chart &&
-                    a.edge_face && a.edge_uses;
-    if (complete) audit(&a, stats);
-    fct_release(env, a.places);
-    fct_release(env, a.first);
-    fct_release(env, a.edges);
-    fct_release(env, a.parents);
-    fct_release(env, a.vertex_chart);
-    fct_release(env, a.edge_chart);
-    fct_release(env, a.edge_face);
-    fct_release(env, a.edge_uses);
-    return complete ? FCT_OK : fct_fail_memory(env, "charts");
+    const fct_array arrays[] = {FCT_ARRAY(a.places, faces),
+                                FCT_ARRAY(a.first, (size_t)c->count + 1),
+                                FCT_ARRAY(a.edges, 3 * (size_t)faces),
+                                FCT_ARRAY(a.parents, faces),
+                                FCT_ARRAY(a.vertex_chart, c->view->vertex_count),
+                                FCT_ARRAY(a.edge_chart, 3 * (size_t)faces),
+                                FCT_ARRAY(a.edge_face, 3 * (size_t)faces),
+                                FCT_ARRAY(a.edge_uses, 3 * (size_t)faces)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "charts");
+    if (result == FCT_OK) audit(&a, stats);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    return result;
 }

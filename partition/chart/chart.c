@@ -109,14 +109,12 @@ static fct_result open_nodes(const fct_env *env, const fct_tree *tree, fct_chart
     const fct_tree_view *view = c->view;
     uint32_t threads = fct_env_threads(env);
     opener o = {.charter = c};
-    o.vertex_before = fct_allocate(env, view->face_count, 3 * sizeof *o.vertex_before);
-    o.parents =
-        fct_allocate(env, view->face_count > view->vertex_count ? view->face_count : view->vertex_count,
-                     sizeof *o.parents);
-    o.opened = fct_allocate_zero(env, threads, sizeof *o.opened);
-    uint32_t *nodes = fct_allocate(env, view->face_count, sizeof *nodes);
-    fct_result result = FCT_OK;
-    if (!o.vertex_before || !o.parents || !o.opened || !nodes) result = fct_fail_memory(env, "charts");
+    uint32_t *nodes;
+    const fct_array arrays[] = {
+        FCT_ARRAY(o.vertex_before, 3 * (size_t)view->face_count),
+        FCT_ARRAY(o.parents, view->face_count > view->vertex_count ? view->face_count : view->vertex_count),
+        FCT_ARRAY_ZERO(o.opened, threads), FCT_ARRAY(nodes, view->face_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "charts");
     if (result == FCT_OK) {
         link_corners(view, o.parents, o.vertex_before);
         result = fct_cut_tree(env, tree, "charts", is_chart, &o, nodes, &c->count);
@@ -132,10 +130,7 @@ static fct_result open_nodes(const fct_env *env, const fct_tree *tree, fct_chart
             stats->opened_topology += (uint32_t)o.opened[t].topology;
         }
     }
-    fct_release(env, o.vertex_before);
-    fct_release(env, o.parents);
-    fct_release(env, o.opened);
-    fct_release(env, nodes);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 

@@ -190,9 +190,11 @@ static fct_result run_round(const fct_env *env, merger *m, uint32_t *joined) {
     fct_adjacency neighbours = {0};
     fct_result result = fct_adjacency_pairs(env, &mesh, &m->charter->sides, m->charter->labels, &neighbours);
     if (result == FCT_OK) result = list_shared(env, m);
-    uint64_t *keys = fct_allocate(env, neighbours.pair_count, sizeof *keys);
-    uint32_t *order = fct_allocate(env, neighbours.pair_count, sizeof *order);
-    if (result == FCT_OK && (!keys || !order)) result = fct_fail_memory(env, "charts");
+    uint64_t *keys = NULL;
+    uint32_t *order = NULL;
+    const fct_array arrays[] = {FCT_ARRAY(keys, neighbours.pair_count),
+                                FCT_ARRAY(order, neighbours.pair_count)};
+    if (result == FCT_OK) result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "charts");
     if (result == FCT_OK) {
         for (uint32_t i = 0; i < neighbours.pair_count; ++i) {
             const piece *p = &m->pieces[neighbours.pairs[2 * (size_t)i]],
@@ -204,8 +206,7 @@ static fct_result run_round(const fct_env *env, merger *m, uint32_t *joined) {
         result = fct_sort_pairs(env, keys, order, neighbours.pair_count);
     }
     if (result == FCT_OK) *joined = join_pairs(m, &neighbours, order);
-    fct_release(env, keys);
-    fct_release(env, order);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     fct_adjacency_release(env, &neighbours);
     return result;
 }
@@ -268,18 +269,13 @@ static fct_result run_rounds(const fct_env *env, merger *m) {
 
 fct_result fct_charts_merge(const fct_env *env, fct_charter *c) {
     merger m = {.charter = c};
-    m.pieces = fct_allocate(env, c->count, sizeof *m.pieces);
-    m.next = fct_allocate(env, c->view->face_count, sizeof *m.next);
-    m.last_label = fct_allocate(env, c->view->vertex_count, sizeof *m.last_label);
-    m.stamps = fct_allocate_zero(env, c->view->vertex_count, sizeof *m.stamps);
-    m.shared = fct_allocate(env, c->view->vertex_count, sizeof *m.shared);
-    bool complete = m.pieces && m.next && m.last_label && m.stamps && m.shared;
-    fct_result result = complete ? run_rounds(env, &m) : fct_fail_memory(env, "charts");
-    fct_release(env, m.pieces);
-    fct_release(env, m.next);
-    fct_release(env, m.last_label);
-    fct_release(env, m.stamps);
-    fct_release(env, m.shared);
+    const fct_array arrays[] = {FCT_ARRAY(m.pieces, c->count), FCT_ARRAY(m.next, c->view->face_count),
+                                FCT_ARRAY(m.last_label, c->view->vertex_count),
+                                FCT_ARRAY_ZERO(m.stamps, c->view->vertex_count),
+                                FCT_ARRAY(m.shared, c->view->vertex_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "charts");
+    if (result == FCT_OK) result = run_rounds(env, &m);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     fct_release(env, m.set);
     return result;
 }

@@ -265,19 +265,16 @@ fct_result fct_meshlets_grow(const fct_env *env, fct_packer *packer, const uint3
     for (uint32_t r = 0; r < regions; ++r)
         if (bounds[r + 1] - bounds[r] > largest) largest = bounds[r + 1] - bounds[r];
     field all = {.packer = packer, .bounds = bounds};
-    all.corners = fct_allocate(env, packer->view->face_count, 3 * sizeof *all.corners);
-    all.counts = fct_allocate(env, regions, sizeof *all.counts);
-    all.growers = fct_allocate_zero(env, threads, sizeof *all.growers);
-    uint32_t *scratch = fct_allocate(env, threads * largest, 6 * sizeof *scratch);
-    bool complete = all.corners && all.counts && all.growers && scratch;
-    for (uint32_t t = 0; t < threads && complete; ++t) {
+    uint32_t *scratch;
+    const fct_array arrays[] = {FCT_ARRAY(all.corners, 3 * (size_t)packer->view->face_count),
+                                FCT_ARRAY(all.counts, regions), FCT_ARRAY_ZERO(all.growers, threads),
+                                FCT_ARRAY(scratch, 6 * (size_t)(threads * largest))};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "meshlets");
+    for (uint32_t t = 0; t < threads && result == FCT_OK; ++t) {
         all.growers[t].live = scratch + 6 * t * largest;
         all.growers[t].stamps = all.growers[t].live + 3 * largest;
     }
-    fct_result result = complete ? grow_field(env, &all, regions) : fct_fail_memory(env, "meshlets");
-    fct_release(env, all.corners);
-    fct_release(env, all.counts);
-    fct_release(env, all.growers);
-    fct_release(env, scratch);
+    if (result == FCT_OK) result = grow_field(env, &all, regions);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }

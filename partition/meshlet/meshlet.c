@@ -124,13 +124,11 @@ static void fill_pieces(void *user, size_t begin, size_t end, size_t chunk, uint
 
 /* The lists of the pieces that owner tells of. Those of a run are of this run alone. */
 static fct_result make_lists(const fct_env *env, fct_packer *p, const uint32_t *bounds, uint32_t count) {
-    p->faces = fct_allocate(env, p->count, p->def.max_triangles * sizeof *p->faces);
-    p->vertices = fct_allocate(env, p->count, p->def.max_vertices * sizeof *p->vertices);
-    p->uses = fct_allocate(env, p->count, p->def.max_vertices * sizeof *p->uses);
-    p->face_counts = fct_allocate_zero(env, p->count, sizeof *p->face_counts);
-    p->vertex_counts = fct_allocate_zero(env, p->count, sizeof *p->vertex_counts);
-    if (!p->faces || !p->vertices || !p->uses || !p->face_counts || !p->vertex_counts)
-        return fct_fail_memory(env, "meshlets");
+    size_t faces = (size_t)p->count * p->def.max_triangles, vertices = (size_t)p->count * p->def.max_vertices;
+    const fct_array arrays[] = {FCT_ARRAY(p->faces, faces), FCT_ARRAY(p->vertices, vertices),
+                                FCT_ARRAY(p->uses, vertices), FCT_ARRAY_ZERO(p->face_counts, p->count),
+                                FCT_ARRAY_ZERO(p->vertex_counts, p->count)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "meshlets") != FCT_OK) return FCT_ERROR_MEMORY;
     piece_run run = {p, bounds};
     fct_parallel_for(env, count - 1, 1, fill_pieces, &run);
     return FCT_OK;
@@ -139,13 +137,12 @@ static fct_result make_lists(const fct_env *env, fct_packer *p, const uint32_t *
 static fct_result make_pieces(const fct_env *env, const fct_tree *tree, fct_packer *p) {
     const fct_tree_view *view = p->view;
     uint32_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count, count;
-    uint32_t *scratch = fct_allocate(env, (size_t)most + 1, sizeof *scratch);
-    p->vertex_before = fct_allocate(env, view->face_count, 3 * sizeof *p->vertex_before);
-    p->reach = fct_allocate(env, view->face_count, sizeof *p->reach);
-    p->home = fct_allocate(env, view->face_count, sizeof *p->home);
-    p->owner = fct_allocate(env, view->face_count, sizeof *p->owner);
-    bool complete = scratch && p->vertex_before && p->reach && p->home && p->owner;
-    fct_result result = complete ? FCT_OK : fct_fail_memory(env, "meshlets");
+    uint32_t *scratch;
+    const fct_array arrays[] = {FCT_ARRAY(scratch, (size_t)most + 1),
+                                FCT_ARRAY(p->vertex_before, 3 * (size_t)view->face_count),
+                                FCT_ARRAY(p->reach, view->face_count), FCT_ARRAY(p->home, view->face_count),
+                                FCT_ARRAY(p->owner, view->face_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "meshlets");
     if (result == FCT_OK) {
         link_corners(view, scratch, p->vertex_before);
         result = read_scales(env, tree, p, scratch);
@@ -228,17 +225,15 @@ static void lay_out(const fct_packer *p, const uint32_t *pieces, fct_meshlets *o
 static fct_result write_down(const fct_env *env, const fct_packer *p, uint32_t *numbers, uint32_t *pieces,
                              fct_meshlets *out) {
     for (uint32_t i = 0; i < p->count; ++i) out->count += p->face_counts[i] > 0;
-    out->meshlets = fct_allocate(env, out->count, sizeof *out->meshlets);
-    out->bounds = fct_allocate(env, out->count, sizeof *out->bounds);
-    out->first_face = fct_allocate(env, (size_t)out->count + 1, sizeof *out->first_face);
-    out->faces = fct_allocate(env, p->view->face_count, sizeof *out->faces);
-    if (!out->meshlets || !out->bounds || !out->first_face || !out->faces)
-        return fct_fail_memory(env, "meshlets");
+    const fct_array arrays[] = {FCT_ARRAY(out->meshlets, out->count), FCT_ARRAY(out->bounds, out->count),
+                                FCT_ARRAY(out->first_face, (size_t)out->count + 1),
+                                FCT_ARRAY(out->faces, p->view->face_count)};
+    if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "meshlets") != FCT_OK) return FCT_ERROR_MEMORY;
     number_pieces(p, numbers, pieces);
     lay_out(p, pieces, out);
-    out->vertices = fct_allocate(env, out->vertex_count, sizeof *out->vertices);
-    out->triangles = fct_allocate(env, out->triangle_bytes, sizeof *out->triangles);
-    if (!out->vertices || !out->triangles) return fct_fail_memory(env, "meshlets");
+    const fct_array lists[] = {FCT_ARRAY(out->vertices, out->vertex_count),
+                               FCT_ARRAY(out->triangles, out->triangle_bytes)};
+    if (fct_allocate_all(env, lists, FCT_LENGTH(lists), "meshlets") != FCT_OK) return FCT_ERROR_MEMORY;
     for (uint32_t f = 0; f < p->view->face_count; ++f)
         out->faces[out->first_face[numbers[p->owner[f]]]++] = f;
     for (uint32_t m = out->count; m > 0; --m) out->first_face[m] = out->first_face[m - 1];

@@ -249,12 +249,12 @@ static fct_result pack_near(const fct_env *env, fct_packer *p, uint32_t *order) 
 }
 
 fct_result fct_meshlets_pack(const fct_env *env, fct_packer *packer) {
-    uint32_t *order = fct_allocate(env, packer->count, sizeof *order);
-    sharing *s = fct_allocate(env, 1, sizeof *s);
-    fct_result result =
-        order && s ? pack_neighbours(env, packer, order, s) : fct_fail_memory(env, "packing meshlets");
+    uint32_t *order;
+    sharing *s;
+    const fct_array arrays[] = {FCT_ARRAY(order, packer->count), FCT_ARRAY(s, 1)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "packing meshlets");
+    if (result == FCT_OK) result = pack_neighbours(env, packer, order, s);
     if (result == FCT_OK) result = pack_near(env, packer, order);
-    fct_release(env, order);
-    fct_release(env, s);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
