@@ -56,7 +56,8 @@ static void count_runs(side_list *list, size_t count, fct_edge_counts *out) {
 }
 
 static fct_result count_lots(const fct_env *env, side_list *list, size_t most, fct_edge_counts *out) {
-    const fct_array arrays[] = {FCT_ARRAY(list->keys, most), FCT_ARRAY(list->faces, most)};
+    const fct_array arrays[] = {FCT_ARRAY(list->keys, most), FCT_ARRAY(list->faces, most),
+                                FCT_ARRAY(list->parents, list->view->face_count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "counting edges");
     if (result == FCT_OK) fct_sets_create(list->parents, list->view->face_count);
     for (uint32_t lot = 0; result == FCT_OK && lot < list->lots; ++lot) {
@@ -78,7 +79,6 @@ fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, u
         if (count > most) most = count;
     }
     *out = (fct_edge_counts){.components = view->face_count};
-    list.parents = fct_allocate(env, view->face_count, sizeof *list.parents);
     fct_result result = count_lots(env, &list, most, out);
     fct_release(env, list.keys);
     fct_release(env, list.faces);
