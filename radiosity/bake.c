@@ -3,7 +3,10 @@
 
 #include "facetree/radiosity.h"
 #include "radiosity/output/output.h"
+#include "radiosity/output/probe.h"
 #include "radiosity/rivals/reference.h"
+#include "radiosity/solve/refine.h"
+#include "radiosity/surface/tessellate.h"
 
 #define DEFAULT_ERROR 2e-5
 /* Diagonals of bounds whose parts have areas that floats can tell. */
@@ -231,7 +234,7 @@ static fct_result reference_probe(fct_bake *bake, size_t count, const float *poi
     if (!irradiance || !offsets || !units || !sites) goto done;
     for (size_t i = 0; i < count; ++i) {
         v3_store(units + 3 * i, v3_unit(v3_load(normals + 3 * i)));
-        fct_site site = fct_output_site(s->scene, points + 3 * i, units + 3 * i);
+        fct_site site = fct_probe_site(s->scene, points + 3 * i, units + 3 * i);
         out[i] = (fct_probe){.instance = site.instance, .face = site.face};
         offsets[i] = site.offset;
         memcpy(sites + 3 * i, site.point, sizeof site.point);

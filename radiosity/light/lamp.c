@@ -1,9 +1,12 @@
 /* radiosity/light/lamp.c: see lamp.h.
  *
- * A receiver's lamps come in two kinds. Each that may bring more than MAJOR_SHARE of the light has its own
- * cut and its own rays. The others bring their exact light too, but share one set of rays, spread over them
- * by systematic sampling, and one visible fraction a channel. A visible fraction is sum(G V) / sum(G) over
- * points drawn in proportion to the light, so that it is 1 or 0 exactly where nothing or all is hidden.
+ * 1. fct_lamp_estimate gives a rough light of every lamp; their sum is `total`.
+ * 2. A major lamp, whose estimate exceeds MAJOR_SHARE of the total, gets its exact light without blockers
+ * times a visible fraction from its own rays.
+ * 3. The minor lamps bring their exact light too, but they share one set of rays and one visible fraction per
+ *    channel. Systematic sampling distributes these rays in proportion to the estimates.
+ * A visible fraction is sum(G V) / sum(G) over points that are drawn roughly in proportion to the light G. So
+ * it is exactly 1 or 0 where nothing or everything is hidden.
  */
 #include "radiosity/light/lamp.h"
 
@@ -13,10 +16,20 @@
 #include "radiosity/sample.h"
 #include "scene/transform.h"
 
+/* Share of the total above which a lamp has rays of its own. Smaller: more lamps, more rays per receiver.
+ * Larger: one visible fraction stands for lamps that differ visibly. */
 #define MAJOR_SHARE .025
-#define MAX_RAYS    64
-#define LARGE_AREA  .25
-#define FLAT_ENOUGH .9 /* |S| / A: a nearly flat lamp does not shine on itself */
+/* Rays per lamp: where the first ones disagree, and at most. */
+#define MIXED_RAYS 16
+#define MAX_RAYS   64
+/* A lamp above this share of the total gets twice the first rays: a wrong agreement of four would show. */
+#define BRIGHT_SHARE .2
+/* Standard error, as a share of the receiver's light, that needs no more than MIXED_RAYS. */
+#define RAY_ERROR .02
+/* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
+#define LARGE_AREA .25
+/* |S| / A above which an emitter counts as flat: it does not shine on itself. */
+#define FLAT_ENOUGH .9
 
 struct fct_lamps {
     const fct_env *env;
@@ -25,7 +38,7 @@ struct fct_lamps {
     bool *sampled; /* per instance */
 };
 
-/* What one call carries along. */
+/* The state of one call. */
 typedef struct query {
     const fct_lamps *lamps;
     const fct_scene *scene;
@@ -34,12 +47,12 @@ typedef struct query {
     uint64_t seed;
     uint32_t base_rays;
     bool fixed;
-    double total; /* of the lamps' estimates times strength */
-    double scale; /* the same, with what is known better in place of estimates */
+    double total; /* sum of the lamps' estimates times strength */
+    double scale; /* the same, with exact light in place of the estimates of lamps seen so far */
     uint64_t rays;
 } query;
 
-static bool visible(query *q, const fct_lamp *lamp, v3 y) {
+static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
     const double *m = lamp->to_world, p[3] = {y.x, y.y, y.z};
     fct_ray ray = {.t_min = 0};
     double distance2 = 0, largest = 0;
@@ -50,20 +63,19 @@ static bool visible(query *q, const fct_lamp *lamp, v3 y) {
         distance2 += d * d;
         largest = fmax(largest, fmax(fabs(world), fabs(q->origin[k])));
     }
-    /* Short of the lamp itself by more than what rounding moves it. */
+    /* The ray ends before the lamp, by more than the rounding of a coordinate. */
     ray.t_max = (float)(1 - 1e-4 - 1e-6 * largest / sqrt(distance2));
     ++q->rays;
     return !(ray.t_max > 0) || !fct_scene_any_hit(q->scene, &ray, NULL);
 }
 
-/* The visible fraction of a cut whose light is `power` (strength included). */
-static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receiver *rec, const fct_cut *cut,
-                               double power) {
+/* The visible fraction of a lamp whose light is `power` (strength included). */
+static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct_receiver *rec,
+                                       const fct_cut *cut, double power) {
     uint64_t seed = fct_hash2(q->seed, lamp->instance);
     double all = 0, seen = 0;
     uint32_t sent = 0;
-    /* a lamp that brings much of the light is not judged by four rays */
-    uint32_t first = !q->fixed && power > .2 * q->total ? 2 * q->base_rays : q->base_rays;
+    uint32_t first = !q->fixed && power > BRIGHT_SHARE * q->total ? 2 * q->base_rays : q->base_rays;
     for (uint32_t goal = first; sent < goal;) {
         for (; sent < goal; ++sent) {
             double u[2];
@@ -71,33 +83,30 @@ static double visible_fraction(query *q, const fct_lamp *lamp, const fct_receive
             fct_lamp_point point = fct_cut_point(lamp, rec, cut, u[0], u[1]);
             if (point.weight <= 0) continue;
             all += point.weight;
-            if (visible(q, lamp, point.y)) seen += point.weight;
+            if (point_is_visible(q, lamp, point.y)) seen += point.weight;
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
         if (!mixed || sent >= MAX_RAYS || q->fixed) break;
-        /* As though one more ray had been seen by half: the spread of few rays is not to be trusted. */
+        /* Counts one more ray as half visible, because the variance of few rays is often too small. */
         double fraction = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
         double error = sqrt(fraction * (1 - fraction) / sent) * power;
-        if (sent < 16)
-            goal = 16;
-        else if (all <= 0 || error > .02 * q->scale)
+        if (sent < MIXED_RAYS)
+            goal = MIXED_RAYS;
+        else if (all <= 0 || error > RAY_ERROR * q->scale)
             goal = MAX_RAYS;
     }
     return all > 0 ? seen / all : 0;
 }
 
-static fct_receiver receiver(const query *q, const fct_lamp *lamp) {
-    return fct_lamp_receiver(lamp, q->point, q->normal);
-}
-
-static double estimate(const query *q, const fct_lamp *lamp) {
-    fct_receiver rec = receiver(q, lamp);
+static double estimate_lamp(const query *q, const fct_lamp *lamp) {
+    fct_receiver rec = fct_lamp_receiver(lamp, q->point, q->normal);
     return fct_lamp_estimate(lamp, &rec) * lamp->strength;
 }
 
-/* Sends about `count` rays to the minor lamps, whose estimates sum to `sum`; adds weights by channel. Returns
- * whether some arrive and some do not. */
-static bool sample_minor(query *q, double sum, uint32_t count, double all[3], double seen[3], fct_cut *cut) {
+/* Sends about `count` rays to the minor lamps, whose estimates sum to `sum`. Sets the light per channel of
+ * all rays and of those that arrive. Returns true if some arrive and some do not. */
+static bool sample_minor_lamps(query *q, double sum, uint32_t count, double all[3], double seen[3],
+                               fct_cut *cut) {
     uint64_t seed = fct_hash2(q->seed, FCT_NONE);
     double step = sum / count, next = step * fct_uniform(fct_hash2(seed, count)), below = 0;
     bool hit = false, miss = false;
@@ -105,10 +114,10 @@ static bool sample_minor(query *q, double sum, uint32_t count, double all[3], do
     for (int k = 0; k < 3; ++k) all[k] = seen[k] = 0;
     for (uint32_t i = 0; i < q->lamps->count; ++i) {
         const fct_lamp *lamp = q->lamps->lamps + i;
-        double share = estimate(q, lamp);
+        double share = estimate_lamp(q, lamp);
         if (share > MAJOR_SHARE * q->total) continue;
         bool ready = false;
-        fct_receiver rec = receiver(q, lamp);
+        fct_receiver rec = fct_lamp_receiver(lamp, q->point, q->normal);
         for (below += share; next < below; next += step) {
             double u[2];
             if (!ready) fct_lamp_cut(lamp, &rec, cut);
@@ -116,7 +125,7 @@ static bool sample_minor(query *q, double sum, uint32_t count, double all[3], do
             fct_plane_point(number++, seed, u);
             fct_lamp_point point = fct_cut_point(lamp, &rec, cut, u[0], u[1]);
             if (point.weight <= 0) continue;
-            bool free = visible(q, lamp, point.y);
+            bool free = point_is_visible(q, lamp, point.y);
             for (int k = 0; k < 3; ++k) {
                 double weight = point.weight * lamp->emission[k] / share;
                 all[k] += weight;
@@ -128,26 +137,27 @@ static bool sample_minor(query *q, double sum, uint32_t count, double all[3], do
     return hit && miss;
 }
 
-static void add_minor(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
+/* Adds the minor lamps' light times their common visible fraction. */
+static void add_minor_lamps(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
     double all[3], seen[3];
-    bool mixed = sample_minor(q, sum, q->base_rays, all, seen, cut);
-    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < 16 && !q->fixed)
-        sample_minor(q, sum, 16, all, seen, cut);
+    bool mixed = sample_minor_lamps(q, sum, q->base_rays, all, seen, cut);
+    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < MIXED_RAYS && !q->fixed)
+        sample_minor_lamps(q, sum, MIXED_RAYS, all, seen, cut);
     double grey = all[0] + all[1] + all[2];
     grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
     for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * (all[k] > 0 ? seen[k] / all[k] : grey);
 }
 
-/* Returns the light that would arrive, over the channels, if all were visible. */
-static double gather(query *q, double irradiance[3]) {
+/* Returns the light without blockers, summed over channels. */
+static double add_lamps(query *q, double irradiance[3]) {
     double minor = 0, open = 0, minor_light[3] = {0, 0, 0};
     fct_cut cut;
     for (int k = 0; k < 3; ++k) irradiance[k] = 0;
-    for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate(q, q->lamps->lamps + i);
+    for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate_lamp(q, q->lamps->lamps + i);
     q->scale = q->total;
     for (uint32_t i = 0; i < q->lamps->count; ++i) {
         const fct_lamp *lamp = q->lamps->lamps + i;
-        fct_receiver rec = receiver(q, lamp);
+        fct_receiver rec = fct_lamp_receiver(lamp, q->point, q->normal);
         double share = fct_lamp_estimate(lamp, &rec) * lamp->strength;
         if (share <= 0) continue;
         fct_lamp_cut(lamp, &rec, &cut);
@@ -157,19 +167,20 @@ static double gather(query *q, double irradiance[3]) {
         q->scale += light * lamp->strength - share;
         if (light <= 0) continue;
         open += light * lamp->strength;
-        if (q->base_rays && major) light *= visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);
+        if (q->base_rays && major)
+            light *= measure_visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);
         double *to = q->base_rays && !major ? minor_light : irradiance;
         for (int k = 0; k < 3; ++k) to[k] += light * lamp->emission[k];
     }
     if (minor_light[0] + minor_light[1] + minor_light[2] > 0)
-        add_minor(q, minor_light, minor, irradiance, &cut);
+        add_minor_lamps(q, minor_light, minor, irradiance, &cut);
     return open;
 }
 
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]) {
     query q = {.lamps = lamps, .point = point, .normal = normal};
-    gather(&q, irradiance);
+    add_lamps(&q, irradiance);
 }
 
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
@@ -183,7 +194,7 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
                .base_rays = base_rays & ~FCT_LAMPS_FIXED,
                .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)(point[k] + offset * normal[k]);
-    double open = gather(&q, irradiance);
+    double open = add_lamps(&q, irradiance);
     if (rays) *rays += q.rays;
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
 }
@@ -196,9 +207,9 @@ bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance) {
     return instance < lamps->instance_count && lamps->sampled[instance];
 }
 
-/* World area of an instance, and the length of its area vector; face by face only under a transform that is
- * no similarity. */
-static double instance_area(const fct_scene_view *view, uint32_t instance, double *vector) {
+/* World area of an instance, and the length of its area vector. Adds up faces only under a transform that is
+ * not a similarity. */
+static double measure_instance(const fct_scene_view *view, uint32_t instance, double *vector) {
     const fct_instance *placed = view->instances + instance;
     const fct_tree *tree = view->models[placed->model].tree;
     fct_tree_view model = fct_tree_get(tree);
@@ -230,7 +241,7 @@ static double instance_area(const fct_scene_view *view, uint32_t instance, doubl
     return area;
 }
 
-static bool emits(const fct_scene_view *view, uint32_t instance) {
+static bool instance_emits(const fct_scene_view *view, uint32_t instance) {
     const float *e = view->materials[view->instances[instance].material].emission;
     return e[0] > 0 || e[1] > 0 || e[2] > 0;
 }
@@ -256,9 +267,9 @@ fct_result fct_lamps_create(const fct_env *env, const fct_scene *scene, fct_lamp
         goto done;
     }
     for (uint32_t i = 0; i < view.instance_count; ++i)
-        total += areas[i] = instance_area(&view, i, &vectors[i]);
+        total += areas[i] = measure_instance(&view, i, &vectors[i]);
     for (uint32_t i = 0; i < view.instance_count && result == FCT_OK; ++i) {
-        if (!emits(&view, i) || !(areas[i] > 0)) continue;
+        if (!instance_emits(&view, i) || !(areas[i] > 0)) continue;
         if (areas[i] > LARGE_AREA * total && vectors[i] < FLAT_ENOUGH * areas[i]) continue;
         result = fct_lamp_init(env, &view, i, lamps->lamps + lamps->count);
         if (result == FCT_OK) lamps->sampled[i] = true, ++lamps->count;

@@ -1,11 +1,12 @@
 /* radiosity/light/lamp_cut.c: see lamp_cut.h.
  *
- * A node that faces the receiver wholly and lies wholly above its horizon sends n.w (-w.S) / (pi r^2) up to a
- * relative error of about rms^2 / r^2 (1 / cos + 1 / cos'), S exact for parallel directions; any other node
- * is known only between bounds (Cauchy-Schwarz on the moments: sum A |n.w| <= sqrt(A w.M w)). Nodes are
- * opened until their error is small beside their own light or beside the lamp's. A lamp as a whole, seen from
- * afar, needs no cut: its projected area over all directions is tabulated on a cube, where it is piecewise
- * linear with kinks at directions in which faces turn away.
+ * w is the unit vector from the receiver to the node, n the receiver's normal.
+ * 1. A node that wholly faces the receiver and lies wholly above its horizon sends (n.w) (-w.S) / (pi r^2),
+ * with a relative error of about rms^2 / r^2 (1 / cos + 1 / cos').
+ * 2. Any other node is known between two bounds only: max(0, -w.S) and, by Cauchy-Schwarz on the moments,
+ *    (sqrt(A w.M w) - w.S) / 2.
+ * 3. Nodes are opened until the error is small against their own light or against the lamp's.
+ * 4. A far bent lamp needs no cut: a table holds its projected area over all directions.
  */
 #include "radiosity/light/lamp_cut.h"
 
@@ -16,34 +17,55 @@
 
 #include <string.h>
 
+/* Error allowed to a node: a share of its own light, or SHARE_ERROR of the lamp's. With these two values,
+ * tests/radiosity/test_lamp.c finds the light of dense lamps within .6 % of the sum over their triangles. */
 #define RELATIVE_ERROR .02
-#define FAR_ERROR      .02
-#define BEND_ERROR     .2
-#define BOUND_ERROR    .35 /* of the distance between bounds */
-#define PLATE_VARIANCE .29 /* of the squared half side: 1/3 for a rectangle, 1/4 for an ellipse */
 #define SHARE_ERROR    7e-4
-#define STACK_SIZE     256
+/* rms^2 / r^2 (1 + 1 / cos) below which a table of projected areas replaces the cut. */
+#define FAR_ERROR .02
+/* Error of a bent node per radian of its normal cone and per rms / r. Smaller: bumpy lamps close by are
+ * coarse. */
+#define BEND_ERROR .2
+/* Expected error as a share of the distance between the bounds. Smaller: nodes across the horizon stay
+ * closed. */
+#define BOUND_ERROR .35
+/* Variance of a plate along its side over the squared half side: 1/3 for a rectangle, 1/4 for an ellipse. A
+ * cluster's outline lies between the two. */
+#define PLATE_VARIANCE .29
+/* Cosines are at least this in error bounds, which would be infinite otherwise. */
+#define LEAST_COSINE .05
+/* A triangle larger than its distance is cut into quarters if it sends more than this share of the lamp's
+ * light: points for shadow rays would be unevenly distributed over its light. */
+#define BRIGHT_PART .05
+#define MAX_PART    (1u << 12) /* quarters down to 4^-6 of a triangle */
+/* Clusters whose projected areas the table sums. */
 #define TABLE_CLUSTERS 2048
-#define MAX_PART       (1u << 12) /* sub-triangles down to 4^-6 */
+#define STACK_SIZE     256
 
-/* What a node sends: an estimate, an upper bound of it, and the error to be expected. */
+/* Light of a node: estimate, upper bound, expected error. */
 typedef struct outlook {
     double light, upper, error;
-    bool whole; /* the node faces the receiver and lies above its horizon wholly */
+    bool whole; /* the node wholly faces the receiver and lies wholly above its horizon */
 } outlook;
 
-static v3 direct_vector(const double m[12], v3 p) {
+static v3 transform_vector(const double m[12], v3 p) {
     return v3_make(m[0] * p.x + m[1] * p.y + m[2] * p.z, m[4] * p.x + m[5] * p.y + m[6] * p.z,
                    m[8] * p.x + m[9] * p.y + m[10] * p.z);
 }
 
-static void triangle_corners(const fct_tree_view *view, uint32_t place, v3 out[3]) {
+static void load_triangle(const fct_tree_view *view, uint32_t place, v3 out[3]) {
     const uint32_t *t = view->triangles + 3 * (size_t)place;
     for (int k = 0; k < 3; ++k) out[k] = v3_load(view->positions + 3 * (size_t)t[k]);
 }
 
-/* Shrinks the corners to the quarter triangles that the digits of `part` name, the leading 1 aside. */
-static void part_corners(uint32_t part, v3 p[3]) {
+/* Shrinks the corners to the quarter that the base-4 digits of `part` name, after the leading 1:
+ *           2
+ *          / \
+ *        m2 - m1        digit k: the quarter at corner k; digit 3: the middle one
+ *        / \ / \
+ *       0 - m0 - 1
+ */
+static void shrink_to_part(uint32_t part, v3 p[3]) {
     int shift = 0;
     while (part >> (shift + 2)) shift += 2;
     for (shift -= 2; shift >= 0; shift -= 2) {
@@ -67,23 +89,23 @@ static void part_corners(uint32_t part, v3 p[3]) {
     }
 }
 
-/* Which side of the surface the receiver sees: 1 front, -1 back, 0 both or unknown. `spread`: sine of the
- * angle within which directions to the node vary; `w` towards the node. */
-static int cluster_side(const fct_cluster *c, v3 w, double spread) {
+/* The side of the node that the receiver sees: 1 front, -1 back, 0 both or unknown. Directions to the node
+ * are within the angle with sine `spread` of w. */
+static int find_visible_side(const fct_cluster *c, v3 w, double spread) {
     v3 s = v3_load(c->area_vector);
     double length = v3_norm(s);
     if (!(c->cone_angle < 1.6) || length == 0 || spread > .9) return 0;
-    /* sin(margin) <= margin: a little wide, and no arc cosine */
+    /* sin(x) <= x makes the test a little too wide, and saves an arc cosine. */
     double cosine = -v3_dot(s, w) / length, margin = c->cone_angle + 1.25 * spread;
     return cosine > margin ? 1 : cosine < -margin ? -1 : 0;
 }
 
-/* The mean of max(0, c) for cosines spread evenly over c +- s. */
-static double clipped_mean(double c, double s) {
+/* The mean of max(0, x) over x uniform in [c - s, c + s]. */
+static double average_above_zero(double c, double s) {
     return c >= s ? c : c <= -s ? 0 : (c + s) * (c + s) / (4 * s);
 }
 
-static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
+static outlook estimate_cluster(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
     v3 middle = v3_sub(v3_load(c->box_center), rec->x), d = v3_sub(v3_load(c->centroid), rec->x);
     double half2 = v3_norm2(v3_load(c->box_half)), shift2 = v3_norm2(v3_sub(d, middle));
     double radius = sqrt(half2) + sqrt(shift2), r2 = v3_norm2(d), height = v3_dot(d, rec->n);
@@ -91,7 +113,7 @@ static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, co
     double r = sqrt(r2), floor2 = r2 > radius * radius ? r2 : radius * radius;
     double spread = radius < r ? radius / r : 1, cosx = r > 0 ? height / r : 0;
     v3 w = r > 0 ? v3_scale(d, 1 / r) : rec->n;
-    int side = cluster_side(c, w, spread);
+    int side = find_visible_side(c, w, spread);
     if (side < 0 && !lamp->two_sided) return (outlook){0};
     double toward = -v3_dot(v3_load(c->area_vector), w), kernel = 1 / (FCT_PI * floor2);
     double cross =
@@ -102,21 +124,22 @@ static outlook cluster_outlook(const fct_lamp *lamp, const fct_receiver *rec, co
     double lower = lamp->two_sided ? fabs(toward) : fmax(0, toward);
     if (upper < lower) upper = lower;
     double top = fmin(1, cosx + spread) * kernel, bottom = fmax(0, cosx - spread) * kernel;
-    /* Directions turn by up to asin(spread) over the node, and what is edge-on here faces x there. */
+    /* Directions turn by up to asin(spread) over the node, so faces that are edge-on for w may face x. */
     double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
     if (side && cosx >= spread && spread < .5) {
-        double light = fabs(toward) * cosx * kernel, cosy = fmax(.05, fabs(toward) / c->area);
+        double light = fabs(toward) * cosx * kernel, cosy = fmax(LEAST_COSINE, fabs(toward) / c->area);
         double rms = sqrt(half2 / 3 + shift2) / r, bend = fmin(c->cone_angle, 1);
-        double error = rms * rms * (1 / fmax(.05, cosx) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
+        double error = rms * rms * (1 / fmax(LEAST_COSINE, cosx) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
         return (outlook){light, widest * top, light * error, true};
     }
-    double light = (.5 * (lower + upper)) * clipped_mean(cosx, spread) * kernel;
+    double light = (.5 * (lower + upper)) * average_above_zero(cosx, spread) * kernel;
     return (outlook){light, widest * top, BOUND_ERROR * (widest * top - (side ? lower * bottom : 0)), false};
 }
 
-/* The mean of (n.y) (s.y) / |y|^4 over a surface about y = d over its value at d, to second order, less 1.
- * The covariance is given as three axes: sum_k axis_k axis_k^T. */
-static double kernel_correction(v3 d, v3 n, v3 s, const v3 axes[3]) {
+/* Second-order correction of the kernel K(y) = (n.y) (s.y) / |y|^4 over a surface with centroid d: mean of K
+ * over K(d), minus 1. The surface's covariance is sum_k axis_k axis_k^T, so the value is the trace of
+ * covariance times Hessian of K, over 2 K(d). */
+static double correct_kernel(v3 d, v3 n, v3 s, const v3 axes[3]) {
     double a = v3_dot(n, d), b = v3_dot(s, d), r2 = v3_norm2(d), sum = 0;
     for (int k = 0; k < 3; ++k) {
         double na = v3_dot(n, axes[k]), sa = v3_dot(s, axes[k]), da = v3_dot(d, axes[k]) / r2;
@@ -125,17 +148,19 @@ static double kernel_correction(v3 d, v3 n, v3 s, const v3 axes[3]) {
     return sum;
 }
 
-/* The same for a cluster taken as a flat plate that fills its box. */
-static double cluster_correction(const fct_receiver *rec, const fct_cluster *c) {
+/* The same for a cluster, as a flat plate that fills its box. */
+static double correct_cluster(const fct_receiver *rec, const fct_cluster *c) {
     fct_box box;
     v3 axes[3];
     fct_cluster_box(c, &box);
     for (int k = 0; k < 3; ++k) axes[k] = v3_scale(v3_load(box.axes[k]), box.half[k] * sqrt(PLATE_VARIANCE));
-    return kernel_correction(v3_sub(v3_load(c->centroid), rec->x), rec->n, v3_load(c->area_vector), axes);
+    return correct_kernel(v3_sub(v3_load(c->centroid), rec->x), rec->n, v3_load(c->area_vector), axes);
 }
 
-/* A triangle: exact, or the far formula. Corners relative to x. */
-static double triangle_light(const fct_lamp *lamp, const fct_receiver *rec, const v3 p[3], bool *near) {
+/* Light of a triangle with corners relative to x: the far formula if its error is small, else Lambert's.
+ * *near: the triangle is larger than its distance. The covariance of a triangle is sum e_k e_k^T / 36 over
+ * its sides. */
+static double light_triangle(const fct_lamp *lamp, const fct_receiver *rec, const v3 p[3], bool *near) {
     v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), e = v3_sub(p[2], p[1]);
     double length = v3_norm(cross), height = -v3_dot(cross, p[0]);
     *near = false;
@@ -148,13 +173,14 @@ static double triangle_light(const fct_lamp *lamp, const fct_receiver *rec, cons
     if (low > 0 && size2 / 36 * (cosx + cosy) < RELATIVE_ERROR * r2 * cosx * cosy) {
         v3 axes[3] = {v3_scale(v3_sub(p[1], p[0]), 1. / 6), v3_scale(v3_sub(p[2], p[0]), 1. / 6),
                       v3_scale(e, 1. / 6)};
-        return .5 * length * cosx * cosy / (FCT_PI * r2) * (1 + kernel_correction(d, rec->n, cross, axes));
+        return .5 * length * cosx * cosy / (FCT_PI * r2) * (1 + correct_kernel(d, rec->n, cross, axes));
     }
     *near = size2 > r2;
     return fct_triangle_irradiance(p, rec->n);
 }
 
-static bool cut_add(fct_cut *cut, uint32_t node, uint32_t part, double light) {
+/* Adds an item; false if the cut is full, and the last item takes its light. */
+static bool append_item(fct_cut *cut, uint32_t node, uint32_t part, double light) {
     cut->light += light;
     if (cut->count < FCT_CUT_SIZE) {
         if (light > 0) cut->items[cut->count++] = (fct_cut_item){node, part, light};
@@ -164,30 +190,31 @@ static bool cut_add(fct_cut *cut, uint32_t node, uint32_t part, double light) {
     return false;
 }
 
-/* Adds a leaf, in quarters where it is large beside its distance and bright. */
-static bool cut_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double reference,
-                     fct_cut *cut) {
+/* Adds a leaf, in quarters where it is near and bright. */
+static bool append_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double reference,
+                        fct_cut *cut) {
     uint32_t parts[32], count = 1;
     bool fits = true;
     parts[0] = 1;
     v3 whole[3];
-    triangle_corners(&lamp->view, node - lamp->view.node_count, whole);
+    load_triangle(&lamp->view, node - lamp->view.node_count, whole);
     for (int k = 0; k < 3; ++k) whole[k] = v3_sub(whole[k], rec->x);
     while (count) {
         uint32_t part = parts[--count];
         v3 p[3] = {whole[0], whole[1], whole[2]};
         bool near;
-        part_corners(part, p);
-        double light = triangle_light(lamp, rec, p, &near);
-        if (near && part < MAX_PART && light > .05 * reference && cut->count + 32 < FCT_CUT_SIZE)
+        shrink_to_part(part, p);
+        double light = light_triangle(lamp, rec, p, &near);
+        if (near && part < MAX_PART && light > BRIGHT_PART * reference && cut->count + 32 < FCT_CUT_SIZE)
             for (uint32_t digit = 4; digit-- > 0;) parts[count++] = part << 2 | digit;
         else
-            fits = cut_add(cut, node, part, light) && fits;
+            fits = append_item(cut, node, part, light) && fits;
     }
     return fits;
 }
 
-/* Cuts the trees below `node` so that errors stay below `share`; false when there were too many nodes. */
+/* Adds the cut of the tree below `node` whose nodes have errors below `share`. False: the cut became too
+ * large. */
 static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
                      double reference, fct_cut *cut) {
     uint32_t stack[STACK_SIZE], depth = 1;
@@ -196,17 +223,17 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
     while (depth) {
         node = stack[--depth];
         if (node >= lamp->view.node_count) {
-            fits = cut_leaf(lamp, rec, node, reference, cut) && fits;
+            fits = append_leaf(lamp, rec, node, reference, cut) && fits;
             continue;
         }
         fct_cluster room;
         const fct_cluster *c = fct_node_cluster(lamp->tree, node, &room);
-        outlook o = cluster_outlook(lamp, rec, c);
+        outlook o = estimate_cluster(lamp, rec, c);
         if (o.upper <= 0) continue;
         bool full = depth + 2 > STACK_SIZE || cut->count + depth + 1 > FCT_CUT_SIZE;
         if (full || o.error <= share || o.error <= RELATIVE_ERROR * o.light) {
-            if (o.whole) o.light *= 1 + fmin(fmax(cluster_correction(rec, c), -.1), .1);
-            fits = cut_add(cut, node, 1, o.light) && !full && fits;
+            if (o.whole) o.light *= 1 + fmin(fmax(correct_cluster(rec, c), -.1), .1);
+            fits = append_item(cut, node, 1, o.light) && !full && fits;
         } else {
             stack[depth++] = fct_node_child(lamp->tree, node, 1);
             stack[depth++] = fct_node_child(lamp->tree, node, 0);
@@ -215,7 +242,8 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
     return fits;
 }
 
-static double table_light(const double *table, v3 w) {
+/* Projected area in the direction of the unit vector w, bilinear on the cube. */
+static double look_up_area(const double *table, v3 w) {
     double a[3] = {w.x, w.y, w.z};
     int axis = fabs(a[0]) >= fabs(a[1])   ? (fabs(a[0]) >= fabs(a[2]) ? 0 : 2)
                : fabs(a[1]) >= fabs(a[2]) ? 1
@@ -233,8 +261,8 @@ static double table_light(const double *table, v3 w) {
            s;
 }
 
-/* The whole lamp from afar; false where it is too near or cut by the horizon. */
-static bool far_light(const fct_lamp *lamp, const fct_receiver *rec, double *light) {
+/* Light of the whole lamp by its table. False if the lamp is too near or crosses the horizon. */
+static bool light_far_lamp(const fct_lamp *lamp, const fct_receiver *rec, double *light) {
     v3 d = v3_sub(lamp->center, rec->x);
     double r2 = v3_norm2(d), height = v3_dot(d, rec->n);
     *light = 0;
@@ -242,7 +270,7 @@ static bool far_light(const fct_lamp *lamp, const fct_receiver *rec, double *lig
     if (!lamp->table || height < lamp->radius) return false;
     double r = sqrt(r2), cosx = height / r;
     if (lamp->rms2 * (1 + 1 / cosx) > FAR_ERROR * r2) return false;
-    *light = table_light(lamp->table, v3_scale(d, -1 / r)) * cosx / (FCT_PI * r2);
+    *light = look_up_area(lamp->table, v3_scale(d, -1 / r)) * cosx / (FCT_PI * r2);
     return true;
 }
 
@@ -251,12 +279,12 @@ double fct_lamp_estimate(const fct_lamp *lamp, const fct_receiver *rec) {
     double r2 = v3_norm2(d), height = v3_dot(d, rec->n), radius = lamp->radius;
     if (height <= -radius) return 0;
     double toward = -v3_dot(lamp->vector, d);
-    /* A plane's front lights one side of it alone, whatever the distance. */
+    /* A plane lights only the side of its front. */
     if (!lamp->table && !lamp->two_sided && toward <= -2e-3 * radius * lamp->area) return 0;
     if (r2 < .25 * radius * radius) return 1;
-    /* As of a disk of the projected area that faces the receiver: A / (A + pi r^2). */
+    /* A disk that faces the receiver gives A / (A + pi r^2) on its axis. */
     double r = sqrt(r2), cosx = fmin(1, (height + radius) / r);
-    double area = lamp->table ? table_light(lamp->table, v3_scale(d, -1 / r)) : fabs(toward) / r;
+    double area = lamp->table ? look_up_area(lamp->table, v3_scale(d, -1 / r)) : fabs(toward) / r;
     area += .1 * lamp->area * fmin(1, radius / r);
     return area * cosx / (area + FCT_PI * r2);
 }
@@ -265,10 +293,11 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
     const fct_tree_view *view = &lamp->view;
     double light, reference = fct_lamp_estimate(lamp, rec), share = SHARE_ERROR;
     cut->count = 0, cut->light = 0;
-    if (view->root_count == 1 && far_light(lamp, rec, &light)) {
-        if (light > 0) cut_add(cut, view->roots[0], 1, light);
+    if (view->root_count == 1 && light_far_lamp(lamp, rec, &light)) {
+        if (light > 0) append_item(cut, view->roots[0], 1, light);
         return;
     }
+    /* The estimate is the first reference; a cut that finds much less light repeats with a smaller one. */
     for (int round = 0; round < 8 && reference > 0; ++round) {
         bool fits = true;
         cut->count = 0, cut->light = 0;
@@ -280,9 +309,9 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
     }
 }
 
-/* A cluster's projected area, its area vector's or at least a tenth of it all, times the most that its place
- * lets through. */
-static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
+/* Weight of a cluster for shadow points: projected area, at least a tenth of the area, times the largest
+ * cosine at the receiver over the squared distance. */
+static double weigh_cluster(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
     v3 d = v3_sub(v3_load(c->centroid), rec->x), half = v3_load(c->box_half);
     double radius = half.x + half.y + half.z, r2 = v3_norm2(d) + radius * radius;
     double top = v3_dot(d, rec->n) + radius;
@@ -292,15 +321,14 @@ static double cluster_weight(const fct_lamp *lamp, const fct_receiver *rec, cons
     return (seen + .1 * c->area * r) * fmin(top, r) / (r2 * r2);
 }
 
-/* How much of the light below an inner node comes through one of its children, roughly; positive unless
- * nothing does. */
-static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node) {
+/* Rough light of a node, for the choice between two children; positive unless the node sends nothing. */
+static double weigh_node(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node) {
     if (node < lamp->view.node_count) {
         fct_cluster room;
-        return cluster_weight(lamp, rec, fct_node_cluster(lamp->tree, node, &room));
+        return weigh_cluster(lamp, rec, fct_node_cluster(lamp->tree, node, &room));
     }
     v3 p[3];
-    triangle_corners(&lamp->view, node - lamp->view.node_count, p);
+    load_triangle(&lamp->view, node - lamp->view.node_count, p);
     for (int k = 0; k < 3; ++k) p[k] = v3_sub(p[k], rec->x);
     v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
     double length = v3_norm(cross), height = -v3_dot(cross, p[0]);
@@ -311,13 +339,13 @@ static double node_weight(const fct_lamp *lamp, const fct_receiver *rec, uint32_
     return top > 0 ? .5 * fabs(height) * (top + .1 * sqrt(size2)) / (FCT_PI * r2 * r2) : 0;
 }
 
-/* Goes down to a leaf by the children's weights, reusing *u; *chance is multiplied by the probability.
- * FCT_NONE where nothing is to be had. */
-static uint32_t descend(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double *u,
-                        double *chance) {
+/* Walks down to a leaf by the children's weights. *u in [0, 1) chooses and is stretched to [0, 1) again;
+ * *chance is multiplied by the probability. Returns FCT_NONE if no child sends light. */
+static uint32_t descend_to_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double *u,
+                                double *chance) {
     while (node < lamp->view.node_count) {
         const uint32_t child[2] = {fct_node_child(lamp->tree, node, 0), fct_node_child(lamp->tree, node, 1)};
-        double left = node_weight(lamp, rec, child[0]), right = node_weight(lamp, rec, child[1]);
+        double left = weigh_node(lamp, rec, child[0]), right = weigh_node(lamp, rec, child[1]);
         if (!(left + right > 0)) return FCT_NONE;
         double p = left / (left + right);
         if (*u < p) {
@@ -330,6 +358,7 @@ static uint32_t descend(const fct_lamp *lamp, const fct_receiver *rec, uint32_t 
     return node;
 }
 
+/* Chooses an item in proportion to its light; u and chance as in descend_to_leaf. */
 static uint32_t choose_item(const fct_cut *cut, double *u, double *chance) {
     double target = *u * cut->light, sum = 0;
     uint32_t i = 0;
@@ -346,14 +375,14 @@ fct_lamp_point fct_cut_point(const fct_lamp *lamp, const fct_receiver *rec, cons
     if (cut->count == 0) return out;
     double chance;
     uint32_t i = choose_item(cut, &u, &chance);
-    uint32_t leaf = descend(lamp, rec, cut->items[i].node, &u, &chance);
+    uint32_t leaf = descend_to_leaf(lamp, rec, cut->items[i].node, &u, &chance);
     if (leaf == FCT_NONE) return out;
     out.place = leaf - lamp->view.node_count;
     v3 p[3];
-    triangle_corners(&lamp->view, out.place, p);
-    part_corners(cut->items[i].part, p);
-    /* u has been spent on the choice of the triangle: v, fresh, runs along the triangle, from the corner
-     * across its shortest side. */
+    load_triangle(&lamp->view, out.place, p);
+    shrink_to_part(cut->items[i].part, p);
+    /* The choice of the triangle has used up u. So v, which is still stratified, runs along the triangle,
+     * from the corner opposite its shortest side. */
     double b[2], sides[3];
     for (int k = 0; k < 3; ++k) sides[k] = v3_norm2(v3_sub(p[(k + 2) % 3], p[(k + 1) % 3]));
     int tip = sides[0] <= sides[1] && sides[0] <= sides[2] ? 0 : sides[1] <= sides[2] ? 1 : 2;
@@ -374,12 +403,12 @@ fct_receiver fct_lamp_receiver(const fct_lamp *lamp, const double point[3], cons
     double largest = fmax(fabs(x.x), fmax(fabs(x.y), fabs(x.z)));
     rec.slack += 4e-7 * largest / lamp->scale;
     const double *m = lamp->to_model;
-    rec.x = v3_add(direct_vector(m, x), v3_make(m[3], m[7], m[11]));
-    rec.n = v3_unit(direct_vector(m, v3_make(normal[0], normal[1], normal[2])));
+    rec.x = v3_add(transform_vector(m, x), v3_make(m[3], m[7], m[11]));
+    rec.n = v3_unit(transform_vector(m, v3_make(normal[0], normal[1], normal[2])));
     return rec;
 }
 
-/* What the table needs of a cluster. */
+/* A cluster of the table. */
 typedef struct facet {
     v3 vector;
     double area, moment[6];
@@ -391,8 +420,9 @@ typedef struct table_work {
     uint32_t count;
 } table_work;
 
-/* Projected area of the lamp's clusters in one direction of the cube. */
-static void table_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+/* Fills entries [begin, end): the mean of both bounds of the projected area, summed over clusters, in the
+ * direction of an entry's point on the cube. */
+static void fill_table(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const table_work *work = user;
     const int side = FCT_LAMP_CELLS + 1;
@@ -434,15 +464,15 @@ static fct_result make_table(const fct_env *env, fct_lamp *lamp) {
         facets[i] = (facet){.vector = v3_load(c->area_vector), .area = c->area};
         for (int k = 0; k < 6; ++k) facets[i].moment[k] = c->moment[k];
     }
-    fct_parallel_for(env, FCT_LAMP_TABLE, 8, table_body, &work);
+    fct_parallel_for(env, FCT_LAMP_TABLE, 8, fill_table, &work);
 done:
     fct_release(env, nodes);
     fct_release(env, facets);
     return result;
 }
 
-/* Sums over the roots. */
-static void measure(fct_lamp *lamp) {
+/* Area, area vector, centroid, radius and rounding, from the roots. */
+static void measure_lamp(fct_lamp *lamp) {
     double area = 0, largest = 0;
     v3 center = {0, 0, 0}, vector = {0, 0, 0};
     fct_cluster room;
@@ -468,7 +498,7 @@ static void measure(fct_lamp *lamp) {
     lamp->rounding += 4e-7 * fmax(fabs(t[3]), fmax(fabs(t[7]), fabs(t[11]))) / lamp->scale;
 }
 
-/* A tree of the lamp as it stands in the world. */
+/* Builds a tree of the lamp in world space. */
 static fct_result make_own_tree(const fct_env *env, const fct_instance *placed, fct_lamp *lamp) {
     fct_mesh mesh;
     fct_result result = fct_tree_mesh(env, lamp->tree, &mesh);
@@ -509,7 +539,7 @@ fct_result fct_lamp_init(const fct_env *env, const fct_scene_view *scene, uint32
     }
     if (result != FCT_OK) return result;
     out->view = fct_tree_get(out->tree);
-    measure(out);
+    measure_lamp(out);
     bool planar = v3_norm(out->vector) > (1 - 1e-6) * out->area;
     if (!planar && out->area > 0) result = make_table(env, out);
     if (result != FCT_OK) fct_lamp_release(env, out);

@@ -1,15 +1,16 @@
-/* radiosity/light/polygon.h: what a polygon of radiant exitance 1 sends to a point: Lambert's formula.
+/* radiosity/light/polygon.h: irradiance at a point from a triangle of radiant exitance 1, by Lambert's
+ * formula.
  *
- * E = 1 / (2 pi) sum theta_i (n . gamma_i) over the sides, with theta_i the angle a side subtends at the
- * point and gamma_i the unit normal of the plane through side and point. Exact at any distance for a polygon
- * above the receiver's horizon, hence the clip.
+ * E = 1 / (2 pi) sum theta_i (n . gamma_i) over the sides, where theta_i is the angle that a side subtends at
+ * the point and gamma_i the unit normal of the plane through side and point. The formula is exact at any
+ * distance for a polygon above the receiver's horizon; fct_triangle_clip cuts off the part below.
  */
 #ifndef FCT_RADIOSITY_POLYGON_H
 #define FCT_RADIOSITY_POLYGON_H
 
 #include "radiosity/sample.h"
 
-/* atan2(y, x) for y >= 0 to 1e-10: the series about 0 and pi / 4. A third of the library's time. */
+/* atan2(y, x) for y >= 0, to 1e-10: the series about 0 or about pi / 4. Takes a third of atan2's time. */
 static inline double fct_angle(double y, double x) {
     double wide = fabs(x), t = y < wide ? y / wide : wide / y, shift = 0;
     if (t > .41421356237309503) t = (t - 1) / (t + 1), shift = FCT_PI / 4;
@@ -20,7 +21,7 @@ static inline double fct_angle(double y, double x) {
     return x < 0 ? FCT_PI - angle : angle;
 }
 
-/* The part of the triangle with n . p >= 0, corners relative to the point; returns 0, 3 or 4 corners. */
+/* The part of the triangle with n . p >= 0; corners are relative to the point. Returns 0, 3 or 4 corners. */
 static inline int fct_triangle_clip(const v3 corners[3], v3 n, v3 out[4]) {
     double height[3];
     int above = 0, count = 0;
@@ -36,8 +37,8 @@ static inline int fct_triangle_clip(const v3 corners[3], v3 n, v3 out[4]) {
     return count;
 }
 
-/* Irradiance over exitance at the origin with unit normal n; corners relative to it. In [0, 1]; either
- * winding. 0 when the origin lies in the triangle's plane. */
+/* Irradiance over exitance at the origin with unit normal n, in [0, 1], for either winding; 0 if the origin
+ * lies in the triangle's plane. Corners are relative to the origin. */
 static inline double fct_triangle_irradiance(const v3 corners[3], v3 n) {
     v3 p[4], sum = {0, 0, 0};
     int count = fct_triangle_clip(corners, n, p);

@@ -1,7 +1,8 @@
 /* radiosity/solve/element.c: see element.h.
  *
- * Under a rotation times a factor the file's sums are turned as they are; under any other transform they are
- * summed anew from the faces, so that an opened cluster then costs its number of faces.
+ * Under a similarity (rotation or reflection times a factor), the sums of the hierarchy file transform in
+ * closed form and an element costs O(1). Under any other transform, A and M do not follow from the file's
+ * sums: set_from_faces adds them up, and an opened cluster costs O(its faces).
  */
 #include "radiosity/solve/element.h"
 
@@ -12,14 +13,15 @@
 
 enum { PAGE = 4096 };
 
+/* An area vector in world space that still points to the outside of a mirrored model. */
 static v3 area_to_world(const fct_instance *in, v3 s) {
     v3 r = fct_transform_normal(in->normal_matrix, s);
     return in->mirrored ? v3_scale(r, -1) : r;
 }
 
-/* Marks the pages of model `model` that hold bytes [begin, begin + size) of section 0 (nodes), 1 (triangles),
- * 2 (positions). */
-static void touch(const fct_elements *set, uint32_t model, int section, size_t begin, size_t size) {
+/* Marks the pages of a model's hierarchy that hold bytes [begin, begin + size) of section 0 (nodes),
+ * 1 (triangles) or 2 (positions). */
+static void mark_pages(const fct_elements *set, uint32_t model, int section, size_t begin, size_t size) {
     const fct_tree_view t = fct_tree_get(set->view.models[model].tree);
     size_t base = 0;
     if (section > 0) base += (size_t)t.node_count * sizeof(fct_cluster) / PAGE + 1;
@@ -36,16 +38,18 @@ uint64_t fct_elements_touched(const fct_elements *set) {
     return pages * PAGE;
 }
 
-static void place_corners(const fct_elements *set, const fct_instance *in, uint32_t place, v3 p[3]) {
+/* World-space corners of the face at `place`. */
+static void load_face(const fct_elements *set, const fct_instance *in, uint32_t place, v3 p[3]) {
     fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
-    touch(set, in->model, 1, (size_t)place * 12, 12);
+    mark_pages(set, in->model, 1, (size_t)place * 12, 12);
     for (int k = 0; k < 3; ++k) {
         uint32_t v = t.triangles[3 * (size_t)place + (size_t)k];
-        touch(set, in->model, 2, (size_t)v * 12, 12);
+        mark_pages(set, in->model, 2, (size_t)v * 12, 12);
         p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * (size_t)v));
     }
 }
 
+/* sign: -1 if the corners wind against the element's side. */
 static void set_triangle(fct_element *e, const v3 p[3], double sign) {
     v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), .5 * sign);
     v3 n = v3_unit(s);
@@ -60,7 +64,7 @@ static void set_triangle(fct_element *e, const v3 p[3], double sign) {
     e->cone = 0;
 }
 
-/* Sums over the faces, for transforms that change shapes. */
+/* A, S, M and centroid as sums over the faces, for transforms that change shapes. */
 static void set_from_faces(const fct_elements *set, const fct_instance *in, const fct_cluster *c, double sign,
                            fct_element *e) {
     e->area = 0;
@@ -68,7 +72,7 @@ static void set_from_faces(const fct_elements *set, const fct_instance *in, cons
     memset(e->moment, 0, sizeof e->moment);
     for (uint32_t i = c->first; i < c->first + c->count; ++i) {
         v3 p[3];
-        place_corners(set, in, i, p);
+        load_face(set, in, i, p);
         v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), .5 * sign);
         double a = v3_norm(s);
         e->area += a;
@@ -90,7 +94,7 @@ static void set_cluster(const fct_elements *set, const fct_instance *in, const f
         e->area = c->area * s * s;
         e->vector = v3_scale(area_to_world(in, v3_load(c->area_vector)), sign);
         e->center = fct_transform_point(in->to_world, v3_load(c->centroid));
-        /* M' = N M N^T / s^2 with N = s^2 times a rotation */
+        /* M' = N M N^T / s^2, because N is s^2 times a rotation or reflection. */
         const float *n = in->normal_matrix;
         v3 rows[3] = {v3_load(n), v3_load(n + 3), v3_load(n + 6)};
         static const int index[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
@@ -99,6 +103,7 @@ static void set_cluster(const fct_elements *set, const fct_instance *in, const f
         e->cone = c->cone_angle;
     } else {
         set_from_faces(set, in, c, in->mirrored ? -sign : sign, e);
+        /* The Frobenius norm bounds the stretch of the box. */
         stretch = 0;
         for (int r = 0; r < 3; ++r)
             for (int k = 0; k < 3; ++k) stretch += (double)in->to_world[4 * r + k] * in->to_world[4 * r + k];
@@ -108,8 +113,7 @@ static void set_cluster(const fct_elements *set, const fct_instance *in, const f
     e->radius = stretch * v3_norm(v3_load(c->box_half)) + v3_norm(from);
 }
 
-/* Room for `more` elements. */
-static fct_result reserve(fct_elements *set, size_t more) {
+static fct_result reserve_elements(fct_elements *set, size_t more) {
     fct_result r =
         fct_grow(set->env, (void **)&set->items, &set->capacity, set->count + more, sizeof *set->items);
     if (r == FCT_OK)
@@ -135,7 +139,7 @@ static void load_corners(const fct_elements *set, uint32_t triangle, v3 p[3]) {
     for (int k = 0; k < 3; ++k) p[k] = v3_load(set->corners + 9 * (size_t)triangle + 3 * k);
 }
 
-/* Appends the element of a tree node; capacity is there. */
+/* Appends the element of a tree node. The caller has reserved its place. */
 static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance, uint32_t node,
                            uint8_t back) {
     const fct_instance *in = &set->view.instances[instance];
@@ -148,12 +152,12 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     double sign = back ? -1 : 1;
     if (c->count == 1) {
         v3 p[3];
-        place_corners(set, in, c->first, p);
+        load_face(set, in, c->first, p);
         set_triangle(&e, p, in->mirrored ? -sign : sign);
         fct_result r = add_corners(set, p, &e.triangle);
         if (r != FCT_OK) return r;
     } else {
-        touch(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
+        mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         set_cluster(set, in, c, sign, &e);
     }
     for (int k = 0; k < 3; ++k) {
@@ -167,12 +171,13 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     return FCT_OK;
 }
 
-static void link_children(fct_elements *set, uint32_t id, size_t first) {
+/* Makes all elements from `first` on the children of `id`. */
+static void set_children(fct_elements *set, uint32_t id, size_t first) {
     set->items[id].child = set->ranges[id].child = (uint32_t)first;
     set->items[id].child_count = set->ranges[id].child_count = (uint32_t)(set->count - first);
 }
 
-static void inherit(fct_elements *set, uint32_t id) {
+static void copy_light_to_children(fct_elements *set, uint32_t id) {
     const fct_element *e = &set->items[id];
     for (uint32_t c = e->child; c < e->child + e->child_count; ++c)
         for (int k = 0; k < 3; ++k) {
@@ -194,11 +199,12 @@ bool fct_elements_can_split(const fct_elements *set, uint32_t id) {
     return longest > set->min_edge && e->area > 0;
 }
 
-static fct_result quarter(fct_elements *set, uint32_t id) {
+/* Three corner triangles, then the middle one; fct_elements_locate relies on this order. */
+static fct_result quarter_triangle(fct_elements *set, uint32_t id) {
     v3 p[3], m[3];
     load_corners(set, set->items[id].triangle, p);
     for (int k = 0; k < 3; ++k)
-        m[k] = v3_scale(v3_add(p[(k + 1) % 3], p[(k + 2) % 3]), .5); /* opposite corner k */
+        m[k] = v3_scale(v3_add(p[(k + 1) % 3], p[(k + 2) % 3]), .5); /* opposite to corner k */
     const v3 parts[4][3] = {{p[0], m[2], m[1]}, {m[2], p[1], m[0]}, {m[1], m[0], p[2]}, {m[0], m[1], m[2]}};
     const fct_instance *in = &set->view.instances[set->items[id].instance];
     double sign = (set->items[id].back ? -1 : 1) * (in->mirrored ? -1 : 1);
@@ -216,20 +222,20 @@ static fct_result quarter(fct_elements *set, uint32_t id) {
 }
 
 fct_result fct_elements_split(fct_elements *set, uint32_t id) {
-    fct_result r = reserve(set, 4);
+    fct_result r = reserve_elements(set, 4);
     if (r != FCT_OK) return r;
     size_t first = set->count;
     const fct_element e = set->items[id];
     if (e.kind == FCT_ELEMENT_TRIANGLE) {
-        r = quarter(set, id);
+        r = quarter_triangle(set, id);
     } else {
         const fct_tree *tree = set->view.models[set->view.instances[e.instance].model].tree;
         r = add_node(set, id, e.instance, fct_node_child(tree, e.node, 0), e.back);
         if (r == FCT_OK) r = add_node(set, id, e.instance, fct_node_child(tree, e.node, 1), e.back);
     }
     if (r != FCT_OK) return r;
-    link_children(set, id, first);
-    inherit(set, id);
+    set_children(set, id, first);
+    copy_light_to_children(set, id);
     return FCT_OK;
 }
 
@@ -237,18 +243,18 @@ static fct_result add_roots(fct_elements *set, uint32_t volume, uint32_t instanc
     const fct_instance *in = &set->view.instances[instance];
     fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
     int sides = set->view.materials[in->material].two_sided ? 2 : 1;
-    fct_result r = reserve(set, (size_t)t.root_count * (size_t)sides);
+    fct_result r = reserve_elements(set, (size_t)t.root_count * (size_t)sides);
     set->roots[instance] = (uint32_t)set->count;
     set->root_counts[instance] = t.root_count;
     size_t first = set->count;
     for (int back = 0; back < sides; ++back)
         for (uint32_t i = 0; i < t.root_count && r == FCT_OK; ++i)
             r = add_node(set, volume, instance, t.roots[i], (uint8_t)back);
-    if (r == FCT_OK) link_children(set, volume, first);
+    if (r == FCT_OK) set_children(set, volume, first);
     return r;
 }
 
-/* Sums of a volume from its children, children having larger numbers. */
+/* Sums of a volume from its children, which have larger numbers. */
 static void sum_volume(fct_elements *set, uint32_t id) {
     fct_element *e = &set->items[id];
     e->area = 0;
@@ -288,8 +294,7 @@ fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, doubl
         if (!set->touched[m]) goto done;
         set->touched_sizes[m] = pages;
     }
-    /* the volumes keep their numbers */
-    if ((r = reserve(set, view->volume_count)) != FCT_OK) goto done;
+    if ((r = reserve_elements(set, view->volume_count)) != FCT_OK) goto done;
     for (uint32_t i = 0; i < view->volume_count; ++i) {
         set->items[i] = (fct_element){.parent = FCT_NONE,
                                       .instance = FCT_NONE,
@@ -302,8 +307,7 @@ fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, doubl
     for (uint32_t i = 0; i < view->volume_count && r == FCT_OK; ++i)
         if (view->volumes[i].instance != FCT_NONE) r = add_roots(set, i, view->volumes[i].instance);
     if (r != FCT_OK) goto done;
-    /* A volume's two children need not be neighbours in the scene's numbering: a binary volume names a pair.
-     */
+    /* The scene numbers the two children of a volume one after the other. */
     for (uint32_t i = 0; i < view->volume_count; ++i)
         if (view->volumes[i].instance == FCT_NONE) {
             for (int k = 0; k < 2; ++k) set->items[view->volumes[i].child[k]].parent = i;
@@ -328,12 +332,12 @@ void fct_elements_release(fct_elements *set) {
     *set = (fct_elements){0};
 }
 
-/* Walks down the hierarchy by area to one face of a cluster. */
-static uint32_t face_by_area(const fct_elements *set, const fct_instance *in, uint32_t node, double *t) {
+/* Place of the face at fraction *t of the area of a node; *t becomes the fraction within that face. */
+static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *in, uint32_t node, double *t) {
     const fct_tree *tree = set->view.models[in->model].tree;
     fct_tree_view view = fct_tree_get(tree);
     while (node < view.node_count) {
-        touch(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
+        mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         double area[2];
         for (int k = 0; k < 2; ++k) {
             fct_cluster room;
@@ -351,7 +355,7 @@ static uint32_t face_by_area(const fct_elements *set, const fct_instance *in, ui
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out) {
     const fct_element *e = &set->items[id];
-    while (e->kind == FCT_ELEMENT_VOLUME) { /* to an instance's root, by area */
+    while (e->kind == FCT_ELEMENT_VOLUME) { /* down to a root, by area */
         uint32_t last = e->child + e->child_count - 1, c = e->child;
         double total = 0, before = 0;
         for (uint32_t i = c; i <= last; ++i) total += set->items[i].area;
@@ -361,26 +365,27 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         e = &set->items[c];
     }
     const fct_instance *in = &set->view.instances[e->instance];
-    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v; /* uniform in the triangle */
+    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v;
     v3 p[3];
     if (e->kind == FCT_ELEMENT_TRIANGLE) {
         load_corners(set, e->triangle, p);
         out->place = set->ranges[e - set->items].first;
     } else {
-        out->place = face_by_area(set, in, e->node, &t);
-        place_corners(set, in, out->place, p);
+        out->place = find_face_by_area(set, in, e->node, &t);
+        load_face(set, in, out->place, p);
     }
     double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
     v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
     v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
     out->u = (float)u, out->v = (float)v;
+    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger. */
     double size = sqrt(v3_norm(s)), reach = fmax(fmax(fabs(x.x), fabs(x.y)), fabs(x.z));
     out->offset = (float)(1e-4 * size + 2e-7 * reach);
     v3_store(out->position, x);
     v3_store(out->normal, v3_unit(s));
 }
 
-static void point_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void choose_points_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     fct_elements *set = user;
     (void)chunk, (void)thread;
     for (size_t i = set->pointed + begin; i < set->pointed + end; ++i)
@@ -393,7 +398,7 @@ static void point_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
 }
 
 void fct_elements_make_points(fct_elements *set) {
-    fct_parallel_for(set->env, set->count - set->pointed, 64, point_chunk, set);
+    fct_parallel_for(set->env, set->count - set->pointed, 64, choose_points_chunk, set);
     set->pointed = set->count;
 }
 
@@ -402,8 +407,7 @@ uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool ba
     const fct_instance *in = &set->view.instances[instance];
     if (back && !set->view.materials[in->material].two_sided) return FCT_NONE;
     uint32_t id = set->roots[instance] + (back ? set->root_counts[instance] : 0);
-    for (uint32_t last = id + set->root_counts[instance] - 1;
-         id < last;) { /* roots tile the places in order */
+    for (uint32_t last = id + set->root_counts[instance] - 1; id < last;) { /* ranges of roots ascend */
         uint32_t middle = id + (last - id + 1) / 2;
         if (set->ranges[middle].first <= place)
             id = middle;
@@ -433,7 +437,8 @@ uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool ba
 }
 
 void fct_elements_pull(fct_elements *set) {
-    /* children of volumes may have smaller numbers than their parents, those of surfaces never have */
+    /* Descending order visits children before parents within surfaces and within volumes. Surfaces go first:
+     * volumes have smaller numbers than the roots below them. */
     for (size_t pass = 0; pass < 2; ++pass) {
         size_t volumes = set->view.volume_count;
         size_t begin = pass == 0 ? volumes : 0, end = pass == 0 ? set->count : volumes;

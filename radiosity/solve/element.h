@@ -1,10 +1,13 @@
-/* radiosity/solve/element.h: the elements of a solution: the parts of the scene's hierarchies that it has
- * opened, and nothing below.
+/* radiosity/solve/element.h: the elements of a solution: the opened part of the scene's hierarchies.
  *
- * The elements form one tree: volumes over the instances, then each instance's roots (front, and back where
- * the material has two sides), then clusters as the hierarchy file has them, single triangles at last, and
- * below a large triangle its quarters. Only split makes elements, so a hierarchy is read no deeper than the
- * light asks for. All quantities are in world space.
+ *     volumes over the instances          element i is volume i of the scene
+ *       `- roots of each instance         front roots, then back roots of a two-sided material
+ *            `- clusters                  as in the hierarchy file
+ *                 `- triangles
+ *                      `- quarters        of triangles with an edge above min_edge
+ *
+ * Only fct_elements_split adds elements, so the solution reads a hierarchy no deeper than the light needs.
+ * All quantities are in world space. Garland shows such an opened hierarchy in figure 8.9.
  */
 #ifndef FCT_RADIOSITY_ELEMENT_H
 #define FCT_RADIOSITY_ELEMENT_H
@@ -17,7 +20,7 @@
 #include "radiosity/sample.h"
 
 enum { FCT_ELEMENT_POINTS = 16 };
-/* A right angle: a cone this wide says nothing about which way the element faces. */
+/* Angle of a cone that no longer bounds the side that an element shows: a right angle. */
 #define FCT_ELEMENT_OPEN_CONE 1.5707963267948966
 
 typedef enum fct_element_kind {
@@ -28,32 +31,34 @@ typedef enum fct_element_kind {
 
 typedef struct fct_element {
     v3 center;     /* centroid of the surface */
-    double radius; /* of a ball about center that holds the element */
+    double radius; /* of a ball about center that contains the element */
     double area;
     v3 vector;        /* S = sum A n */
     double moment[6]; /* M = sum A n n^T */
-    double cone;      /* every normal lies within this angle of S; pi: nothing is known */
+    double cone;      /* radians; every normal is within this angle of S; pi: unknown */
     uint32_t parent, child, child_count;
     uint32_t instance, node; /* of the tree; FCT_NONE in a volume */
-    uint32_t triangle;       /* index of its corners, FCT_NONE unless a triangle */
-    uint8_t kind, back;      /* fct_element_kind; 1 on the back of a two-sided material */
+    uint32_t triangle;       /* index of its corners; FCT_NONE unless kind is TRIANGLE */
+    uint8_t kind, back;      /* fct_element_kind; 1: back side of a two-sided material */
     float reflectance[3], emission[3];
-    double irradiance[3]; /* leaf: mean E */
-    double radiosity[3];  /* mean b = e + rho E; of an inner element the mean of its leaves */
-    v3 power[3];          /* sum of b S over the leaves */
+    double irradiance[3]; /* leaf: mean E over the surface */
+    double radiosity[3];  /* leaf: b = e + rho E; inner element: area-weighted mean of its leaves */
+    v3 power[3];          /* P = sum b_k S_k over the leaves */
 } fct_element;
 
-/* A point of an element's surface; the normal is that of its face, on the element's side. */
+/* A point of an element's surface, with the unit normal of its face on the element's side. */
 typedef struct fct_element_point {
     float position[3], normal[3];
-    float offset; /* how far to lift a ray's origin off the surface */
-    float u, v;
-    uint32_t place;
+    float offset;   /* rays start at position + offset * normal */
+    float u, v;     /* barycentrics of the second and third corner */
+    uint32_t place; /* of the face in the tree's order */
 } fct_element_point;
 
-/* What locate needs, apart from the rest to be quick. */
+/* The fields that fct_elements_locate reads, in an array of their own: 16 bytes instead of about 400 per
+ * step. */
 typedef struct fct_element_range {
-    uint32_t first, count, child, child_count;
+    uint32_t first, count; /* places of the tree's face order */
+    uint32_t child, child_count;
 } fct_element_range;
 
 typedef struct fct_elements {
@@ -62,19 +67,19 @@ typedef struct fct_elements {
     fct_scene_view view;
     fct_element *items;
     fct_element_range *ranges;
-    fct_element_point *points; /* FCT_ELEMENT_POINTS for each element */
+    fct_element_point *points; /* FCT_ELEMENT_POINTS per element */
     size_t count, capacity, range_capacity, point_capacity;
-    size_t pointed; /* elements whose points are made */
-    float *corners; /* of triangles, 3 x 3 each */
+    size_t pointed; /* elements that have their points */
+    float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
-    uint32_t *roots; /* instance -> its first root element; front roots, then back roots */
-    uint32_t *root_counts;
-    double min_edge;        /* triangles with no longer edge are not quartered */
-    atomic_uchar **touched; /* per model: pages of the hierarchy's arrays that were read */
+    uint32_t *roots;        /* instance -> its first root element; front roots, then back roots */
+    uint32_t *root_counts;  /* instance -> roots per side */
+    double min_edge;        /* a triangle whose longest edge is at most this is not quartered */
+    atomic_uchar **touched; /* per model and page of 4 KiB of its hierarchy: 1 after a read */
     size_t *touched_sizes;
 } fct_elements;
 
-/* The volumes and the instances' roots. Errors: MEMORY. */
+/* Creates the volumes and the instances' roots. Errors: MEMORY. */
 fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, double min_edge,
                                fct_elements *out);
 void fct_elements_release(fct_elements *set);
@@ -82,21 +87,23 @@ void fct_elements_release(fct_elements *set);
 static inline bool fct_element_is_leaf(const fct_element *e) {
     return e->child_count == 0;
 }
-/* Whether split would make children. */
+/* True for a leaf that fct_elements_split can open. */
 bool fct_elements_can_split(const fct_elements *set, uint32_t id);
-/* Makes the children of a leaf that can be split; they inherit its light. Errors: MEMORY. */
+/* Adds the children of a leaf that can be split. They start with its light. Errors: MEMORY. */
 fct_result fct_elements_split(fct_elements *set, uint32_t id);
-/* Makes the points of all elements added since the last call; parallel. */
+/* Chooses the points of all elements that have none: point k lies in the k-th sixteenth of the area. */
 void fct_elements_make_points(fct_elements *set);
-/* A point at fraction t in [0, 1) of the area, (a, b) uniform in its triangle. */
+/* The point at fraction t in [0, 1) of the area. (a, b) in [0, 1)^2 chooses the point of the triangle found
+ * there, uniformly. Stratified t gives points that are stratified over the surface. */
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out);
-/* The leaf at barycentrics (u, v) of the face at `place`; FCT_NONE on a back that has no element. */
+/* The leaf that contains barycentrics (u, v) of the face at `place`; FCT_NONE on the back of a one-sided
+ * material. */
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,
                              float v);
-/* Sums radiosity and power from the leaves up. */
+/* Sets radiosity and power of all inner elements from their leaves. */
 void fct_elements_pull(fct_elements *set);
-/* Bytes of the hierarchies' pages that were read so far. */
+/* Size of the hierarchies' pages that were read so far, bytes. */
 uint64_t fct_elements_touched(const fct_elements *set);
 
 #endif

@@ -1,10 +1,10 @@
-/* radiosity/solve/transport.h: the stored solution made exact in the mean: each leaf element gathers over its
- * own surface by rays.
+/* radiosity/solve/transport.h: the stored solution, gathered by rays over the surface of each leaf element.
  *
- * The links' solution decides which elements there are and starts the iteration. Then every leaf takes its
- * direct light from the lamps at a few of its points, and sends cosine-distributed rays from points spread
- * over its surface; what they hit is kept, so that the system E_i = D_i + mean of b over the hits is solved
- * to any precision without another ray. Its rows sum to at most one.
+ * Input: the elements that the links chose, with the links' solution as a start. Each leaf takes its direct
+ * light D_i from the lamps at four of its points and sends cosine-distributed rays from points all over its
+ * surface. The hits stay in memory, so the iteration of E_i = D_i + mean of b over the hits needs no further
+ * ray. Rows sum to at most 1 for any mesh, because each ray counts one hit or none; so a furnace is exact.
+ * Cost: leaves x rays.
  */
 #ifndef FCT_RADIOSITY_TRANSPORT_H
 #define FCT_RADIOSITY_TRANSPORT_H
@@ -13,37 +13,39 @@
 #include "radiosity/solve/element.h"
 
 typedef struct fct_transport {
-    float *stored;  /* per element x 3: radiosity that a gather ray finds: without what lamps account for */
+    float *stored;  /* per element x 3: radiosity that a gather ray finds; without the emission of lamps,
+                       because shadow rays bring that */
     double *direct; /* per element x 3: mean direct irradiance of a leaf */
     uint64_t rays;
     uint32_t sweeps;
-    double change; /* relative, of the last sweep */
+    double change; /* of the last sweep, relative to the solution */
     bool converged;
-    double noise; /* relative standard error of the leaves' irradiance, from two halves of the rays,
-                     area-weighted */
-    double emitted, absorbed, escaped;
+    double noise; /* half the RMS difference between the leaves' irradiances from the first and from the
+                     second half of the rays, over the RMS irradiance; area-weighted */
+    double emitted, absorbed, escaped; /* power, summed over channels; escaped: carried out by rays */
 } fct_transport;
 
 typedef struct fct_transport_def {
     uint64_t seed;
-    double epsilon;   /* leaves across which direct light varies by more than this power are split */
+    double epsilon;   /* power; a leaf whose direct light varies by more (fct_direct_spread) is split */
     double tolerance; /* of the iteration */
-    double fineness;  /* factor on the number of rays, which goes by the number of leaves */
+    double fineness;  /* factor on the number of rays per leaf */
 } fct_transport_def;
 
-/* Splits leaves at shadow borders, gathers, solves; radiosities in `set` are then the solution. Errors:
- * MEMORY, CANCELLED. */
+/* Splits bent leaves and leaves on shadow borders, gathers, and solves. Afterwards the radiosities in `set`
+ * are the solution. Errors: MEMORY, CANCELLED. */
 fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const fct_transport_def *def,
                                fct_transport *out);
 void fct_transport_release(const fct_env *env, fct_transport *t);
 
-/* What a ray from a surface finds: the stored radiosity of what it hits. */
+/* The hit of a ray, as light. */
 typedef struct fct_found {
     const float *radiosity; /* 3 floats, never NULL */
-    uint32_t leaf;          /* FCT_NONE: nothing or a black back */
+    uint32_t leaf;          /* FCT_NONE: no hit, or a black back */
     double distance;        /* infinity on a miss */
-    bool black;             /* a back without a side of its own */
+    bool black;             /* the back of a one-sided material */
 } fct_found;
+/* Traces a ray and looks up the stored radiosity of the leaf that it hits. */
 fct_found fct_transport_look(const fct_elements *set, const float *stored, const float origin[3],
                              const float direction[3]);
 

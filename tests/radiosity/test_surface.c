@@ -1,7 +1,8 @@
 /* Output surfaces: no T-junctions, sizes, creases, footholds, refinement. */
 #include "place.h"
-#include "radiosity/output/split.h"
-#include "radiosity/output/surface.h"
+#include "radiosity/surface/refine.h"
+#include "radiosity/surface/split.h"
+#include "radiosity/surface/tessellate.h"
 
 static fct_env plain; /* outlives every scene */
 

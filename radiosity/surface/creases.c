@@ -1,22 +1,26 @@
-/* radiosity/output/surface_vertex.c: creases: the corners around each position fall into smooth groups, and a
- * vertex is doubled for each group beyond its first.
+/* radiosity/surface/creases.c: see creases.h.
  *
- * Two passes over the positions, each in parallel: the first sorts a position's corners by group and vertex
- * and counts the vertices to be added, the second numbers and fills them. O(F log valence).
+ * Two parallel passes over the positions:
+ *   1. join a position's corners across smooth edges, sort them by group and vertex, count added vertices;
+ *   2. number and fill the vertices.
+ * Cost: O(F log valence).
  */
-#include "radiosity/output/surface_vertex.h"
+#include "radiosity/surface/creases.h"
 
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "base/union_find.h"
-#include "radiosity/output/split.h"
+#include "radiosity/surface/split.h"
 
 #include <string.h>
 
-#define CREASE_COSINE .766 /* 40 degrees */
-#define GRAIN         4096
+/* Cosine of 40 degrees between the normals of two faces: sharper edges are creases. Larger angles shade boxes
+ * as if they were round; smaller ones break coarse spheres into facets. */
+#define CREASE_COSINE .766
+/* Positions per chunk. */
+#define GRAIN 4096
 
-/* What begins at a corner of the sorted list. */
+/* Flags of a corner in the sorted list: a vertex, an added vertex, a group, a group on a rim begins here. */
 enum { BEGIN_VERTEX = 1, ADDED_VERTEX = 2, BEGIN_GROUP = 4, RIM_GROUP = 8 };
 
 typedef struct work {
@@ -25,25 +29,25 @@ typedef struct work {
     float *normals;    /* per face */
     size_t *begin;     /* position (by lowest vertex) -> its corners in `corners`; vertex_count + 1 */
     uint32_t *corners; /* 3 face_count */
-    uint8_t *flags;    /* likewise */
-    uint8_t *taken;    /* per vertex: its number is given away */
-    uint32_t *added;   /* per position: vertices added; then the first one's number */
+    uint8_t *flags;    /* 3 face_count, as `corners` */
+    uint8_t *taken;    /* per vertex: a group has its number */
+    uint32_t *added;   /* per position: vertices added; from make_room on, number of the first one */
     size_t largest;    /* most corners at a position */
-    uint64_t *keys;    /* per thread 2 x largest; with `values`, pairs to be sorted */
-    uint32_t *values;  /* likewise */
-    uint32_t *parents; /* per thread largest */
-    uint8_t *open;     /* per thread largest */
+    uint64_t *keys;    /* 2 x largest per thread; sorted with `values` */
+    uint32_t *values;  /* 2 x largest per thread */
+    uint32_t *parents; /* largest per thread: union-find over a position's corners */
+    uint8_t *open;     /* largest per thread */
     fct_surface *out;
 } work;
 
-/* A degenerate face has no normal to differ in. */
-static bool smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
+/* A degenerate face has no normal, so it is smooth with every neighbour. */
+static bool faces_are_smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
     v3 a = v3_load(w->normals + corner_a / 3 * (size_t)3), b = v3_load(w->normals + corner_b / 3 * (size_t)3);
     return v3_norm2(a) == 0 || v3_norm2(b) == 0 || v3_dot(a, b) > CREASE_COSINE;
 }
 
 /* Joins the corners around a position across smooth edges. open[i]: corner i has an edge that is not joined;
- * for the lowest corner of a group: any of the group's has. */
+ * at the lowest corner of a group: any corner of the group has one. */
 static void join_corners(const work *w, const uint32_t *corners, size_t count, uint64_t *keys,
                          uint32_t *values, uint32_t *parents, uint8_t *open) {
     const uint32_t *t = w->mesh->triangles;
@@ -58,7 +62,8 @@ static void join_corners(const work *w, const uint32_t *corners, size_t count, u
     for (size_t i = 0, end; i < 2 * count; i = end) {
         for (end = i + 1; end < 2 * count && keys[end] == keys[i];) ++end;
         uint32_t a = values[i], b = values[end - 1];
-        if (end - i != 2 || (a & 1) == (b & 1) || !smooth(w, corners[a / 2], corners[b / 2])) continue;
+        if (end - i != 2 || (a & 1) == (b & 1) || !faces_are_smooth(w, corners[a / 2], corners[b / 2]))
+            continue;
         fct_sets_join(parents, a / 2, b / 2);
         --open[a / 2], --open[b / 2];
     }
@@ -68,8 +73,8 @@ static void join_corners(const work *w, const uint32_t *corners, size_t count, u
     }
 }
 
-/* Writes what begins where among the corners of one group; a group without a direction in front of all its
- * faces is taken apart. Returns how many vertices are to be added. */
+/* Sets the flags of the corners [begin, end) of one group. A group without a normal in front of all its faces
+ * becomes one group per corner. Returns the number of vertices to add. */
 static uint32_t mark_group(const work *w, size_t begin, size_t end, bool rim) {
     const uint32_t *t = w->mesh->triangles;
     uint32_t added = 0;
@@ -90,7 +95,7 @@ static uint32_t mark_group(const work *w, size_t begin, size_t end, bool rim) {
 }
 
 /* First pass: positions [begin, end). */
-static void group_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void group_positions(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk;
     const work *w = user;
     uint64_t *keys = w->keys + 2 * w->largest * thread;
@@ -114,7 +119,8 @@ static void group_body(void *user, size_t begin, size_t end, size_t chunk, uint3
     }
 }
 
-static double corner_area(const fct_corners *mesh, uint32_t corner) {
+/* A third of the area of the corner's face. */
+static double measure_corner_area(const fct_corners *mesh, uint32_t corner) {
     const uint32_t *t = mesh->triangles + corner / 3 * (size_t)3;
     v3 a = v3_load(mesh->positions + 3 * (size_t)t[0]);
     v3 e1 = v3_sub(v3_load(mesh->positions + 3 * (size_t)t[1]), a);
@@ -122,15 +128,7 @@ static double corner_area(const fct_corners *mesh, uint32_t corner) {
     return v3_norm(v3_cross(e1, e2)) / 6;
 }
 
-void fct_surface_place(fct_surface *surface, uint32_t v, const fct_foothold *at) {
-    v3_store(surface->normals + 3 * (size_t)v, at->normal);
-    v3_store(surface->sample_points + 3 * (size_t)v, at->sample);
-    surface->offsets[v] = (float)at->offset;
-    surface->places[v] = surface->face_places[at->face];
-    surface->flat[v] = at->flat;
-}
-
-/* Fills the vertices of one group, corners [begin, end); *next is the number for the next added one. */
+/* Fills the vertices of one group, corners [begin, end). *next is the number of the next added vertex. */
 static void fill_group(const work *w, size_t begin, size_t end, uint32_t *next) {
     const fct_corners *mesh = w->mesh;
     v3 normal;
@@ -148,14 +146,14 @@ static void fill_group(const work *w, size_t begin, size_t end, uint32_t *next) 
             fct_surface_place(w->out, v, &at);
             area = 0;
         }
-        area += corner_area(mesh, w->corners[i]);
+        area += measure_corner_area(mesh, w->corners[i]);
         w->out->areas[v] = (float)area;
         w->out->mesh.triangles[w->corners[i]] = v;
     }
 }
 
 /* Second pass: positions [begin, end). */
-static void fill_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void fill_positions(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const work *w = user;
     for (size_t v = begin; v < end; ++v) {
@@ -167,7 +165,7 @@ static void fill_body(void *user, size_t begin, size_t end, size_t chunk, uint32
     }
 }
 
-static void normal_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void compute_normals(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const work *w = user;
     for (size_t f = begin; f < end; ++f) {
@@ -179,7 +177,7 @@ static void normal_body(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* Lists the corners at each position, in order of face. */
+/* Lists the corners at each position, in the order of faces. */
 static void list_corners(work *w) {
     const fct_corners *mesh = w->mesh;
     size_t corners = 3 * (size_t)mesh->face_count;
@@ -189,7 +187,7 @@ static void list_corners(work *w) {
         if (w->begin[v + 1] > w->largest) w->largest = w->begin[v + 1];
         w->begin[v + 1] += w->begin[v];
     }
-    /* Fill from the end, so that begin[v] moves down to where it belongs. */
+    /* Shift by one: begin[v + 1] is the next free place of v, and ends as the begin of v + 1. */
     for (size_t v = mesh->vertex_count; v > 0; --v) w->begin[v] = w->begin[v - 1];
     for (size_t c = 0; c < corners; ++c)
         w->corners[w->begin[w->first[mesh->triangles[c]] + 1]++] = (uint32_t)c;
@@ -235,42 +233,7 @@ static void release_work(const fct_env *env, work *w) {
     fct_release(env, w->open);
 }
 
-fct_result fct_surface_allocate(const fct_env *env, uint32_t vertex_count, uint32_t face_count,
-                                fct_surface *out) {
-    *out = (fct_surface){0};
-    fct_result result =
-        fct_mesh_create(env, vertex_count, face_count, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, &out->mesh);
-    if (result != FCT_OK) return result;
-    size_t vertices = vertex_count;
-    out->normals = fct_allocate_zero(env, vertices, 3 * sizeof *out->normals);
-    out->sample_points = fct_allocate_zero(env, vertices, 3 * sizeof *out->sample_points);
-    out->offsets = fct_allocate_zero(env, vertices, sizeof *out->offsets);
-    out->areas = fct_allocate_zero(env, vertices, sizeof *out->areas);
-    out->places = fct_allocate(env, vertices, sizeof *out->places);
-    out->flat = fct_allocate_zero(env, vertices, sizeof *out->flat);
-    out->face_places = fct_allocate(env, face_count, sizeof *out->face_places);
-    if (!out->normals || !out->sample_points || !out->offsets || !out->areas || !out->places || !out->flat ||
-        !out->face_places) {
-        fct_surface_release(env, out);
-        return fct_fail_memory(env, "a surface");
-    }
-    memset(out->places, 0xff, vertices * sizeof *out->places);
-    return FCT_OK;
-}
-
-void fct_surface_release(const fct_env *env, fct_surface *surface) {
-    fct_mesh_release(env, &surface->mesh);
-    fct_release(env, surface->normals);
-    fct_release(env, surface->sample_points);
-    fct_release(env, surface->offsets);
-    fct_release(env, surface->areas);
-    fct_release(env, surface->places);
-    fct_release(env, surface->flat);
-    fct_release(env, surface->face_places);
-    *surface = (fct_surface){0};
-}
-
-/* Allocates *out for the vertices there are and those added, whose numbers follow in order of position. */
+/* Numbers the added vertices in the order of positions, and allocates the surface. */
 static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_faces,
                             const uint32_t *face_places) {
     uint64_t total = w->mesh->vertex_count;
@@ -302,14 +265,14 @@ fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, con
     if (result != FCT_OK) goto done;
     result = fct_weld(env, mesh->vertex_count, mesh->positions, w.first);
     if (result != FCT_OK) goto done;
-    fct_parallel_for(env, mesh->face_count, GRAIN, normal_body, &w);
+    fct_parallel_for(env, mesh->face_count, GRAIN, compute_normals, &w);
     list_corners(&w);
     result = allocate_scratch(env, &w);
     if (result != FCT_OK) goto done;
-    fct_parallel_for(env, mesh->vertex_count, GRAIN, group_body, &w);
+    fct_parallel_for(env, mesh->vertex_count, GRAIN, group_positions, &w);
     result = make_room(env, &w, source_faces, face_places);
     if (result != FCT_OK) goto done;
-    fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_body, &w);
+    fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_positions, &w);
 done:
     release_work(env, &w);
     return result;

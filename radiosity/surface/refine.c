@@ -1,15 +1,16 @@
-/* radiosity/output/surface_refine.c: one more round of splits on a finished surface.
+/* radiosity/surface/refine.c: see refine.h.
  *
- * Edges on creases exist once for each side, with vertices of their own at the same positions: a mark on one
- * side counts for the other, so that no T-junction opens along the crease.
+ * An edge on a crease exists once per side, with its own vertices at the same positions. A mark on one side
+ * also splits the other, so that no T-junction opens along the crease.
  */
-#include "base/math/vec.h"
-#include "radiosity/output/split.h"
-#include "radiosity/output/surface_vertex.h"
+#include "radiosity/surface/refine.h"
+
+#include "base/env.h"
+#include "radiosity/surface/split.h"
 
 #include <string.h>
 
-/* Marks per face of the edges that are to be split. */
+/* Marks the edges to split: bit k of a face is the edge from corner k to corner k + 1. */
 static fct_result mark_faces(const fct_env *env, const fct_mesh *mesh, fct_edge_test *test, void *user,
                              uint8_t *marks) {
     const uint32_t *t = mesh->triangles;
@@ -41,8 +42,8 @@ done:
     return result;
 }
 
-/* Copies the old vertices, appends the middles, and takes over the faces of the split. */
-static void carry_over(const fct_surface *old, const fct_split *split, fct_surface *out) {
+/* Copies the old vertices and the faces of the split, and appends the midpoints. */
+static void copy_surface(const fct_surface *old, const fct_split *split, fct_surface *out) {
     size_t count = old->mesh.vertex_count;
     memcpy(out->mesh.positions, old->mesh.positions, 3 * count * sizeof(float));
     memcpy(out->mesh.colors, old->mesh.colors, 3 * count * sizeof(float));
@@ -68,6 +69,7 @@ static void carry_over(const fct_surface *old, const fct_split *split, fct_surfa
     }
 }
 
+/* Adds a third of each face's area to its vertices. */
 static void add_areas(fct_surface *s) {
     for (size_t f = 0; f < s->mesh.face_count; ++f) {
         const uint32_t *t = s->mesh.triangles + 3 * f;
@@ -79,9 +81,9 @@ static void add_areas(fct_surface *s) {
     }
 }
 
-/* The normal half-way between the ends' where it is in front of all faces, else the faces' own. */
-static v3 middle_normal(const fct_surface *s, const fct_corners *mesh, const uint32_t ends[2],
-                        const uint32_t *corners, size_t count) {
+/* The mean of the ends' normals if it is in front of all faces, else the corners' own normal. */
+static v3 find_middle_normal(const fct_surface *s, const fct_corners *mesh, const uint32_t ends[2],
+                             const uint32_t *corners, size_t count) {
     v3 half =
         v3_unit(v3_add(v3_load(s->normals + 3 * (size_t)ends[0]), v3_load(s->normals + 3 * (size_t)ends[1])));
     v3 own;
@@ -90,8 +92,8 @@ static v3 middle_normal(const fct_surface *s, const fct_corners *mesh, const uin
     return own;
 }
 
-/* Footholds of the new vertices from the corners around them. A middle lies on the rim when one face of the
- * old surface alone holds its edge. */
+/* Sets the footholds of the new vertices from the corners around them. A midpoint is on the rim if only one
+ * face of the old surface has its edge. */
 static fct_result place_middles(const fct_env *env, const fct_split *split, uint32_t old_count,
                                 fct_surface *s) {
     size_t corners = 3 * (size_t)s->mesh.face_count;
@@ -116,7 +118,7 @@ static fct_result place_middles(const fct_env *env, const fct_split *split, uint
         uint32_t parent = split->parents[around[0] / 3];
         bool rim = true;
         for (size_t k = 1; k < count && rim; ++k) rim = split->parents[around[k] / 3] == parent;
-        v3 normal = middle_normal(s, &mesh, split->ends + 2 * (size_t)i, around, count);
+        v3 normal = find_middle_normal(s, &mesh, split->ends + 2 * (size_t)i, around, count);
         fct_foothold at = fct_corner_foothold(&mesh, around, count, normal, rim);
         fct_surface_place(s, old_count + i, &at);
     }
@@ -147,7 +149,7 @@ fct_result fct_surface_refine(const fct_env *env, fct_surface *surface, fct_edge
     }
     result = fct_surface_allocate(env, old_count + split.vertex_count, split.face_count, &finer);
     if (result != FCT_OK) goto done;
-    carry_over(surface, &split, &finer);
+    copy_surface(surface, &split, &finer);
     add_areas(&finer);
     result = place_middles(env, &split, old_count, &finer);
     if (result != FCT_OK) goto done;

@@ -1,6 +1,5 @@
-/* radiosity/output/split.c: see split.h. Hash tables with linear probing; their layout depends on ids and
- * positions alone, and nothing depends on their layout. */
-#include "radiosity/output/split.h"
+/* radiosity/surface/split.c: see split.h. The hash tables use linear probing and are at most half full. */
+#include "radiosity/surface/split.h"
 
 #include "base/key.h"
 #include "base/math/vec.h"
@@ -10,14 +9,14 @@
 
 #define NO_EDGE UINT64_MAX
 
-static size_t table_size(size_t count) {
+static size_t choose_table_size(size_t count) {
     size_t size = 16;
     while (size < 2 * count) size *= 2;
     return size;
 }
 
 fct_result fct_edge_table_init(const fct_env *env, size_t count, fct_edge_table *out) {
-    size_t size = table_size(count);
+    size_t size = choose_table_size(count);
     out->mask = size - 1;
     out->keys = fct_allocate(env, size, sizeof *out->keys);
     out->values = fct_allocate(env, size, sizeof *out->values);
@@ -35,73 +34,69 @@ void fct_edge_table_release(const fct_env *env, fct_edge_table *table) {
     *table = (fct_edge_table){0};
 }
 
-static uint64_t edge_key(uint32_t a, uint32_t b) {
-    return fct_pair_key(a, b);
-}
-
-static size_t edge_slot(const fct_edge_table *table, uint64_t key) {
+static size_t find_edge_slot(const fct_edge_table *table, uint64_t key) {
     size_t slot = fct_hash(key) & table->mask;
     while (table->keys[slot] != key && table->keys[slot] != NO_EDGE) slot = (slot + 1) & table->mask;
     return slot;
 }
 
 uint32_t *fct_edge_table_insert(fct_edge_table *table, uint32_t a, uint32_t b, bool *fresh) {
-    uint64_t key = edge_key(a, b);
-    size_t slot = edge_slot(table, key);
+    uint64_t key = fct_pair_key(a, b);
+    size_t slot = find_edge_slot(table, key);
     *fresh = table->keys[slot] == NO_EDGE;
     table->keys[slot] = key;
     return table->values + slot;
 }
 
 const uint32_t *fct_edge_table_find(const fct_edge_table *table, uint32_t a, uint32_t b) {
-    uint64_t key = edge_key(a, b);
-    size_t slot = edge_slot(table, key);
+    uint64_t key = fct_pair_key(a, b);
+    size_t slot = find_edge_slot(table, key);
     return table->keys[slot] == key ? table->values + slot : NULL;
 }
 
-static double distance2(const float *positions, uint32_t a, uint32_t b) {
+static double measure_distance2(const float *positions, uint32_t a, uint32_t b) {
     return v3_norm2(v3_sub(v3_load(positions + 3 * (size_t)a), v3_load(positions + 3 * (size_t)b)));
 }
 
-/* Whether the diagonal from corner a to the middle of bc is shorter than the one from c to the middle of ab.
- */
-static bool first_diagonal(const float *positions, uint32_t a, uint32_t b, uint32_t c) {
-    /* Squared medians: (2 ab + 2 ca - bc) / 4 against (2 ca + 2 bc - ab) / 4. */
-    return distance2(positions, a, b) <= distance2(positions, b, c);
+/* True if the diagonal from a to the midpoint of bc is no longer than the one from c to the midpoint of ab.
+ * Squared medians: (2 |ab|^2 + 2 |ca|^2 - |bc|^2) / 4 against (2 |ca|^2 + 2 |bc|^2 - |ab|^2) / 4. */
+static bool first_diagonal_is_shorter(const float *positions, uint32_t a, uint32_t b, uint32_t c) {
+    return measure_distance2(positions, a, b) <= measure_distance2(positions, b, c);
 }
 
-static uint32_t *emit(uint32_t *out, uint32_t a, uint32_t b, uint32_t c) {
+static uint32_t *emit_triangle(uint32_t *out, uint32_t a, uint32_t b, uint32_t c) {
     out[0] = a, out[1] = b, out[2] = c;
     return out + 3;
 }
 
-/* The parts of one triangle with corners t and new vertices m on its edges; returns how many. */
+/* Writes the parts of a triangle with corners t and new vertices m on its marked edges. Returns their number.
+ */
 static uint32_t split_face(const float *positions, const uint32_t t[3], const uint32_t m[3], unsigned mark,
                            uint32_t *out) {
     int edges = __builtin_popcount(mark), turn = 0;
-    if (edges == 0) return emit(out, t[0], t[1], t[2]), 1;
+    if (edges == 0) return emit_triangle(out, t[0], t[1], t[2]), 1;
     if (edges == 3) {
-        out = emit(out, t[0], m[0], m[2]);
-        out = emit(out, m[0], t[1], m[1]);
-        out = emit(out, m[2], m[1], t[2]);
-        return emit(out, m[0], m[1], m[2]), 4;
+        out = emit_triangle(out, t[0], m[0], m[2]);
+        out = emit_triangle(out, m[0], t[1], m[1]);
+        out = emit_triangle(out, m[2], m[1], t[2]);
+        return emit_triangle(out, m[0], m[1], m[2]), 4;
     }
-    /* Turn it so that edge 0, or edges 0 and 1, are those that are split. */
+    /* Turn the triangle until edge 0, or edges 0 and 1, are the marked ones. */
     unsigned wanted = edges == 1 ? 1 : 3;
     while (((mark >> turn | mark << (3 - turn)) & 7) != wanted) ++turn;
     uint32_t a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
     uint32_t ab = m[turn], bc = m[(turn + 1) % 3];
     if (edges == 1) {
-        out = emit(out, a, ab, c);
-        return emit(out, ab, b, c), 2;
+        out = emit_triangle(out, a, ab, c);
+        return emit_triangle(out, ab, b, c), 2;
     }
-    out = emit(out, ab, b, bc);
-    if (first_diagonal(positions, a, b, c)) {
-        out = emit(out, a, ab, bc);
-        return emit(out, a, bc, c), 3;
+    out = emit_triangle(out, ab, b, bc);
+    if (first_diagonal_is_shorter(positions, a, b, c)) {
+        out = emit_triangle(out, a, ab, bc);
+        return emit_triangle(out, a, bc, c), 3;
     }
-    out = emit(out, a, ab, c);
-    return emit(out, ab, bc, c), 3;
+    out = emit_triangle(out, a, ab, c);
+    return emit_triangle(out, ab, bc, c), 3;
 }
 
 fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const float *positions,
@@ -154,7 +149,7 @@ void fct_split_release(const fct_env *env, fct_split *split) {
     *split = (fct_split){0};
 }
 
-static uint64_t position_hash(const float *p, uint32_t bits[3]) {
+static uint64_t hash_position(const float *p, uint32_t bits[3]) {
     for (int k = 0; k < 3; ++k) {
         float value = p[k] == 0 ? 0 : p[k];
         memcpy(bits + k, &value, sizeof value);
@@ -163,14 +158,14 @@ static uint64_t position_hash(const float *p, uint32_t bits[3]) {
 }
 
 fct_result fct_weld(const fct_env *env, uint32_t vertex_count, const float *positions, uint32_t *first) {
-    size_t size = table_size(vertex_count), mask = size - 1;
+    size_t size = choose_table_size(vertex_count), mask = size - 1;
     uint32_t *slots = fct_allocate(env, size, sizeof *slots);
     if (!slots) return fct_fail_memory(env, "a table of vertices");
     memset(slots, 0xff, size * sizeof *slots);
     for (uint32_t v = 0; v < vertex_count; ++v) {
         const float *p = positions + 3 * (size_t)v;
         uint32_t bits[3];
-        size_t slot = position_hash(p, bits) & mask;
+        size_t slot = hash_position(p, bits) & mask;
         for (;; slot = (slot + 1) & mask) {
             if (slots[slot] == FCT_NONE) {
                 slots[slot] = v;

@@ -1,42 +1,49 @@
-/* radiosity/output/surface.c: tessellation: which edges are too long, and rounds of splits until none is.
+/* radiosity/surface/tessellate.c: see tessellate.h.
  *
- * Whether an edge is split depends on its end points and the scene alone, so both its faces, and coinciding
- * edges of unwelded meshes, agree. Sizes are graded: on open ground up to max_edge, and near another instance
- * as long as the distance to it, down to max_edge / 4: light changes fastest where surfaces meet. Nearness is
- * judged by the oriented boxes of the other's tree, down to boxes small beside the distance.
+ * Rounds of splits until no edge is too long. An edge is too long above max_edge, and near another instance
+ * above the distance to it, but never below max_edge / 4: light changes fastest where surfaces meet. The test
+ * reads only the end points and the scene, so both faces at an edge agree, and so do coinciding edges of
+ * unwelded meshes. The oriented boxes of the other instance's tree give the distance.
  */
-#include "radiosity/output/surface.h"
+#include "radiosity/surface/tessellate.h"
 
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
-#include "radiosity/output/split.h"
-#include "radiosity/output/surface_vertex.h"
+#include "radiosity/surface/creases.h"
+#include "radiosity/surface/split.h"
 #include "scene/transform.h"
 
 #include <string.h>
 
+/* Default edges per diagonal of the scene. More edges resolve finer shadows; the output's time grows with the
+ * square. */
 #define DIAGONAL_EDGES 72
-#define GRADES         4
-#define STACK_SIZE     288
-#define SMALL_BOX      .35 /* of the distance asked about */
-#define GRAIN          1024
+/* Longest over shortest edge that a split may leave. Larger: finer contact shadows, more vertices. */
+#define GRADES 4
+/* Boxes with a half diagonal below this share of the distance count as solid: the distance is then right to
+ * about a third. */
+#define SMALL_BOX  .35
+#define STACK_SIZE 288
+/* Faces per chunk. */
+#define GRAIN 1024
 
-/* Faces under way. */
-typedef struct cloth {
+/* The faces of the instance in their present state. */
+typedef struct patch {
     const fct_env *env;
     const fct_scene *scene;
     fct_scene_view view;
     uint32_t instance;
-    double longest, shortest; /* edges */
-    double *shrinks;          /* per instance: world over model distance, at least */
+    double longest, shortest; /* edges: split above `longest`, never below `shortest` */
+    double *shrinks;          /* per instance: lower bound of world over model distance */
     uint32_t vertex_count, face_count;
     float *positions;
-    uint32_t *triangles, *faces; /* faces: the model's */
+    uint32_t *triangles, *faces; /* faces: input face of the model's tree */
     uint8_t *marks;
-    uint8_t *settled; /* per face: an earlier round found nothing to split */
-} cloth;
+    uint8_t *settled; /* per face: an earlier round left it whole */
+} patch;
 
-static double box_distance2(const fct_cluster *cluster, v3 p) {
+/* Squared distance of a point to the cluster's box. */
+static double measure_box_distance2(const fct_cluster *cluster, v3 p) {
     fct_box box;
     fct_cluster_box(cluster, &box);
     v3 d = v3_sub(p, v3_load(box.center));
@@ -48,8 +55,8 @@ static double box_distance2(const fct_cluster *cluster, v3 p) {
     return sum;
 }
 
-/* Whether a tree comes within `distance` of p, both in model space, to about a third of the distance. */
-static bool tree_near(const fct_tree *tree, v3 p, double distance) {
+/* True if the tree comes within `distance` of p (model space), to about a third of the distance. */
+static bool tree_is_near(const fct_tree *tree, v3 p, double distance) {
     fct_tree_view view = fct_tree_get(tree);
     uint32_t stack[STACK_SIZE];
     double d2 = distance * distance, small2 = SMALL_BOX * SMALL_BOX * d2;
@@ -60,7 +67,7 @@ static bool tree_near(const fct_tree *tree, v3 p, double distance) {
             uint32_t node = stack[--top];
             fct_cluster room;
             const fct_cluster *c = fct_node_cluster(tree, node, &room);
-            if (box_distance2(c, p) > d2) continue;
+            if (measure_box_distance2(c, p) > d2) continue;
             if (node >= view.node_count || v3_norm2(v3_load(c->box_half)) < small2 || top + 2 > STACK_SIZE)
                 return true;
             stack[top++] = fct_node_child(tree, node, 1);
@@ -70,7 +77,7 @@ static bool tree_near(const fct_tree *tree, v3 p, double distance) {
     return false;
 }
 
-static bool bounds_near(const fct_bounds *bounds, const double p[3], double distance) {
+static bool bounds_are_near(const fct_bounds *bounds, const double p[3], double distance) {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
         double out = fmax(bounds->lower[k] - p[k], p[k] - bounds->upper[k]);
@@ -79,14 +86,14 @@ static bool bounds_near(const fct_bounds *bounds, const double p[3], double dist
     return sum <= distance * distance;
 }
 
-/* Whether another instance comes within `distance` of the point. */
-static bool others_near(const cloth *c, v3 point, double distance) {
+/* True if another instance comes within `distance` of the point. */
+static bool others_are_near(const patch *c, v3 point, double distance) {
     uint32_t stack[STACK_SIZE], top = 0;
     const double p[3] = {point.x, point.y, point.z};
     if (c->view.volume_count) stack[top++] = 0;
     while (top) {
         const fct_volume *volume = c->view.volumes + stack[--top];
-        if (volume->instance == c->instance || !bounds_near(&volume->bounds, p, distance)) continue;
+        if (volume->instance == c->instance || !bounds_are_near(&volume->bounds, p, distance)) continue;
         if (volume->instance == FCT_NONE) {
             if (top + 2 > STACK_SIZE) return true;
             stack[top++] = volume->child[1];
@@ -96,40 +103,41 @@ static bool others_near(const cloth *c, v3 point, double distance) {
         const fct_instance *other = c->view.instances + volume->instance;
         v3 local = fct_transform_point(other->to_model, point);
         double shrink = c->shrinks[volume->instance];
-        if (tree_near(c->view.models[other->model].tree, local, shrink > 0 ? distance / shrink : INFINITY))
+        if (tree_is_near(c->view.models[other->model].tree, local, shrink > 0 ? distance / shrink : INFINITY))
             return true;
     }
     return false;
 }
 
-static bool too_long(const cloth *c, uint32_t va, uint32_t vb) {
+static bool edge_is_too_long(const patch *c, uint32_t va, uint32_t vb) {
     v3 a = v3_load(c->positions + 3 * (size_t)va), b = v3_load(c->positions + 3 * (size_t)vb);
     double length = v3_norm(v3_sub(b, a));
     if (!(length > c->shortest)) return false;
     v3 middle = v3_scale(v3_add(a, b), .5);
     float m[3];
     v3_store(m, middle);
+    /* A midpoint that rounds to an end cannot split the edge. */
     v3 rounded = v3_load(m);
     if (v3_norm2(v3_sub(rounded, a)) == 0 || v3_norm2(v3_sub(rounded, b)) == 0) return false;
-    return length > c->longest || others_near(c, middle, length);
+    return length > c->longest || others_are_near(c, middle, length);
 }
 
-static void mark_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void mark_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
-    const cloth *c = user;
+    const patch *c = user;
     for (size_t f = begin; f < end; ++f) {
         c->marks[f] = 0;
         if (c->settled[f]) continue;
         const uint32_t *t = c->triangles + 3 * f;
         for (int k = 0; k < 3; ++k)
-            if (too_long(c, t[k], t[k == 2 ? 0 : k + 1])) c->marks[f] |= (uint8_t)(1 << k);
+            if (edge_is_too_long(c, t[k], t[k == 2 ? 0 : k + 1])) c->marks[f] |= (uint8_t)(1 << k);
         c->settled[f] = c->marks[f] == 0;
     }
 }
 
-/* Extends positions by the middles of the ends. */
-static fct_result add_middles(const fct_env *env, const float *old, uint32_t old_count,
-                              const fct_split *split, float **out) {
+/* Copies the positions and appends the midpoints. */
+static fct_result add_midpoints(const fct_env *env, const float *old, uint32_t old_count,
+                                const fct_split *split, float **out) {
     float *positions = fct_allocate(env, (size_t)old_count + split->vertex_count, 3 * sizeof *positions);
     if (!positions) return fct_fail_memory(env, "split triangles");
     memcpy(positions, old, 3 * (size_t)old_count * sizeof *positions);
@@ -142,8 +150,8 @@ static fct_result add_middles(const fct_env *env, const float *old, uint32_t old
     return FCT_OK;
 }
 
-/* Replaces the cloth's faces by their parts. */
-static fct_result apply_split(cloth *c, fct_split *split) {
+/* Replaces the faces by their parts. */
+static fct_result apply_split(patch *c, fct_split *split) {
     const fct_env *env = c->env;
     float *positions = NULL;
     uint32_t *faces = fct_allocate(env, split->face_count, sizeof *faces);
@@ -151,7 +159,7 @@ static fct_result apply_split(cloth *c, fct_split *split) {
     uint8_t *settled = fct_allocate(env, split->face_count, sizeof *settled);
     fct_result result = FCT_ERROR_MEMORY;
     if (faces && marks && settled)
-        result = add_middles(env, c->positions, c->vertex_count, split, &positions);
+        result = add_midpoints(env, c->positions, c->vertex_count, split, &positions);
     else
         fct_fail_memory(env, "split triangles");
     if (result != FCT_OK) {
@@ -172,9 +180,9 @@ static fct_result apply_split(cloth *c, fct_split *split) {
     return FCT_OK;
 }
 
-static fct_result tessellate(cloth *c) {
+static fct_result split_long_edges(patch *c) {
     for (;;) {
-        fct_parallel_for(c->env, c->face_count, GRAIN, mark_body, c);
+        fct_parallel_for(c->env, c->face_count, GRAIN, mark_faces, c);
         bool any = false;
         for (size_t f = 0; f < c->face_count && !any; ++f) any = c->marks[f] != 0;
         if (!any) return FCT_OK;
@@ -188,8 +196,8 @@ static fct_result tessellate(cloth *c) {
     }
 }
 
-/* The model in world space, in the order of its input. */
-static fct_result lay_out(cloth *c) {
+/* Fills the patch with the model in world space, in input order. */
+static fct_result place_model(patch *c) {
     const fct_instance *placed = c->view.instances + c->instance;
     fct_mesh mesh;
     fct_result result = fct_tree_mesh(c->env, c->view.models[placed->model].tree, &mesh);
@@ -221,8 +229,8 @@ done:
     return result;
 }
 
-/* The numbers of the cloth's faces in the mesh as it was added and in the tree's order; then its vertices. */
-static fct_result finish(cloth *c, fct_surface *out) {
+/* Translates face numbers to the mesh as it was added and to tree places, and makes the surface. */
+static fct_result make_surface(patch *c, fct_surface *out) {
     const fct_env *env = c->env;
     const fct_model *model = c->view.models + c->view.instances[c->instance].model;
     fct_tree_view tree = fct_tree_get(model->tree);
@@ -254,16 +262,16 @@ double fct_surface_default_edge(const fct_scene *scene) {
 fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_t instance, double max_edge,
                              fct_surface *out) {
     double longest = max_edge > 0 ? max_edge : fct_surface_default_edge(scene);
-    cloth c = {.env = env,
+    patch c = {.env = env,
                .scene = scene,
                .view = fct_scene_get(scene),
                .instance = instance,
                .longest = longest,
                .shortest = longest / GRADES};
     *out = (fct_surface){0};
-    fct_result result = lay_out(&c);
-    if (result == FCT_OK) result = tessellate(&c);
-    if (result == FCT_OK) result = finish(&c, out);
+    fct_result result = place_model(&c);
+    if (result == FCT_OK) result = split_long_edges(&c);
+    if (result == FCT_OK) result = make_surface(&c, out);
     fct_release(env, c.positions);
     fct_release(env, c.triangles);
     fct_release(env, c.faces);

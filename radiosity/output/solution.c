@@ -1,0 +1,25 @@
+/* radiosity/output/solution.c: see solution.h. */
+#include "radiosity/output/solution.h"
+
+enum { MOST_LAMP_RAYS = 64 };
+
+uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least) {
+    return (uint32_t)fmin(fmax(least * s->fineness, least), MOST_LAMP_RAYS);
+}
+
+void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
+                         uint64_t seed, uint32_t rays_each, double irradiance[3], uint64_t *rays) {
+    irradiance[0] = irradiance[1] = irradiance[2] = 0;
+    if (s->def.indirect_only) return;
+    double p[3] = {point[0], point[1], point[2]}, n[3] = {normal[0], normal[1], normal[2]};
+    fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, irradiance, rays);
+}
+
+void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const double irradiance[3],
+                            float radiosity[3]) {
+    const fct_scene_view *view = &s->elements.view;
+    const fct_material *m = &view->materials[view->instances[instance].material];
+    for (int c = 0; c < 3; ++c)
+        radiosity[c] =
+            (float)((s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * irradiance[c]);
+}
