@@ -147,6 +147,19 @@ static inline fct_mesh make_copies(const fct_env *env, fct_mesh one, uint32_t co
     return mesh;
 }
 
+/* Turns a mesh so that none of its sides lies along the world's axes. */
+static inline void turn(fct_mesh *mesh) {
+    static const double rows[3][3] = {
+        {2.0 / 3, -2.0 / 3, 1.0 / 3}, {1.0 / 3, 2.0 / 3, 2.0 / 3}, {-2.0 / 3, -1.0 / 3, 2.0 / 3}};
+    for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
+        const float *p = mesh->positions + 3 * (size_t)v;
+        double q[3];
+        for (int i = 0; i < 3; ++i)
+            q[i] = rows[i][0] * (double)p[0] + rows[i][1] * (double)p[1] + rows[i][2] * (double)p[2];
+        set_vertex(mesh, v, q[0], q[1], q[2]);
+    }
+}
+
 /* Gives the faces `count` materials in stripes of `width` faces. */
 static inline void paint_stripes(const fct_env *env, fct_mesh *mesh, uint32_t count, uint32_t width) {
     mesh->materials = fct_allocate(env, mesh->face_count, sizeof *mesh->materials);

@@ -4,6 +4,8 @@
 #include "meshes.h"
 #include "oracle.h"
 
+#include "cluster/shape/box.h"
+
 enum { ANGLES = 8, BLOCK = 1024, SAMPLES = 64 };
 
 /* A node's faces in the mesh's own coordinates. */
@@ -169,7 +171,7 @@ typedef struct excess {
 } excess;
 
 /* exact: of clusters with at most 64 vertices, to the eight angles. sampled: the same of larger ones. fine:
- * to 180 angles. world, own: of clusters with more than 1024 faces, to the axes of the world and to the eight
+ * to 90 angles. world, own: of clusters with more than 1024 faces, to the axes of the world and to the eight
  * angles. */
 typedef struct excesses {
     excess exact, sampled, fine, world, own;
@@ -219,11 +221,32 @@ static void check_box(const node *n, excesses *out) {
         if (all_points && area > (1 + 1e-4) * turned)
             expect(n, "area of the box", area, turned, 1e-4 * turned);
         add_excess(all_points ? &out->exact : &out->sampled, area, turned);
-        add_excess(&out->fine, area, least_turned_area(n, own, 180));
+        add_excess(&out->fine, area, least_turned_area(n, own, 90));
     }
 }
 
 /* --- Trees --- */
+
+/* Depths of all leaves, from the roots down: a child's number is larger than its parent's. */
+static void check_depth(const char *name, const fct_tree *tree) {
+    fct_tree_view view = fct_tree_get(tree);
+    uint32_t all = view.node_count + view.face_count, deepest = 0, *depths = calloc(all, sizeof *depths);
+    double sum = 0;
+    for (uint32_t id = 0; id < all; ++id) {
+        fct_cluster c;
+        assert_int_equal(fct_tree_cluster(tree, id, &c), FCT_OK);
+        for (int k = 0; k < 2 && c.count > 1; ++k) depths[c.child[k]] = depths[id] + 1;
+        if (c.count > 1) continue;
+        sum += depths[id];
+        deepest = depths[id] > deepest ? depths[id] : deepest;
+    }
+    if (view.depth != deepest || fabs(view.mean_depth - sum / view.face_count) > 1e-9 * view.mean_depth)
+        fail_msg("%s: depths are %u and %g in the mean, should be %u and %g", name, view.depth,
+                 view.mean_depth, deepest, sum / view.face_count);
+    if (deepest > 3 * log2(view.face_count))
+        fail_msg("%s: %u faces are %u deep", name, view.face_count, deepest);
+    free(depths);
+}
 
 static void check_nodes(const char *name, const fct_tree *tree, excesses *out) {
     fct_tree_view view = fct_tree_get(tree);
@@ -239,7 +262,7 @@ static void check_nodes(const char *name, const fct_tree *tree, excesses *out) {
         check_box(&n, out);
         free(n.corners);
     }
-    if (view.root_count == 1 && view.face_count > 1) assert_true(view.depth <= 3 * log2(view.face_count));
+    check_depth(name, tree);
 }
 
 static fct_mesh make_mesh(const fct_env *env, int which, const char **name) {
@@ -280,11 +303,15 @@ static fct_mesh make_mesh(const fct_env *env, int which, const char **name) {
         return *name = "fine cube", make_fine_box(env, 18, 1, 1, 1);
     case 14:
         return *name = "fine box", make_fine_box(env, 18, 3, 1, 0.7);
+    case 15:
+        mesh = make_terrain(env, 50, 0.05, 8);
+        turn(&mesh);
+        return *name = "turned terrain", mesh;
     default:
         return *name = "large pages", make_pages(env, 5, 24, 24);
     }
 }
-enum { MESHES = 16 };
+enum { MESHES = 17 };
 
 static void check_excess(const char *what, const excess *e, double worst, double mean) {
     double found = e->sum / e->count;
@@ -311,7 +338,14 @@ static void nodes(void **state) {
     check_excess("large clusters' eight angles", &all.own, 1.15, 1.02);
 }
 
+/* What frames of large clusters are compared by: half the surface area. */
+static void areas(void **state) {
+    (void)state;
+    const fct_extents extents = {{-1, 2, 5}, {2, 4, 12}};
+    assert_true(fabs(2 * fct_box_area(&extents) - 2 * (3 * 2 + 2 * 7 + 7 * 3)) < 1e-12);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(nodes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(nodes), cmocka_unit_test(areas)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
