@@ -21,23 +21,23 @@ typedef struct upper {
 
 /* A slot for each top; edges come later. */
 static fct_result open_work(const fct_env *env, const fct_metric *metric, const fct_top *tops,
-                            const fct_direction *directions, uint32_t count, fct_work *work) {
+                            const fct_mean_record *means, uint32_t count, fct_work *work) {
     *work = (fct_work){.env = env, .metric = *metric, .face_count = count};
     work->records = fct_allocate(env, count, sizeof *work->records);
-    if (directions) work->directions = fct_allocate(env, count, sizeof *work->directions);
+    if (means) work->means = fct_allocate(env, count, sizeof *work->means);
     work->heights = fct_allocate(env, count, sizeof *work->heights);
     work->nodes = fct_allocate(env, count, sizeof *work->nodes);
     work->children = fct_allocate(env, count, sizeof *work->children);
     work->costs = fct_allocate(env, count, sizeof *work->costs);
-    if (!work->records || (directions && !work->directions) || !work->heights || !work->nodes ||
-        !work->children || !work->costs)
+    if (!work->records || (means && !work->means) || !work->heights || !work->nodes || !work->children ||
+        !work->costs)
         return fct_fail_memory(env, "the clusters of all parts");
     for (uint32_t i = 0; i < count; ++i) {
         work->records[i] = tops[i].record;
         work->heights[i] = tops[i].height;
         work->nodes[i] = i;
     }
-    if (directions) memcpy(work->directions, directions, count * sizeof *directions);
+    if (means) memcpy(work->means, means, count * sizeof *means);
     return FCT_OK;
 }
 
@@ -70,10 +70,10 @@ static fct_result join_work(fct_work *work, const fct_top *tops) {
 }
 
 fct_result fct_large_join(const fct_env *env, const fct_metric *metric, const fct_top *tops,
-                          const fct_direction *directions, uint32_t count, uint32_t (*children)[2],
+                          const fct_mean_record *means, uint32_t count, uint32_t (*children)[2],
                           float *costs) {
     fct_work work;
-    fct_result result = open_work(env, metric, tops, directions, count, &work);
+    fct_result result = open_work(env, metric, tops, means, count, &work);
     if (result == FCT_OK) result = join_work(&work, tops);
     if (result == FCT_OK) {
         memcpy(children, work.children, work.merge_count * sizeof *children);
@@ -252,15 +252,14 @@ static fct_result order_nodes(upper *u) {
     return result == FCT_OK ? place_tops(l) : result;
 }
 
-static fct_result run(upper *u, fct_direction *directions) {
+static fct_result run(upper *u, fct_mean_record *means) {
     fct_large *l = u->large;
     uint32_t count = l->top_count;
     fct_result result = fct_spool_read(&l->tops, 0, l->all_tops, count * sizeof *l->all_tops);
-    if (result == FCT_OK && directions)
-        result = fct_spool_read(&l->directions, 0, directions, count * sizeof *directions);
+    if (result == FCT_OK && means) result = fct_spool_read(&l->means, 0, means, count * sizeof *means);
     if (result != FCT_OK) return result;
     fct_metric metric = fct_metric_make(l->def, &l->bounds);
-    result = open_work(l->env, &metric, l->all_tops, directions, count, &u->work);
+    result = open_work(l->env, &metric, l->all_tops, means, count, &u->work);
     if (result != FCT_OK) return result;
     if (u->materials) {
         /* clusters of several materials are foreign to all others */
@@ -283,16 +282,16 @@ fct_result fct_large_contract(fct_large *large) {
     upper u = {.large = large};
     bool mean = large->def->cost == FCT_COST_MEAN;
     large->all_tops = fct_allocate(env, large->top_count, sizeof *large->all_tops);
-    fct_direction *directions = mean ? fct_allocate(env, large->top_count, sizeof *directions) : NULL;
+    fct_mean_record *means = mean ? fct_allocate(env, large->top_count, sizeof *means) : NULL;
     if (large->info.materials) u.materials = fct_allocate(env, large->top_count, sizeof *u.materials);
     fct_result result;
-    if (!large->all_tops || (mean && !directions) || (large->info.materials && !u.materials))
+    if (!large->all_tops || (mean && !means) || (large->info.materials && !u.materials))
         result = fct_fail_memory(env, "the clusters of all parts");
     else
-        result = run(&u, directions);
+        result = run(&u, means);
     if (u.work.env) fct_work_release(&u.work);
     fct_release(env, u.materials);
-    fct_release(env, directions);
+    fct_release(env, means);
     large->seconds_contract += fct_seconds() - start;
     return result;
 }

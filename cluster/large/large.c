@@ -71,8 +71,8 @@ static fct_result plan(fct_large *l, const fct_large_def *def) {
 }
 
 static void release(fct_large *l) {
-    fct_spool *spools[] = {&l->faces, &l->nodes, &l->costs,      &l->face_ids, &l->triangles, &l->materials,
-                           &l->tops,  &l->sums,  &l->directions, &l->edges,    &l->sides};
+    fct_spool *spools[] = {&l->faces, &l->nodes, &l->costs, &l->face_ids, &l->triangles, &l->materials,
+                           &l->tops,  &l->sums,  &l->means, &l->edges,    &l->sides};
     for (size_t i = 0; i < sizeof spools / sizeof *spools; ++i) fct_spool_close(spools[i]);
     fct_stream_close(l->stream);
     fct_release(l->env, l->shared);

@@ -82,7 +82,7 @@ typedef struct fct_large {
     fct_part *parts;
     size_t part_count, part_capacity;
     fct_spool nodes, costs, face_ids, triangles, materials;
-    fct_spool tops, sums, directions, edges, sides;
+    fct_spool tops, sums, means, edges, sides;
     uint32_t top_count;
     uint32_t loose_joins; /* merges without an edge inside parts */
     int64_t boundary_edges, nonmanifold_edges;
@@ -118,7 +118,7 @@ fct_result fct_large_write(fct_large *large, fct_tree_view *out);
 /* Joins clusters by proximity: with children as for upper_children, count - 1 merges. boxes: lower and upper
  * corner of each in the unit model. Errors: MEMORY, CANCELLED. */
 fct_result fct_large_join(const fct_env *env, const fct_metric *metric, const fct_top *tops,
-                          const fct_direction *directions, uint32_t count, uint32_t (*children)[2],
+                          const fct_mean_record *means, uint32_t count, uint32_t (*children)[2],
                           float *costs);
 
 /* The sections of faces and vertices; roots in order of ids. Errors: INPUT, OUTPUT, MEMORY, CANCELLED. */

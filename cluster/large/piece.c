@@ -33,7 +33,7 @@ typedef struct piece {
     uint8_t *on_cut; /* the same, kept */
     fct_top *tops;   /* in the order of the tree's roots */
     fct_sums *sums;  /* of the tops */
-    fct_direction *directions;
+    fct_mean_record *means;
     uint32_t *top_of; /* per face */
     fct_edge *edges;
     uint32_t edge_count;
@@ -203,9 +203,9 @@ static fct_result join_slots(piece *p, const uint32_t *slots, uint32_t count) {
     *at = fct_allocate(env, count, 2 * sizeof *at);
     float *costs = fct_allocate(env, count, sizeof *costs);
     fct_top *tops = fct_allocate_zero(env, count, sizeof *tops);
-    fct_direction *directions = work->directions ? fct_allocate(env, count, sizeof *directions) : NULL;
+    fct_mean_record *means = work->means ? fct_allocate(env, count, sizeof *means) : NULL;
     fct_result result = FCT_OK;
-    if (!owner || !children || !at || !costs || !tops || (work->directions && !directions)) {
+    if (!owner || !children || !at || !costs || !tops || (work->means && !means)) {
         result = fct_fail_memory(env, "joining a part");
         goto done;
     }
@@ -214,13 +214,13 @@ static fct_result join_slots(piece *p, const uint32_t *slots, uint32_t count) {
         owner[work->nodes[slots[i]]] = i;
         tops[i].record = work->records[slots[i]];
         tops[i].count = work->records[slots[i]].count, tops[i].height = work->heights[slots[i]];
-        if (directions) directions[i] = work->directions[slots[i]];
+        if (means) means[i] = work->means[slots[i]];
     }
     for (uint32_t m = work->merge_count; m-- > 0;)
         if (owner[work->face_count + m] != FCT_NONE)
             owner[work->children[m][0]] = owner[work->children[m][1]] = owner[work->face_count + m];
     bound_tops(p, owner, tops, count);
-    result = fct_large_join(env, &work->metric, tops, directions, count, children, costs);
+    result = fct_large_join(env, &work->metric, tops, means, count, children, costs);
     for (uint32_t i = 0; i < count; ++i) at[i] = slots[i]; /* slot of each of the join's clusters */
     for (uint32_t m = 0; result == FCT_OK && m + 1 < count; ++m) {
         at[count + m] = at[children[m][0]];
@@ -232,7 +232,7 @@ done:
     fct_release(env, at);
     fct_release(env, costs);
     fct_release(env, tops);
-    fct_release(env, directions);
+    fct_release(env, means);
     return result;
 }
 
@@ -326,14 +326,14 @@ static fct_result note_live(piece *p) {
     uint32_t count = live_count(work), i = 0;
     p->part->top_count = count;
     p->tops = fct_allocate_zero(env, count, sizeof *p->tops);
-    if (work->directions) p->directions = fct_allocate(env, count, sizeof *p->directions);
-    if (!p->tops || (work->directions && !p->directions)) return fct_fail_memory(env, "a part of a mesh");
+    if (work->means) p->means = fct_allocate(env, count, sizeof *p->means);
+    if (!p->tops || (work->means && !p->means)) return fct_fail_memory(env, "a part of a mesh");
     for (uint32_t s = 0; s < work->face_count; ++s) {
         if (work->nodes[s] == FCT_NONE) continue;
         p->tops[i].node = s;
         p->tops[i].record = work->records[s];
         p->tops[i].height = work->heights[s];
-        if (p->directions) p->directions[i] = work->directions[s];
+        if (p->means) p->means[i] = work->means[s];
         ++i;
     }
     p->edges = work->edges, p->edge_count = work->edge_count;
@@ -351,11 +351,11 @@ static fct_result order_tops(piece *p) {
     const fct_env *env = p->large->env;
     uint32_t count = p->part->top_count;
     fct_top *tops = fct_allocate(env, count, sizeof *tops);
-    fct_direction *directions = p->directions ? fct_allocate(env, count, sizeof *directions) : NULL;
+    fct_mean_record *means = p->means ? fct_allocate(env, count, sizeof *means) : NULL;
     p->top_of = fct_allocate(env, view.face_count, sizeof *p->top_of);
-    if (!tops || !p->top_of || (p->directions && !directions)) {
+    if (!tops || !p->top_of || (p->means && !means)) {
         fct_release(env, tops);
-        fct_release(env, directions);
+        fct_release(env, means);
         return fct_fail_memory(env, "a part of a mesh");
     }
     for (uint32_t r = 0; r < count; ++r) {
@@ -377,11 +377,11 @@ static fct_result order_tops(piece *p) {
         uint32_t r = p->top_of[p->tops[i].node];
         tops[r].record = p->tops[i].record;
         tops[r].height = p->tops[i].height;
-        if (directions) directions[r] = p->directions[i];
+        if (means) means[r] = p->means[i];
     }
     fct_release(env, p->tops);
-    fct_release(env, p->directions);
-    p->tops = tops, p->directions = directions;
+    fct_release(env, p->means);
+    p->tops = tops, p->means = means;
     return FCT_OK;
 }
 
@@ -480,8 +480,8 @@ static fct_result put_tree(piece *p) {
         result = fct_spool_append(&l->materials, view.materials, faces * sizeof *view.materials);
     if (result == FCT_OK) result = fct_spool_append(&l->tops, p->tops, p->part->top_count * sizeof *p->tops);
     if (result == FCT_OK) result = fct_spool_append(&l->sums, p->sums, p->part->top_count * sizeof *p->sums);
-    if (result == FCT_OK && p->directions)
-        result = fct_spool_append(&l->directions, p->directions, p->part->top_count * sizeof *p->directions);
+    if (result == FCT_OK && p->means)
+        result = fct_spool_append(&l->means, p->means, p->part->top_count * sizeof *p->means);
     fct_release(l->env, costs);
     return result;
 }
@@ -497,7 +497,7 @@ static void release_piece(piece *p) {
     fct_release(env, p->on_cut);
     fct_release(env, p->tops);
     fct_release(env, p->sums);
-    fct_release(env, p->directions);
+    fct_release(env, p->means);
     fct_release(env, p->top_of);
     fct_release(env, p->edges);
     fct_release(env, p->sides);
@@ -554,7 +554,7 @@ static fct_result run(piece *p) {
 
 fct_result fct_large_pieces(fct_large *large) {
     fct_spool *spools[] = {&large->nodes,     &large->costs, &large->face_ids, &large->triangles,
-                           &large->materials, &large->tops,  &large->sums,     &large->directions,
+                           &large->materials, &large->tops,  &large->sums,     &large->means,
                            &large->edges,     &large->sides};
     fct_result result = FCT_OK;
     for (size_t i = 0; i < sizeof spools / sizeof *spools && result == FCT_OK; ++i)

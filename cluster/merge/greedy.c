@@ -14,10 +14,15 @@
 #include "base/sort.h"
 #include "cluster/merge/work.h"
 
+/* Low bits of the key of a MEAN cost, which log2 of the faces (5) and the hash (15) take. The cost keeps 32
+ * bits of its mantissa, so that costs whose only difference is rounding are a tie. */
+#define TIE_BITS ((1ull << 20) - 1)
+
 typedef struct greedy {
     fct_work *work;
     fct_edge *edges;
     float *costs;
+    double *mean_costs;  /* MEAN only */
     uint32_t (*next)[2]; /* per edge and end: the next link of that end's list; a link is 2 edge + end */
     uint32_t *heads;     /* per slot: first link */
     uint32_t *seen;      /* per slot: the edge of the list being walked that leads there, if it does */
@@ -26,12 +31,23 @@ typedef struct greedy {
     uint32_t waiting, batch[FCT_LANES]; /* edges to be priced together */
 } greedy;
 
+/* Orders as the doubles do; -0 below +0. */
+static uint64_t double_key(double value) {
+    union {
+        double d;
+        uint64_t u;
+    } bits = {value};
+    return bits.u >> 63 ? ~bits.u : bits.u | 1ull << 63;
+}
+
 static uint64_t edge_key(const greedy *g, uint32_t e) {
     const fct_edge *edge = &g->edges[e];
     uint32_t faces = g->work->records[edge->a].count + g->work->records[edge->b].count;
     uint64_t size = 31 - (uint32_t)__builtin_clz(faces), hash = (uint32_t)(e * 2654435769u) >> 5;
     uint64_t cost = fct_float_key(g->costs[e]);
-    return g->work->balanced ? (uint64_t)faces << 32 | cost : cost << 32 | size << 27 | hash;
+    if (g->work->balanced) return (uint64_t)faces << 32 | cost;
+    if (g->mean_costs) return (double_key(g->mean_costs[e]) & ~TIE_BITS) | size << 15 | hash >> 12;
+    return cost << 32 | size << 27 | hash;
 }
 
 static bool waits(const greedy *g, const fct_edge *edge) {
@@ -40,13 +56,23 @@ static bool waits(const greedy *g, const fct_edge *edge) {
     return !fct_work_allowed(g->work, edge->a, edge->b);
 }
 
+static void price_mean(greedy *g, uint32_t e) {
+    const fct_mean_record *means = g->work->means;
+    g->mean_costs[e] =
+        fct_mean_cost(&g->work->metric, &means[g->edges[e].a], &means[g->edges[e].b], g->work->borders[e]);
+    g->costs[e] = (float)g->mean_costs[e];
+}
+
 static void price_batch(greedy *g) {
     fct_pair pairs[FCT_LANES];
     float costs[FCT_LANES];
     for (uint32_t i = 0; i < g->waiting; ++i) pairs[i] = g->edges[g->batch[i]];
-    if (g->waiting) fct_work_costs(g->work, pairs, g->waiting, costs);
+    if (g->mean_costs)
+        for (uint32_t i = 0; i < g->waiting; ++i) price_mean(g, g->batch[i]);
+    else if (g->waiting)
+        fct_work_costs(g->work, pairs, g->waiting, costs);
     for (uint32_t i = 0; i < g->waiting; ++i) {
-        g->costs[g->batch[i]] = costs[i];
+        if (!g->mean_costs) g->costs[g->batch[i]] = costs[i];
         fct_heap_set(&g->heap, g->batch[i], edge_key(g, g->batch[i]));
     }
     g->waiting = 0;
@@ -64,7 +90,8 @@ static void price(greedy *g, uint32_t e) {
 static void price_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     greedy *g = user;
-    for (size_t e = begin; e < end; e += FCT_LANES) {
+    for (size_t e = begin; e < end && g->mean_costs; ++e) price_mean(g, (uint32_t)e);
+    for (size_t e = begin; e < end && !g->mean_costs; e += FCT_LANES) {
         uint32_t count = end - e < FCT_LANES ? (uint32_t)(end - e) : FCT_LANES;
         fct_work_costs(g->work, g->edges + e, count, g->costs + e);
     }
@@ -98,6 +125,7 @@ static uint32_t *keep_links(greedy *g, uint32_t link, uint32_t from, uint32_t a,
             edge->a = FCT_NONE;
         } else if (g->seen[other] != FCT_NONE) {
             g->edges[g->seen[other]].shared += edge->shared;
+            if (g->mean_costs) g->work->borders[g->seen[other]] += g->work->borders[e];
             fct_heap_remove(&g->heap, e);
             edge->a = FCT_NONE;
         } else {
@@ -113,7 +141,8 @@ static uint32_t *keep_links(greedy *g, uint32_t link, uint32_t from, uint32_t a,
 
 static void contract(greedy *g, uint32_t e) {
     uint32_t a = g->edges[e].a, b = g->edges[e].b;
-    fct_work_merge(g->work, a, b, g->edges[e].shared, g->costs[e]);
+    double shared = g->mean_costs ? g->work->borders[e] : (double)g->edges[e].shared;
+    fct_work_merge(g->work, a, b, shared, g->costs[e]);
     uint32_t first = g->heads[a], second = g->heads[b], *tail = &g->heads[a];
     tail = keep_links(g, first, a, a, b, tail);
     tail = keep_links(g, second, b, a, b, tail);
@@ -148,19 +177,34 @@ static fct_result run(greedy *g) {
     }
     uint32_t kept = 0;
     for (uint32_t e = 0; e < work->edge_count; ++e)
-        if (g->edges[e].a != FCT_NONE) g->edges[kept++] = g->edges[e];
+        if (g->edges[e].a != FCT_NONE) {
+            if (g->mean_costs) work->borders[kept] = work->borders[e];
+            g->edges[kept++] = g->edges[e];
+        }
     work->edge_count = kept;
+    return FCT_OK;
+}
+
+/* The borders in double, from those of the edges where there are none yet. Errors: MEMORY. */
+static fct_result widen_borders(fct_work *work) {
+    if (!work->means || work->borders) return FCT_OK;
+    work->borders = fct_allocate(work->env, work->edge_count, sizeof *work->borders);
+    if (!work->borders) return fct_fail_memory(work->env, "clustering");
+    for (uint32_t e = 0; e < work->edge_count; ++e) work->borders[e] = (double)work->edges[e].shared;
     return FCT_OK;
 }
 
 fct_result fct_work_greedy(fct_work *work, bool across) {
     const fct_env *env = work->env;
     fct_result result = fct_work_list_edges(work);
+    if (result == FCT_OK) result = widen_borders(work);
     if (result != FCT_OK || work->edge_count == 0) return result;
     if (work->edge_count >= UINT32_MAX / 2) return fct_fail_memory(env, "so many dual edges");
     greedy g = {.work = work, .edges = work->edges, .across = across};
-    const fct_array arrays[] = {FCT_ARRAY(g.costs, work->edge_count), FCT_ARRAY(g.next, work->edge_count),
-                                FCT_ARRAY(g.heads, work->face_count), FCT_ARRAY(g.seen, work->face_count)};
+    const fct_array arrays[] = {FCT_ARRAY(g.costs, work->edge_count),
+                                FCT_ARRAY_IF(work->means, g.mean_costs, work->edge_count),
+                                FCT_ARRAY(g.next, work->edge_count), FCT_ARRAY(g.heads, work->face_count),
+                                FCT_ARRAY(g.seen, work->face_count)};
     result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
     if (result == FCT_OK) result = fct_heap_create(env, work->edge_count, &g.heap);
     if (result == FCT_OK) {

@@ -14,20 +14,18 @@
 
 #include <string.h>
 
-#include "base/math/eigen.h"
 #include "base/math/simd.h"
 
-#define TINY  1e-30f
-#define REACH 5e9f
+#define TINY 1e-30f
 
 fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
     bool mean = def->cost == FCT_COST_MEAN;
     v3 lower = v3_load(bounds->lower), upper = v3_load(bounds->upper);
     double diagonal = v3_norm(v3_sub(upper, lower));
     fct_metric metric = {.cost = def->cost, .measure = def->fit_measure};
-    metric.fit_weight = (float)(def->fit_weight >= 0 ? def->fit_weight : mean ? 1e6 : 1e4);
-    metric.direction_weight = (float)(def->direction_weight >= 0 ? def->direction_weight : 1);
-    metric.shape_weight = (float)(def->shape_weight >= 0 ? def->shape_weight : mean ? 1 : 0.006);
+    metric.fit_weight = def->fit_weight >= 0 ? def->fit_weight : mean ? 1e6 : 1e4;
+    metric.direction_weight = def->direction_weight >= 0 ? def->direction_weight : 1;
+    metric.shape_weight = def->shape_weight >= 0 ? def->shape_weight : mean ? 1 : 0.002;
     metric.origin = v3_scale(v3_add(lower, upper), 0.5);
     metric.scale = diagonal > 0 ? 1 / diagonal : 1;
     return metric;
@@ -133,17 +131,6 @@ void fct_metric_faces(const fct_metric *metric, const float *positions, const ui
     for (uint32_t i = 0; i < count; ++i) {
         store_record(&out, i, &records[i]);
     }
-}
-
-void fct_metric_direction(const fct_metric *metric, const float *positions, const uint32_t triangle[3],
-                          fct_direction *direction) {
-    v3 p[3];
-    for (int k = 0; k < 3; ++k) p[k] = v3_load(positions + 3 * (size_t)triangle[k]);
-    v3 a = v3_scale(v3_sub(p[1], p[0]), metric->scale), b = v3_scale(v3_sub(p[2], p[0]), metric->scale);
-    v3 vector = v3_scale(v3_cross(a, b), 0.5);
-    double area = v3_norm(vector);
-    *direction = (fct_direction){.vector = {vector.x, vector.y, vector.z}, .area = area};
-    if (area > 0) sym3_add_outer(direction->moment, 1 / area, vector);
 }
 
 /* A whole FCT_LANES of pairs, the first again where there are fewer. */
@@ -273,45 +260,8 @@ static inline f8 direction_growth(const lanes *a, const lanes *b, const lanes *u
     return f8_mul(f8_mul(u->area, f8_set(4)), f8_div(over, at_least(under, TINY)));
 }
 
-/* (8.18) with an eigen solve, in double. */
-static void mean_costs(const fct_metric *metric, const lanes *u, f8 shape, const fct_direction *directions,
-                       const fct_pair *pairs, uint32_t count, float *costs) {
-    float fields[10][FCT_LANES];
-    for (int i = 0; i < 6; ++i) f8_store(fields[i], u->covariance[i]);
-    f8_store(fields[6], weight_of(metric, u));
-    f8_store(fields[7], shape);
-    for (uint32_t lane = 0; lane < count; ++lane) {
-        const fct_direction *da = &directions[pairs[lane].a], *db = &directions[pairs[lane].b];
-        double covariance[6], moment[6], values[3], weight = (double)fields[6][lane];
-        v3 axes[3];
-        for (int i = 0; i < 6; ++i)
-            covariance[i] = (double)fields[i][lane], moment[i] = da->moment[i] + db->moment[i];
-        fct_eigen3(covariance, values, axes);
-        v3 s = {da->vector[0] + db->vector[0], da->vector[1] + db->vector[1], da->vector[2] + db->vector[2]};
-        v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
-        double area = da->area + db->area, fit = weight > 0 ? fmax(values[0], 0) / weight : 0;
-        double direction = area > 0 ? fmax((sym3_form(moment, n, n) - 2 * v3_dot(n, s)) / area + 1, 0) : 0;
-        costs[lane] =
-            (float)((double)metric->fit_weight * fit + (double)metric->direction_weight * direction +
-                    (double)(metric->shape_weight * fields[7][lane]));
-    }
-}
-
-/* wa wb w |xb - xa|^2 (1 - |S| / w). It grows with the sixth power of a cluster's size, so that it is nothing
- * where normals decide and rounds off what no plane fits any more; flat clusters are left alone at any size.
- */
-static inline f8 reach(const lanes *a, const lanes *b, const lanes *u, f8 invert_area) {
-    f8 d[3], s[3];
-    for (int i = 0; i < 3; ++i) {
-        d[i] = f8_sub(b->centroid[i], a->centroid[i]);
-        s[i] = f8_mul(u->vector[i], invert_area);
-    }
-    f8 bent = at_least(f8_sub(f8_set(1), f8_sqrt(dot3(s, s))), 0);
-    return f8_mul(f8_mul(f8_mul(a->area, b->area), f8_mul(u->area, bent)), dot3(d, d));
-}
-
-void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_direction *directions,
-                      const fct_pair *pairs, uint32_t count, float *costs) {
+void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_pair *pairs,
+                      uint32_t count, float *costs) {
     lanes a, b, u;
     f8 invert_area, invert_weight;
     pair_lanes filled;
@@ -320,23 +270,17 @@ void fct_metric_costs(const fct_metric *metric, const fct_record *records, const
     load_lanes(records, pairs, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
     join(metric, &a, &b, load_shared(pairs), invert_weight, &u);
-    f8 shape = shape_error(&a, &b, &u, invert_area);
-    if (metric->cost == FCT_COST_MEAN) {
-        mean_costs(metric, &u, shape, directions, pairs, count, costs);
-        return;
-    }
     f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u, invert_area, invert_weight), a.fit), b.fit), 0);
-    f8 cost = f8_mul(f8_set(metric->fit_weight), fit);
-    cost = f8_mad(cost, f8_set(metric->direction_weight), direction_growth(&a, &b, &u, invert_area));
-    f8 form_error = f8_mad(f8_mul(u.area, shape), f8_set(REACH), reach(&a, &b, &u, invert_area));
-    cost = f8_mad(cost, f8_set(metric->shape_weight), form_error);
+    f8 cost = f8_mul(f8_set((float)metric->fit_weight), fit);
+    cost = f8_mad(cost, f8_set((float)metric->direction_weight), direction_growth(&a, &b, &u, invert_area));
+    f8 shape = f8_mul(u.area, shape_error(&a, &b, &u, invert_area));
+    cost = f8_mad(cost, f8_set((float)metric->shape_weight), shape);
     float all[FCT_LANES];
     f8_store(all, cost);
     memcpy(costs, all, count * sizeof *costs);
 }
 
-void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direction *directions,
-                       const fct_pair *pairs, uint32_t count) {
+void fct_metric_merges(const fct_metric *metric, fct_record *records, const fct_pair *pairs, uint32_t count) {
     lanes a, b, u;
     f8 invert_area, invert_weight;
     pair_lanes filled;
@@ -348,13 +292,5 @@ void fct_metric_merges(const fct_metric *metric, fct_record *records, fct_direct
     u.fit = total_fit(metric, &u, invert_area, invert_weight);
     f8_transpose(u.rows);
     f8_transpose(u.rows + 8);
-    for (uint32_t i = 0; i < count; ++i) {
-        store_record(&u, i, &records[pairs[i].a]);
-        if (!directions) continue;
-        fct_direction *da = &directions[pairs[i].a];
-        const fct_direction *db = &directions[pairs[i].b];
-        for (int k = 0; k < 6; ++k) da->moment[k] += db->moment[k];
-        for (int k = 0; k < 3; ++k) da->vector[k] += db->vector[k];
-        da->area += db->area;
-    }
+    for (uint32_t i = 0; i < count; ++i) store_record(&u, i, &records[pairs[i].a]);
 }

@@ -1,8 +1,9 @@
-/* cluster/merge/metric.h: what merging two clusters costs.
+/* cluster/merge/metric.h: the default cost of a merge, INCREMENT, eight merges at once.
  *
- * Everything is measured on the model moved to the origin and scaled to a bounding-box diagonal of 1. A
- * record holds sums over a cluster in floats, centred on the cluster's own centroid: the raw form A - b b^T /
- * c (8.11) loses its digits in floats, the centred one keeps them. Records are combined, never subtracted.
+ * All lengths are those of the unit model: the mesh, moved to the origin and scaled to a bounding-box
+ * diagonal of 1. A record holds the sums of one cluster in floats. Its covariance is centred on the cluster's
+ * centroid, because the raw form A - b b^T / c (8.11) loses its digits in floats. The records of two clusters
+ * are added to that of their union; no record is ever subtracted.
  */
 #ifndef FCT_CLUSTER_METRIC_H
 #define FCT_CLUSTER_METRIC_H
@@ -12,63 +13,47 @@
 #include "facetree/cluster.h"
 
 typedef struct fct_record {
-    float covariance[6]; /* sum over the fit measure of (x - centroid)(x - centroid)^T */
-    float centroid[3];   /* of the fit measure */
+    float covariance[6]; /* Z (8.6) by the fit measure: xx xy xz yy yz zz */
+    float centroid[3];   /* by the fit measure */
     uint32_t count;      /* of faces */
     float vector[3];     /* S = sum A_k n_k */
-    float area;          /* sum A_k */
-    float perimeter;
-    float fit; /* area times the mean squared distance to the cluster's plane */
+    float area;          /* sum A_k, w of (8.12) */
+    float perimeter;     /* rho of (8.16) */
+    float fit;           /* area times E_fit (8.1) for the best plane */
 } fct_record;
 
-/* What the direction error of the MEAN cost needs; in double, for its terms cancel (8.13). */
-typedef struct fct_direction {
-    double moment[6]; /* sum A_k n_k n_k^T */
-    double vector[3], area;
-} fct_direction;
-
+/* What a merge costs, and the map to the unit model. */
 typedef struct fct_metric {
     fct_cluster_cost cost;
     fct_fit_measure measure;
-    float fit_weight, direction_weight, shape_weight;
+    double fit_weight, direction_weight, shape_weight; /* a1, a2, a3 of (8.18) */
     v3 origin;    /* of the unit model, in the mesh's coordinates */
-    double scale; /* mesh unit to unit model */
+    double scale; /* from mesh unit to unit model */
 } fct_metric;
 
-/* Weights below zero in def become the defaults of its cost. */
-#define fct_metric_make FCT_KERNEL(fct_metric_make)
-FCT_DECLARE_KERNEL(fct_metric, fct_metric_make, (const fct_tree_def *def, const fct_bounds *bounds));
-
-/* Two clusters, by their records' numbers, and the border they share (unit model). */
+/* Two clusters, as places in an array of records, and the length of their common border. */
 typedef struct fct_pair {
     uint32_t a, b;
     float shared;
 } fct_pair;
 
-enum { FCT_LANES = 8 }; /* pairs or triangles worked on at once */
+enum { FCT_LANES = 8 }; /* pairs or triangles per call */
 
-/* The records of count <= FCT_LANES triangles; perimeters in the unit model. */
+/* The records of count <= FCT_LANES triangles (count x 3 vertex ids, count perimeters). */
 #define fct_metric_faces FCT_KERNEL(fct_metric_faces)
 FCT_DECLARE_KERNEL(void, fct_metric_faces,
                    (const fct_metric *metric, const float *positions, const uint32_t *triangles,
                     const float *perimeters, uint32_t count, fct_record *records));
-/* What MEAN needs of one triangle besides. */
-#define fct_metric_direction FCT_KERNEL(fct_metric_direction)
-FCT_DECLARE_KERNEL(void, fct_metric_direction,
-                   (const fct_metric *metric, const float *positions, const uint32_t triangle[3],
-                    fct_direction *direction));
 
-/* Costs of merging count <= FCT_LANES pairs. The same for (a, b) as for (b, a) but for rounding. directions
- * only for MEAN. A NaN is never returned. */
+/* The INCREMENT costs of count <= FCT_LANES merges. Never NaN. Swapping a and b changes rounding only. */
 #define fct_metric_costs FCT_KERNEL(fct_metric_costs)
 FCT_DECLARE_KERNEL(void, fct_metric_costs,
-                   (const fct_metric *metric, const fct_record *records, const fct_direction *directions,
-                    const fct_pair *pairs, uint32_t count, float *costs));
+                   (const fct_metric *metric, const fct_record *records, const fct_pair *pairs,
+                    uint32_t count, float *costs));
 
-/* In each of count <= FCT_LANES pairs of different clusters, a becomes the union. */
+/* In each of count <= FCT_LANES pairs without a common cluster, record a becomes that of the union. */
 #define fct_metric_merges FCT_KERNEL(fct_metric_merges)
 FCT_DECLARE_KERNEL(void, fct_metric_merges,
-                   (const fct_metric *metric, fct_record *records, fct_direction *directions,
-                    const fct_pair *pairs, uint32_t count));
+                   (const fct_metric *metric, fct_record *records, const fct_pair *pairs, uint32_t count));
 
 #endif

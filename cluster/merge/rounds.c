@@ -110,7 +110,7 @@ static void price_eight(const fct_rounds *r, const edge_queue *queue, uint32_t a
     float costs[FCT_LANES];
     for (uint32_t k = 0; k < FCT_LANES; ++k)
         faces[k] = r->work->records[pairs[k].a].count + r->work->records[pairs[k].b].count;
-    fct_metric_costs(&r->work->metric, r->work->records, r->work->directions, pairs, FCT_LANES, costs);
+    fct_work_costs(r->work, pairs, FCT_LANES, costs);
     i8_store(new_keys, keys_of(costs, faces));
     i8_store(ties, ties_of(r->round, i8_load(queue->clusters + at), i8_load(queue->others + at)));
     for (uint32_t k = 0; k < count; ++k) {
@@ -538,6 +538,9 @@ fct_result fct_work_rounds(fct_work *work, bool across) {
     fct_result result = FCT_OK;
     size_t live = work->face_count - work->merge_count;
     if (live > FEW && (work->lists.neighbors || work->edge_count > 0)) {
+        fct_release(env, work->entry_borders);
+        fct_release(env, work->borders);
+        work->entry_borders = work->borders = NULL; /* the lists have borders in float alone */
         fct_rounds r = {.work = work, .across = across, .alone = fct_env_threads(env) == 1};
         result = allocate_rounds(&r, live) ? run(&r) : fct_fail_memory(env, "clustering");
         release_rounds(&r);

@@ -42,6 +42,17 @@ static fct_result bound_mesh(const fct_env *env, const fct_mesh *mesh, fct_bound
     return FCT_OK;
 }
 
+/* The record of one face in double, and its borders. */
+static void make_mean_record(fct_work *work, const fct_mesh *mesh, uint32_t face) {
+    const uint32_t *triangles = mesh->triangles;
+    const fct_lists *lists = &work->lists;
+    fct_mean_face(&work->metric, mesh->positions, triangles + 3 * (size_t)face, &work->means[face]);
+    for (uint32_t i = lists->starts[face]; i < lists->starts[face] + lists->counts[face]; ++i)
+        work->entry_borders[i] =
+            fct_mean_border(&work->metric, mesh->positions, triangles + 3 * (size_t)face,
+                            triangles + 3 * (size_t)lists->neighbors[i], lists->lengths[i]);
+}
+
 static void make_records(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     face_job *job = user;
@@ -50,19 +61,22 @@ static void make_records(void *user, size_t begin, size_t end, size_t chunk, uin
     for (size_t f = begin; f < end; f += FCT_LANES)
         fct_metric_faces(&work->metric, positions, job->mesh->triangles + 3 * f, work->lists.perimeters + f,
                          end - f < FCT_LANES ? (uint32_t)(end - f) : FCT_LANES, work->records + f);
-    for (size_t f = begin; f < end && work->directions; ++f)
-        fct_metric_direction(&work->metric, positions, job->mesh->triangles + 3 * f, &work->directions[f]);
+    for (size_t f = begin; f < end && work->means; ++f) make_mean_record(work, job->mesh, (uint32_t)f);
     for (size_t f = begin; f < end; ++f) work->nodes[f] = (uint32_t)f;
     memset(work->heights + begin, 0, end - begin);
 }
 
-static fct_result allocate_clusters(fct_work *work, bool directions) {
+static fct_result allocate_clusters(fct_work *work) {
     const fct_env *env = work->env;
     size_t faces = work->face_count;
-    const fct_array arrays[] = {
-        FCT_ARRAY(work->records, faces),  FCT_ARRAY_IF(directions, work->directions, faces),
-        FCT_ARRAY(work->heights, faces),  FCT_ARRAY(work->nodes, faces),
-        FCT_ARRAY(work->children, faces), FCT_ARRAY(work->costs, faces)};
+    bool mean = work->metric.cost == FCT_COST_MEAN;
+    const fct_array arrays[] = {FCT_ARRAY(work->records, faces),
+                                FCT_ARRAY_IF(mean, work->means, faces),
+                                FCT_ARRAY_IF(mean, work->entry_borders, work->lists.entry_count),
+                                FCT_ARRAY(work->heights, faces),
+                                FCT_ARRAY(work->nodes, faces),
+                                FCT_ARRAY(work->children, faces),
+                                FCT_ARRAY(work->costs, faces)};
     return fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
 }
 
@@ -71,7 +85,7 @@ fct_result fct_work_create_within(const fct_env *env, const fct_mesh *mesh, cons
     *out = (fct_work){.env = env, .face_count = mesh->face_count, .materials = mesh->materials};
     out->metric = fct_metric_make(def, bounds);
     fct_result result = fct_lists_build(env, mesh, out->metric.scale, &out->lists);
-    if (result == FCT_OK) result = allocate_clusters(out, def->cost == FCT_COST_MEAN);
+    if (result == FCT_OK) result = allocate_clusters(out);
     if (result != FCT_OK) {
         fct_work_release(out);
         return result;
@@ -92,12 +106,15 @@ fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_t
 
 void fct_work_release_clusters(fct_work *work) {
     fct_release(work->env, work->records);
-    fct_release(work->env, work->directions);
+    fct_release(work->env, work->means);
     fct_release(work->env, work->heights);
     fct_release(work->env, work->nodes);
     fct_release(work->env, work->edges);
+    fct_release(work->env, work->borders);
+    fct_release(work->env, work->entry_borders);
     fct_lists_release(work->env, &work->lists);
-    work->records = NULL, work->directions = NULL, work->heights = NULL;
+    work->records = NULL, work->means = NULL, work->heights = NULL;
+    work->borders = work->entry_borders = NULL;
     work->nodes = NULL, work->edges = NULL, work->edge_count = 0;
 }
 
@@ -115,8 +132,9 @@ bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b) {
            taller + 1 <= fct_height_limit(work->records[a].count + work->records[b].count, !work->steep);
 }
 
-void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
-                     uint32_t count) {
+/* Writes children, costs and heights of merges, and moves the union to slot a. */
+static void note_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
+                        uint32_t count) {
     for (uint32_t i = 0; i < count; ++i, ++merge) {
         uint32_t a = pairs[i].a, b = pairs[i].b;
         work->children[merge][0] = work->nodes[a];
@@ -127,11 +145,21 @@ void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, cons
         work->nodes[a] = work->face_count + merge;
         work->nodes[b] = FCT_NONE;
     }
-    fct_metric_merges(&work->metric, work->records, work->directions, pairs, count);
 }
 
-void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost) {
-    fct_work_merges(work, work->merge_count++, &(fct_pair){a, b, shared}, &cost, 1);
+void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,
+                     uint32_t count) {
+    note_merges(work, merge, pairs, costs, count);
+    fct_metric_merges(&work->metric, work->records, pairs, count);
+    for (uint32_t i = 0; i < count && work->means; ++i)
+        fct_mean_merge(&work->means[pairs[i].a], &work->means[pairs[i].b], (double)pairs[i].shared);
+}
+
+void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, double shared, float cost) {
+    const fct_pair pair = {a, b, (float)shared};
+    note_merges(work, work->merge_count++, &pair, &cost, 1);
+    fct_metric_merges(&work->metric, work->records, &pair, 1);
+    if (work->means) fct_mean_merge(&work->means[a], &work->means[b], shared);
 }
 
 fct_result fct_work_list_edges(fct_work *work) {
@@ -141,11 +169,16 @@ fct_result fct_work_list_edges(fct_work *work) {
     for (uint32_t f = 0; f < work->face_count; ++f)
         for (uint32_t i = 0; i < lists->counts[f]; ++i) count += lists->neighbors[lists->starts[f] + i] > f;
     work->edges = fct_allocate(work->env, count, sizeof *work->edges);
-    if (!work->edges) return fct_fail_memory(work->env, "clustering");
+    if (work->means) work->borders = fct_allocate(work->env, count, sizeof *work->borders);
+    if (!work->edges || (work->means && !work->borders)) return fct_fail_memory(work->env, "clustering");
     for (uint32_t f = 0; f < work->face_count; ++f)
-        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i)
-            if (lists->neighbors[i] > f)
-                work->edges[work->edge_count++] = (fct_edge){f, lists->neighbors[i], lists->lengths[i]};
+        for (uint32_t i = lists->starts[f]; i < lists->starts[f] + lists->counts[f]; ++i) {
+            if (lists->neighbors[i] <= f) continue;
+            if (work->means) work->borders[work->edge_count] = work->entry_borders[i];
+            work->edges[work->edge_count++] = (fct_edge){f, lists->neighbors[i], lists->lengths[i]};
+        }
+    fct_release(work->env, work->entry_borders);
+    work->entry_borders = NULL;
     fct_lists_release(work->env, &work->lists);
     return FCT_OK;
 }

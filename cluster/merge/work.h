@@ -9,7 +9,7 @@
 
 #include "base/env.h"
 #include "base/variant.h"
-#include "cluster/merge/metric.h"
+#include "cluster/merge/mean.h"
 #include "dual/lists.h"
 
 typedef fct_pair fct_edge; /* a, b: slots */
@@ -20,7 +20,7 @@ typedef struct fct_work {
     uint32_t face_count;
     /* per slot */
     fct_record *records;
-    fct_direction *directions; /* MEAN only */
+    fct_mean_record *means;    /* MEAN only */
     uint8_t *heights;          /* of the subtree */
     uint32_t *nodes;           /* build id; FCT_NONE when the slot's cluster has been merged into another */
     bool steep;                /* the reserve of height may be used */
@@ -38,7 +38,9 @@ typedef struct fct_work {
     uint32_t phase_ends[3]; /* merges within materials, across materials, without a shared edge */
     /* live edges, in the unit model: before the first contraction as lists by face, afterwards once each */
     fct_lists lists;
+    double *entry_borders; /* MEAN only, per entry of the lists: the shared length */
     fct_edge *edges;
+    double *borders; /* MEAN only, per edge: the shared length; NULL: that of the edge is all there is */
     uint32_t edge_count;
     uint32_t boundary_edges, nonmanifold_edges; /* of the mesh */
 } fct_work;
@@ -47,6 +49,10 @@ typedef struct fct_work {
  * tree within 3 log2 F; as long as `mild`, no more than 2 log2 n + 8 either, which leaves the rest in
  * reserve. */
 uint32_t fct_height_limit(uint32_t count, bool mild);
+
+/* The metric of a build over a model with these bounds. Negative weights of def become the defaults of its
+ * cost. */
+fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds);
 
 /* Records of all faces and the edges of the dual graph. Errors: MEMORY, CANCELLED. */
 fct_result fct_work_create(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *out);
@@ -59,7 +65,13 @@ void fct_work_release_clusters(fct_work *work);
 
 /* Costs of merging count <= FCT_LANES pairs of slots. */
 static inline void fct_work_costs(const fct_work *work, const fct_pair *pairs, uint32_t count, float *costs) {
-    fct_metric_costs(&work->metric, work->records, work->directions, pairs, count, costs);
+    if (!work->means) {
+        fct_metric_costs(&work->metric, work->records, pairs, count, costs);
+        return;
+    }
+    for (uint32_t i = 0; i < count; ++i)
+        costs[i] = (float)fct_mean_cost(&work->metric, &work->means[pairs[i].a], &work->means[pairs[i].b],
+                                        (double)pairs[i].shared);
 }
 static inline float fct_work_cost(const fct_work *work, uint32_t a, uint32_t b, float shared) {
     float cost;
@@ -70,7 +82,7 @@ enum { FCT_FREE_HEIGHT = 8 }; /* clusters that are lower may always merge */
 /* Whether the union keeps the height limit. */
 bool fct_work_allowed(const fct_work *work, uint32_t a, uint32_t b);
 /* Notes the merge; slot a holds the union, slot b dies. */
-void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, float shared, float cost);
+void fct_work_merge(fct_work *work, uint32_t a, uint32_t b, double shared, float cost);
 /* The same for count <= FCT_LANES pairs with no slot in common, which become merges `merge` and on, on
  * several threads; the caller counts. */
 void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, const float *costs,

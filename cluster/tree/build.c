@@ -51,9 +51,9 @@ static fct_result make_parts(const fct_env *env, const fct_mesh *mesh, const fct
 /* The options as used, with the default weights filled in. */
 static fct_tree_def used_def(const fct_tree_def *def, const fct_metric *metric) {
     fct_tree_def used = *def;
-    used.fit_weight = (double)metric->fit_weight;
-    used.direction_weight = (double)metric->direction_weight;
-    used.shape_weight = (double)metric->shape_weight;
+    used.fit_weight = metric->fit_weight;
+    used.direction_weight = metric->direction_weight;
+    used.shape_weight = metric->shape_weight;
     used.source = NULL;
     return used;
 }
