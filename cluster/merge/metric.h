@@ -27,8 +27,8 @@ typedef struct fct_metric {
     fct_cluster_cost cost;
     fct_fit_measure measure;
     double fit_weight, direction_weight, shape_weight; /* a1, a2, a3 of (8.18) */
-    v3 origin;    /* of the unit model, in the mesh's coordinates */
-    double scale; /* from mesh unit to unit model */
+    v3 origin;                                         /* of the unit model, in the mesh's coordinates */
+    double scale;                                      /* from mesh unit to unit model */
 } fct_metric;
 
 /* Two clusters, as places in an array of records, and the length of their common border. */

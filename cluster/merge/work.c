@@ -20,6 +20,19 @@ uint32_t fct_height_limit(uint32_t count, bool mild) {
     return (uint32_t)(mild && gentle < steep ? gentle : steep);
 }
 
+fct_metric fct_metric_make(const fct_tree_def *def, const fct_bounds *bounds) {
+    const bool mean = def->cost == FCT_COST_MEAN;
+    v3 lower = v3_load(bounds->lower), upper = v3_load(bounds->upper);
+    double diagonal = v3_norm(v3_sub(upper, lower));
+    fct_metric metric = {.cost = def->cost, .measure = def->fit_measure};
+    metric.fit_weight = def->fit_weight >= 0 ? def->fit_weight : mean ? 1e6 : 1e4;
+    metric.direction_weight = def->direction_weight >= 0 ? def->direction_weight : 1;
+    metric.shape_weight = def->shape_weight >= 0 ? def->shape_weight : mean ? 1 : 0.002;
+    metric.origin = v3_scale(v3_add(lower, upper), 0.5);
+    metric.scale = diagonal > 0 ? 1 / diagonal : 1;
+    return metric;
+}
+
 static void bound_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     face_job *job = user;
