@@ -58,9 +58,9 @@ static void check_model(const figures *expected) {
 
 static void real_meshes(void **state) {
     (void)state;
-    const figures models[] = {{"stanford-bunny", true, 0.0207, 3.2, 66},
-                              {"cow", true, 0.0105, 2.4, 42},
-                              {"fandisk", true, 0.0003, 1.8, 47}};
+    const figures models[] = {{"stanford-bunny", true, 0.0202, 3.6, 71},
+                              {"cow", true, 0.0102, 2.4, 41},
+                              {"fandisk", true, 0.00002, 2.0, 47}};
     for (size_t i = 0; i < sizeof models / sizeof *models; ++i) check_model(&models[i]);
 }
 
