@@ -41,16 +41,23 @@ typedef struct fct_cluster {
 /* The oriented box, whose extents hold every vertex for exactly these axes. */
 FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
 
-/* GREEDY: always the cheapest edge (8.2). ROUNDS: all mutually cheapest pairs at once, and of those left over
- * pairs that are nearly so; the default. */
+/* GREEDY contracts the cheapest edge of the dual graph, again and again (section 8.2). ROUNDS, the default,
+ * merges all pairs of clusters at once that are each other's cheapest neighbour, or nearly so. */
 typedef enum fct_cluster_method { FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS } fct_cluster_method;
-/* MEAN: E = a1 E_fit + a2 E_dir + a3 E_shape of the union (8.18). INCREMENT, the default: the growth of the
- * total error, a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 (w E_shape + 5e9 wa wb w |xb - xa|^2 (1 -
- * |S| / w)), where w is area and x the centroid; the last term rounds off clusters that are too large to be
- * flat. E_shape is (8.17) as printed. All on the model scaled to a bounding-box diagonal of 1; default
- * weights 1e4, 1, .006 (INCREMENT) and 1e6, 1, 1 (MEAN: weight 1 on a model of diagonal 1000). */
+
+/* What the merge of clusters a and b costs. S = sum A_k n_k, w = sum A_k and E_shape (8.17) are those of the
+ * union, D(x) is x of the union less x of both parts. Lengths are those of the mesh scaled to a bounding-box
+ * diagonal of 1.
+ * INCREMENT, the default: the growth of the total error. Default weights 1e4, 1, .002.
+ *     C = a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |S|) + a3 w E_shape f
+ *     f = (1 - |S| / w) / .001, held between .05 (flat ground) and 1 (bent ground)
+ * MEAN: the dissertation's cost (8.18), computed in double. With GREEDY borders are in double too. Default
+ * weights 1e6, 1, 1, where 1e6 is the weight 1 on a mesh of diagonal 1000.
+ *     E = a1 E_fit + a2 E_dir + a3 E_shape
+ * Ties: the union with the smaller log2 of its faces comes first, then a hash of the pair decides. */
 typedef enum fct_cluster_cost { FCT_COST_INCREMENT, FCT_COST_MEAN } fct_cluster_cost;
-/* POINTS: each face adds its three corners (8.3). AREA: the surface integral over the triangles. */
+/* The points of E_fit (8.1). POINTS: each face adds its three corners (8.3). AREA, the default: the surface
+ * integral over the triangles, which does not depend on the tessellation. */
 typedef enum fct_fit_measure { FCT_FIT_AREA, FCT_FIT_POINTS } fct_fit_measure;
 
 typedef struct fct_tree_def {
