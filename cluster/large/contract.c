@@ -11,7 +11,8 @@
 #include "base/sort.h"
 #include "base/union_find.h"
 #include "cluster/large/large.h"
-#include "cluster/merge/work.h"
+#include "cluster/merge/greedy.h"
+#include "cluster/merge/join.h"
 
 typedef struct upper {
     fct_large *large;

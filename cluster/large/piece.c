@@ -14,6 +14,8 @@
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "cluster/large/large.h"
+#include "cluster/merge/greedy.h"
+#include "cluster/merge/rounds/rounds.h"
 #include "cluster/tree/node.h"
 
 typedef struct piece {

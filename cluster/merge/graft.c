@@ -8,11 +8,12 @@
  * resort that costs O(F) and a few paths a cluster; meshes seldom come here (caterpillars of the MEAN cost,
  * hubs, graded strips). Merges are renumbered afterwards, children first.
  */
+#include "cluster/merge/graft.h"
+
 #include <string.h>
 
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "cluster/merge/work.h"
 #include "facetree/dual.h"
 
 enum { MOST_PATHS = 256, MOST_HEIGHT = 128 };

@@ -6,13 +6,14 @@
  * an edge is priced by the height of the tree: O(F log^2 F) at worst, whatever the valence. Ties go to the
  * smaller union, then to a hash of the edge: by edge number a flat grid would become chains.
  */
+#include "cluster/merge/greedy.h"
+
 #include <string.h>
 
 #include "base/heap.h"
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "cluster/merge/work.h"
 
 /* Low bits of the key of a MEAN cost, which log2 of the faces (5) and the hash (15) take. The cost keeps 32
  * bits of its mantissa, so that costs whose only difference is rounding are a tie. */

@@ -7,11 +7,12 @@
  * bisection). With heights of at most 3 log2 n_i - 1 this keeps the whole within 3 log2 F. O(k log k) for k
  * clusters. Smaller groups are split side by side; unions are then made level by level from below.
  */
+#include "cluster/merge/join.h"
+
 #include <string.h>
 
 #include "base/math/simd.h"
 #include "base/parallel.h"
-#include "cluster/merge/work.h"
 
 enum { BINS = 16, FEW = 8, STACK = 256, GRAIN = 1 << 8, PORTION = 1 << 12, PORTIONS = 1 << 8 };
 

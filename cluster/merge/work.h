@@ -91,18 +91,4 @@ void fct_work_merges(fct_work *work, uint32_t merge, const fct_pair *pairs, cons
 /* Turns the lists into edges, if there are lists. Errors: MEMORY. */
 fct_result fct_work_list_edges(fct_work *work);
 
-/* Contracts along live edges, cheapest first, until no allowed one is left; with `across` false only between
- * clusters of one material. Leaves the edges that remain. Errors: MEMORY, CANCELLED. */
-fct_result fct_work_greedy(fct_work *work, bool across);
-/* The same, but merging all mutually cheapest pairs at once as long as that pays. Errors: MEMORY, CANCELLED.
- */
-#define fct_work_rounds FCT_KERNEL(fct_work_rounds)
-FCT_DECLARE_KERNEL(fct_result, fct_work_rounds, (fct_work * work, bool across));
-/* Hangs clusters that edges still lead to, but heights forbid to merge, into their neighbours' trees; see
- * graft.c. Errors: MEMORY, CANCELLED. */
-fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh);
-/* Joins all clusters that are left into one tree by proximity. Errors: MEMORY, CANCELLED. */
-#define fct_work_join FCT_KERNEL(fct_work_join)
-FCT_DECLARE_KERNEL(fct_result, fct_work_join, (fct_work * work, const fct_mesh *mesh));
-
 #endif

@@ -3,6 +3,10 @@
 #include <string.h>
 
 #include "base/pool.h"
+#include "cluster/merge/graft.h"
+#include "cluster/merge/greedy.h"
+#include "cluster/merge/join.h"
+#include "cluster/merge/rounds/rounds.h"
 #include "cluster/tree/locality.h"
 #include "cluster/tree/tree.h"
 

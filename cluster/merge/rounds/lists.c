@@ -1,18 +1,24 @@
-/* cluster/merge/rounds_join.c: the lists of the next round: a union's list is those of its parts, renumbered,
- * doubles added up.
+/* cluster/merge/rounds/lists.c: the lists of neighbours of the next round.
  *
- * Most lists have at most eight entries: these are joined in registers, each lane beside every other, for
- * branches on what they hold could not be foretold. Longer ones are put together in a scratch area, where a
- * byte for every live number says at which place it was seen last; what stands there tells whether that was
- * in this list. The longest are sorted.
+ * The list of a union holds the entries of both parts, renumbered, without the edge between the parts.
+ * Entries that now lead to the same neighbour become one, with the sum of their borders. Three ways, by the
+ * longer list of the two parts:
+ * 1. At most 8 entries, as most lists: in registers, each lane compared with every other.
+ * 2. At most SHORT_LIST: in scratch memory. A byte per live cluster says at which place it was put last, and
+ *    the scratch tells whether that was for this list.
+ * 3. More: sorted in place.
+ * In 1 and 2 no branch depends on the entries, because such branches are unpredictable.
  */
+#include "cluster/merge/rounds/lists.h"
+
 #include <string.h>
 
 #include "base/math/simd.h"
 #include "base/sift.h"
-#include "cluster/merge/rounds.h"
 
-/* A long list in its place. */
+enum { SHORT_LIST = 100 }; /* two such lists and the union itself fit the 256 places of the scratch */
+
+/* A list in its place in the arrays of the next round. */
 typedef struct list {
     uint32_t *others, *keys;
     float *shared;
@@ -31,8 +37,9 @@ static void swap_entries(void *items, size_t i, size_t j) {
     l->others[j] = other, l->keys[j] = key, l->shared[j] = shared;
 }
 
-/* Adds up neighbouring doubles; a double stands for a merge, so its cost is open. */
-static uint32_t join_sorted(const list *l, uint32_t count) {
+/* Unites neighbouring entries with the same end. Such an end, or this cluster, is a union of this round, so
+ * the key is open already. */
+static uint32_t unite_sorted(const list *l, uint32_t count) {
     uint32_t to = 0;
     for (uint32_t i = 0; i < count; ++i) {
         if (to > 0 && l->others[to - 1] == l->others[i])
@@ -43,8 +50,9 @@ static uint32_t join_sorted(const list *l, uint32_t count) {
     return to;
 }
 
-/* Appends the list of live cluster i in the next round's numbers, without what leads to `self`. */
-static uint32_t renumber_list(const fct_rounds *r, uint32_t i, uint32_t self, const list *l, uint32_t count) {
+/* Appends the list of live cluster i, in the numbers of the next round, without entries to `self`. */
+static uint32_t append_renumbered(const fct_rounds *r, uint32_t i, uint32_t self, const list *l,
+                                  uint32_t count) {
     uint32_t own = r->renumbered[i], from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
         uint32_t number = r->renumbered[r->now.others[from]];
@@ -56,18 +64,18 @@ static uint32_t renumber_list(const fct_rounds *r, uint32_t i, uint32_t self, co
     return count;
 }
 
-static uint32_t join_long(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place) {
+static uint32_t join_long_lists(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next,
+                                uint32_t place) {
     list l = {r->next.others + place, r->next.keys + place, r->next.shared + place};
-    uint32_t count = renumber_list(r, i, next, &l, 0);
-    if (mate != FCT_NONE) count = renumber_list(r, mate, next, &l, count);
+    uint32_t count = append_renumbered(r, i, next, &l, 0);
+    if (mate != FCT_NONE) count = append_renumbered(r, mate, next, &l, count);
     fct_sift_sort(&l, count, less_entries, swap_entries);
-    return join_sorted(&l, count);
+    return unite_sorted(&l, count);
 }
 
-/* Adds the list of live cluster i; returns how many places are taken. Without branches but the loop's, for
- * which way they go could not be foretold. */
-static inline uint32_t add_list(const fct_rounds *r, uint32_t i, bool merged, fct_list_scratch *s,
-                                uint32_t count) {
+/* Adds the list of live cluster i to the scratch; returns the number of places in use. */
+static inline uint32_t add_to_scratch(const fct_rounds *r, uint32_t i, bool merged, fct_list_scratch *s,
+                                      uint32_t count) {
     uint8_t *places = s->places;
     uint32_t from = r->now.starts[i], end = from + r->now.lengths[i];
     for (; from < end; ++from) {
@@ -85,11 +93,11 @@ static inline uint32_t add_list(const fct_rounds *r, uint32_t i, bool merged, fc
     return count;
 }
 
-static uint32_t join_short(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next, uint32_t place,
-                           fct_list_scratch *s) {
+static uint32_t join_short_lists(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next,
+                                 uint32_t place, fct_list_scratch *s) {
     s->others[0] = next, s->places[next] = 0;
-    uint32_t count = add_list(r, i, mate != FCT_NONE, s, 1);
-    if (mate != FCT_NONE) count = add_list(r, mate, true, s, count);
+    uint32_t count = add_to_scratch(r, i, mate != FCT_NONE, s, 1);
+    if (mate != FCT_NONE) count = add_to_scratch(r, mate, true, s, count);
     --count;
     memcpy(r->next.others + place, s->others + 1, count * sizeof *s->others);
     memcpy(r->next.keys + place, s->keys + 1, count * sizeof *s->keys);
@@ -99,19 +107,20 @@ static uint32_t join_short(const fct_rounds *r, uint32_t i, uint32_t mate, uint3
 
 /* --- Lists of at most eight, in registers --- */
 
-/* Lanes that hold nothing have FCT_NONE. */
+/* A list of at most eight. Empty lanes have others = FCT_NONE. */
 typedef struct lanes {
     i8 others, keys;
     f8 shared;
 } lanes;
 
+/* first, first + 1, ... modulo 8 */
 static inline i8 numbers(uint32_t first) {
     static const uint32_t all[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
     return i8_load(all + first);
 }
 
-/* The list of live cluster i in the next round's numbers, without what leads to `self`. */
-static inline lanes load_list(const fct_rounds *r, uint32_t i, uint32_t self) {
+/* The list of live cluster i, in the numbers of the next round, without entries to `self`. */
+static inline lanes load_lanes(const fct_rounds *r, uint32_t i, uint32_t self) {
     const fct_generation *now = &r->now;
     uint32_t start = now->starts[i];
     i8 within = i8_less(numbers(0), i8_set(now->lengths[i])), flag = i8_set(FCT_MERGED);
@@ -122,14 +131,14 @@ static inline lanes load_list(const fct_rounds *r, uint32_t i, uint32_t self) {
                    f8_load(now->shared + start)};
 }
 
-/* Lanes of l, turned by `turn`, beside those of `to`: where both hold the same number its border is added. */
-static inline f8 add_equal(const lanes *to, f8 sum, const lanes *l, i8 turn) {
+/* sum plus the borders of l, rotated by `turn`, where l and `to` have the same number. */
+static inline f8 add_equal_lanes(const lanes *to, f8 sum, const lanes *l, i8 turn) {
     i8 equal = i8_same(to->others, i8_lookup8(l->others, turn));
     return f8_add(sum, f8_only(f8_lookup8(l->shared, turn), equal));
 }
 
-/* The first of several lanes with one number gets the borders of all, the others are emptied. */
-static inline void fold(lanes *l) {
+/* Of lanes with the same number, the first gets the sum of the borders and the others become empty. */
+static inline void unite_lanes(lanes *l) {
     f8 sum = l->shared;
     i8 gone = i8_set(0), eight = i8_set(8);
     for (uint32_t turn = 1; turn < 8; ++turn) {
@@ -142,20 +151,20 @@ static inline void fold(lanes *l) {
     l->others = i8_or(l->others, gone);
 }
 
-/* What both hold goes to a. */
-static inline void fold_into(lanes *a, lanes *b) {
+/* Moves the borders of numbers that a and b have in common from b to a. */
+static inline void unite_lists(lanes *a, lanes *b) {
     f8 sum = a->shared;
     i8 gone = i8_set(0);
     for (uint32_t turn = 0; turn < 8; ++turn) {
-        sum = add_equal(a, sum, b, numbers(turn));
+        sum = add_equal_lanes(a, sum, b, numbers(turn));
         gone = i8_or(gone, i8_same(b->others, i8_lookup8(a->others, numbers(turn))));
     }
     a->shared = sum;
     b->others = i8_or(b->others, gone);
 }
 
-/* Moves lanes that hold something to the front; returns how many. */
-static inline uint32_t pack(lanes *l) {
+/* Moves the lanes that are not empty to the front; returns their number. */
+static inline uint32_t pack_lanes(lanes *l) {
     uint32_t held = ~i8_eq(l->others, i8_set(FCT_NONE)) & 0xFF, count = (uint32_t)__builtin_popcount(held);
     i8 order = i8_chosen(held), filled = i8_less(numbers(0), i8_set(count));
     l->others = i8_if(filled, i8_lookup8(l->others, order), i8_set(FCT_NONE));
@@ -164,56 +173,57 @@ static inline uint32_t pack(lanes *l) {
     return count;
 }
 
-static inline void store(const fct_rounds *r, const lanes *l, uint32_t place) {
+static inline void store_lanes(const fct_rounds *r, const lanes *l, uint32_t place) {
     i8_store(r->next.others + place, l->others);
     i8_store(r->next.keys + place, l->keys);
     f8_store(r->next.shared + place, l->shared);
 }
 
 static inline uint32_t keep_lanes(const fct_rounds *r, uint32_t i, uint32_t next, uint32_t place) {
-    lanes l = load_list(r, i, next);
-    fold(&l);
-    uint32_t count = pack(&l);
-    store(r, &l, place);
+    lanes l = load_lanes(r, i, next);
+    unite_lanes(&l);
+    uint32_t count = pack_lanes(&l);
+    store_lanes(r, &l, place);
     return count;
 }
 
 static inline uint32_t join_lanes(const fct_rounds *r, uint32_t i, uint32_t mate, uint32_t next,
                                   uint32_t place) {
-    lanes a = load_list(r, i, next), b = load_list(r, mate, next);
+    lanes a = load_lanes(r, i, next), b = load_lanes(r, mate, next);
     a.keys = b.keys = i8_set(FCT_KEY_OPEN);
-    uint32_t count = pack(&a), all = count + pack(&b);
+    uint32_t count = pack_lanes(&a), all = count + pack_lanes(&b);
     if (all <= 8) {
         i8 lane = numbers(0), back = i8_add(lane, i8_set(8 - count)), first = i8_less(lane, i8_set(count));
         a.others = i8_if(first, a.others, i8_lookup8(b.others, back));
         a.shared = f8_if(first, a.shared, f8_lookup8(b.shared, back));
-        fold(&a);
-        count = pack(&a);
-        store(r, &a, place);
+        unite_lanes(&a);
+        count = pack_lanes(&a);
+        store_lanes(r, &a, place);
         return count;
     }
-    fold(&a), fold(&b), fold_into(&a, &b);
-    count = pack(&a);
-    store(r, &a, place);
-    uint32_t more = pack(&b);
-    store(r, &b, place + count);
+    unite_lanes(&a), unite_lanes(&b), unite_lists(&a, &b);
+    count = pack_lanes(&a);
+    store_lanes(r, &a, place);
+    uint32_t more = pack_lanes(&b);
+    store_lanes(r, &b, place + count);
     return count + more;
 }
 
-static inline uint32_t join(const fct_rounds *r, uint32_t next, fct_list_scratch *scratch) {
+/* Writes the list of cluster `next` of the next round; returns its length. */
+static inline uint32_t join_parts(const fct_rounds *r, uint32_t next, fct_list_scratch *scratch) {
     uint32_t i = (uint32_t)r->parents[next], mate = (uint32_t)(r->parents[next] >> 32),
              place = r->next.starts[next];
     uint32_t length = r->now.lengths[i], other = mate == FCT_NONE ? 0 : r->now.lengths[mate];
     if (length <= 8 && other <= 8)
         return mate == FCT_NONE ? keep_lanes(r, i, next, place) : join_lanes(r, i, mate, next, place);
-    if (length <= FCT_SHORT_LIST && other <= FCT_SHORT_LIST)
-        return join_short(r, i, mate, next, place, scratch);
-    return join_long(r, i, mate, next, place);
+    if (length <= SHORT_LIST && other <= SHORT_LIST)
+        return join_short_lists(r, i, mate, next, place, scratch);
+    return join_long_lists(r, i, mate, next, place);
 }
 
-void fct_rounds_join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+void fct_join_lists(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)begin, (void)end;
     fct_rounds *r = user;
     for (uint32_t next = r->kept[chunk]; next < r->kept[chunk + 1]; ++next)
-        r->next.lengths[next] = join(r, next, &r->scratch[thread]);
+        r->next.lengths[next] = join_parts(r, next, &r->scratch[thread]);
 }
