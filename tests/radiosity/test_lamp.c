@@ -1,6 +1,7 @@
 /* Direct light of lamps: closed forms, brute force over triangles, shadows, and odd places to stand. */
 #include "place.h"
 #include "radiosity/light/lamp.h"
+#include "radiosity/light/lamp_cut.h"
 #include "radiosity/light/polygon.h"
 
 typedef struct fixture {
@@ -389,6 +390,79 @@ static void equal_seeds_equal_light(void **state) {
     end(&f);
 }
 
+/* The weights of points that (u, v) choose have the cut's light as their mean, from near and far, also where
+ * a part of the lamp is below the horizon; the estimate is about the light or more. */
+static void points_have_the_light_as_mean(void **state) {
+    (void)state;
+    for (int shape = 0; shape < 3; ++shape) {
+        fixture f = begin();
+        fct_mesh mesh = shape ? make_bumpy(&f.env, 12, .15) : make_grid(&f.env, 1);
+        const float moved[12] = {2, 0, 0, 1, 0, 0, -2, 2, 0, 2, 0, 3};
+        place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, shape == 2), moved);
+        assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+        fct_scene_view view = fct_scene_get(f.scene);
+        fct_lamp lamp;
+        assert_int_equal(fct_lamp_init(&f.env, &view, 0, &lamp), FCT_OK);
+        static fct_cut cut;
+        for (uint64_t i = 0; i < 30; ++i) {
+            v3 away = v3_unit(v3_make(fct_uniform(fct_hash2(1, i)) - .5, fct_uniform(fct_hash2(2, i)) - .5,
+                                      fct_uniform(fct_hash2(3, i)) - .5));
+            v3 x = v3_mad(v3_make(1, 2, 3), 3 + 5 * (double)(i % 4), away);
+            v3 n = v3_unit(v3_sub(v3_scale(v3_make(fct_uniform(fct_hash2(4, i)), 0, .3), .7), away));
+            fct_receiver rec =
+                fct_lamp_receiver(&lamp, (double[3]){x.x, x.y, x.z}, (double[3]){n.x, n.y, n.z});
+            fct_lamp_cut(&lamp, &rec, &cut);
+            double mean = 0, square = 0;
+            enum { N = 4096 };
+            for (uint32_t k = 0; k < N; ++k) {
+                double u[2];
+                fct_plane_point(k, 11, u);
+                fct_lamp_point y = fct_cut_point(&lamp, &rec, &cut, u[0], u[1]);
+                mean += y.weight / N, square += y.weight * y.weight / N;
+            }
+            if (cut.light < 1e-3) continue;
+            double error = sqrt(fmax(square - mean * mean, 0) / N);
+            if (fabs(mean - cut.light) > .01 * cut.light + 4 * error)
+                fail_msg("shape %d, receiver %d: points %g, light %g", shape, (int)i, mean, cut.light);
+            /* drawn in proportion to the light, roughly: the spread of one point stays below its mean */
+            assert_true(square - mean * mean < mean * mean);
+            double estimate = fct_lamp_estimate(&lamp, &rec);
+            /* both sides of a two-sided body send light, and the estimate sees its outline */
+            assert_true(estimate > (shape == 2 ? .5 : .8) * cut.light && estimate < 4 * cut.light + .02);
+        }
+        fct_lamp_release(&f.env, &lamp);
+        fct_mesh_release(&f.env, &mesh);
+        fct_scene_destroy(f.scene);
+    }
+}
+
+/* A lamp half hidden sends its fraction with any number of rays, and fixed rays are exactly so many. */
+static void fractions_are_unbiased(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), 1, v3_make(-.5, -.5, 4),
+                v3_make(0, 1, 0), v3_make(1, 0, 0));
+    /* hides x < -.2, which is .3 of the lamp */
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 0, false), 1, v3_make(-10.1, -5, 2),
+                v3_make(10, 0, 0), v3_make(0, 10, 0));
+    light_up(&f);
+    for (uint32_t base = 2; base <= 16; base *= 2) {
+        double sum = 0, point[3] = {0, 0, 0}, normal[3] = {0, 0, 1};
+        uint64_t rays = 0;
+        enum { N = 600 };
+        for (uint64_t seed = 0; seed < N; ++seed) {
+            double e[3];
+            sum += fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, e,
+                                    &rays) /
+                   N;
+        }
+        assert_int_equal(rays, N * base);
+        assert_near(sum, .7, .02);
+    }
+    end(&f);
+}
+
 /* Every allocation may fail; nothing leaks. */
 static void memory_runs_out(void **state) {
     (void)state;
@@ -432,6 +506,8 @@ int main(void) {
         cmocka_unit_test(large_flat_emitters_are_lamps),
         cmocka_unit_test(equal_seeds_equal_light),
         cmocka_unit_test(single_triangle),
+        cmocka_unit_test(points_have_the_light_as_mean),
+        cmocka_unit_test(fractions_are_unbiased),
         cmocka_unit_test(memory_runs_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,208 @@
+/* Outputs: the smoothing filter against a direct evaluation, borders, sides, sites of probes, radiosities. */
+#include "place.h"
+#include "radiosity/output/output.h"
+#include "radiosity/output/probe.h"
+#include "radiosity/output/smooth.h"
+#include "radiosity/surface/tessellate.h"
+
+static fct_env plain; /* outlives every scene */
+
+static void assert_near(double value, double expected, double tolerance) {
+    if (!(fabs(value - expected) <= tolerance))
+        fail_msg("%.9g, expected %.9g within %g", value, expected, tolerance);
+}
+
+static fct_scene *begin(void) {
+    fct_scene *scene;
+    plain = fct_env_default();
+    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &scene), FCT_OK);
+    return scene;
+}
+
+/* Two passes of c = (c + sum w c') / (1 + sum w) over all sides of all faces, w = (1 - x^2)^2, x = difference
+ * over 4 % of the sum. */
+static void smooth_directly(const fct_surface *s, double *c) {
+    size_t n = s->mesh.vertex_count;
+    double *sum = malloc(4 * n * sizeof *sum);
+    for (int pass = 0; pass < 2; ++pass) {
+        for (size_t v = 0; v < n; ++v) {
+            for (int k = 0; k < 3; ++k) sum[4 * v + (size_t)k] = c[3 * v + (size_t)k];
+            sum[4 * v + 3] = 1;
+        }
+        for (size_t i = 0; i < 3 * (size_t)s->mesh.face_count; ++i) {
+            size_t ends[2] = {s->mesh.triangles[i], s->mesh.triangles[i % 3 == 2 ? i - 2 : i + 1]};
+            double difference = 0, level = 0;
+            for (size_t k = 0; k < 3; ++k) {
+                difference += fabs(c[3 * ends[0] + k] - c[3 * ends[1] + k]);
+                level += c[3 * ends[0] + k] + c[3 * ends[1] + k];
+            }
+            double x = difference / (.04 * level), w = x < 1 ? (1 - x * x) * (1 - x * x) : 0;
+            for (size_t e = 0; e < 2; ++e) {
+                for (size_t k = 0; k < 3; ++k) sum[4 * ends[e] + k] += w * c[3 * ends[1 - e] + k];
+                sum[4 * ends[e] + 3] += w;
+            }
+        }
+        for (size_t v = 0; v < n; ++v)
+            for (size_t k = 0; k < 3; ++k) c[3 * v + k] = sum[4 * v + k] / sum[4 * v + 3];
+    }
+    free(sum);
+}
+
+static void noise_on_flat_surfaces_is_smoothed(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    place_sheet(&plain, scene, place_material(scene, .5, 0, false), 12, v3_make(0, 0, 0), v3_make(1, 0, 0),
+                v3_make(0, 1, 0));
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    fct_surface s;
+    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &s), FCT_OK);
+    size_t n = s.mesh.vertex_count;
+    double *expected = malloc(3 * n * sizeof *expected), before = 0, after = 0;
+    for (size_t v = 0; v < n; ++v)
+        for (size_t k = 0; k < 3; ++k) {
+            double level = s.mesh.positions[3 * v] > .5F ? 1 : .5,
+                   noise = fct_uniform(fct_hash3(v, k, 1)) - .5;
+            expected[3 * v + k] = s.mesh.colors[3 * v + k] = (float)(level * (1 + .03 * noise));
+        }
+    smooth_directly(&s, expected);
+    float *noisy = malloc(3 * n * sizeof *noisy);
+    memcpy(noisy, s.mesh.colors, 3 * n * sizeof *noisy);
+    assert_int_equal(fct_colors_smooth(&plain, &s), FCT_OK);
+    for (size_t i = 0; i < 3 * n; ++i) {
+        double level = s.mesh.positions[i - i % 3] > .5F ? 1 : .5;
+        assert_near(s.mesh.colors[i], expected[i], 1e-5);
+        before += pow(noisy[i] / level - 1, 2), after += pow(s.mesh.colors[i] / level - 1, 2);
+    }
+    assert_true(after < .2 * before);
+    /* Bent vertices keep their colours. */
+    memset(s.flat, 0, n);
+    memcpy(s.mesh.colors, noisy, 3 * n * sizeof *noisy);
+    assert_int_equal(fct_colors_smooth(&plain, &s), FCT_OK);
+    assert_memory_equal(noisy, s.mesh.colors, 3 * n * sizeof *noisy);
+    free(noisy), free(expected);
+    fct_surface_release(&plain, &s);
+    fct_scene_destroy(scene);
+}
+
+/* Difference against 10 % of the sum plus 4 % of the scene's mean, summed over channels. */
+static void borders_are_relative_and_absolute(void **state) {
+    (void)state;
+    const float a[3] = {1, 1, 1}, near[3] = {1, 1, .405F}, far[3] = {1, 1, .375F}, dark[3] = {0, 0, 0},
+                dim[3] = {.03F, 0, 0};
+    /* 3 + 2 + x: |1 - x| = .1 (5 + x) + .04 at x = .41818 */
+    assert_false(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 1));
+    assert_true(fct_output_crosses_border(a, near, 1));
+    /* without the scene's level at x = .4545 */
+    assert_true(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 0));
+    assert_true(fct_output_crosses_border(far, a, 1));
+    assert_false(fct_output_crosses_border(dark, dim, 1)),
+        assert_true(fct_output_crosses_border(dark, dim, .5));
+}
+
+static void small_scenes_get_more_rays(void **state) {
+    (void)state;
+    fct_solution s = {0};
+    const double faces[5] = {1, 12500, 50000, 200000, 1e7}, factors[5] = {4, 4, 2, 1, 1};
+    for (int k = 0; k < 5; ++k) {
+        s.elements.view.face_count = (uint64_t)faces[k];
+        assert_near(fct_output_ray_factor(&s), factors[k], 1e-9);
+    }
+    const double fineness[4] = {.25, 1, 3, 16};
+    const uint32_t rays[4] = {4, 4, 12, 64};
+    for (int k = 0; k < 4; ++k) {
+        s.fineness = fineness[k];
+        assert_int_equal(fct_solution_lamp_rays(&s, 4), rays[k]);
+    }
+}
+
+static void radiosity_is_emission_plus_reflection(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    place_sheet(&plain, scene, place_material(scene, .25, 3, false), 1, v3_make(0, 0, 0), v3_make(1, 0, 0),
+                v3_make(0, 1, 0));
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    fct_solution s = {.env = &plain, .scene = scene};
+    s.elements.view = fct_scene_get(scene);
+    const double irradiance[3] = {1, 2, 4};
+    float b[3];
+    fct_solution_radiosity(&s, 0, irradiance, b);
+    assert_near(b[0], 3.25, 1e-6), assert_near(b[1], 3.5, 1e-6), assert_near(b[2], 4, 1e-6);
+    s.def.indirect_only = true;
+    fct_solution_radiosity(&s, 0, irradiance, b);
+    assert_near(b[0], .25, 1e-6), assert_near(b[2], 1, 1e-6);
+    fct_scene_destroy(scene);
+}
+
+static void the_brighter_side_is_shown(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    place_sheet(&plain, scene, place_material(scene, .5, 0, true), 2, v3_make(0, 0, 0), v3_make(1, 0, 0),
+                v3_make(0, 1, 0));
+    place_sheet(&plain, scene, place_material(scene, .5, 0, false), 2, v3_make(0, 0, 1), v3_make(1, 0, 0),
+                v3_make(0, 1, 0));
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    fct_solution s = {.env = &plain, .scene = scene};
+    assert_int_equal(fct_elements_create(&plain, scene, 1, &s.elements), FCT_OK);
+    fct_element *front = &s.elements.items[s.elements.roots[0]];
+    assert_true(front[1].back && !front[0].back);
+    assert_false(fct_output_back(&s, 0));
+    front[1].radiosity[2] = .1;
+    assert_true(fct_output_back(&s, 0));
+    front[0].radiosity[0] = .2;
+    assert_false(fct_output_back(&s, 0));
+    s.elements.items[s.elements.roots[1]].radiosity[0] = 1;
+    assert_false(fct_output_back(&s, 1));
+    fct_elements_release(&s.elements);
+    fct_scene_destroy(scene);
+}
+
+/* Sheets of side 10 at heights 0 (one-sided), .01 (two-sided) and 5 (one-sided, mirrored, facing up); the
+ * scene's diagonal is about 15, so probes look .015 around them. */
+static void probes_find_their_surface(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    uint32_t one = place_material(scene, .5, 0, false), two = place_material(scene, .5, 0, true);
+    place_sheet(&plain, scene, one, 1, v3_make(0, 0, 0), v3_make(10, 0, 0), v3_make(0, 10, 0));
+    place_sheet(&plain, scene, two, 1, v3_make(0, 0, .01), v3_make(10, 0, 0), v3_make(0, 10, 0));
+    fct_mesh mesh = make_sheet(&plain, 1, v3_make(0, 0, 5), v3_make(0, 10, 0), v3_make(10, 0, 0));
+    const float flipped[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 10};
+    place_mesh(scene, &mesh, one, flipped); /* front down, then mirrored: front up */
+    fct_mesh_release(&plain, &mesh);
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    const struct {
+        float point[3], normal[3];
+        uint32_t instance;
+        bool back;
+        float height;
+    } cases[] = {
+        {{2, 3, .001F}, {0, 0, 1}, 0, false, 0},
+        {{2, 3, .009F}, {0, 0, 1}, 1, false, .01F},
+        {{2, 3, .009F}, {0, 0, -1}, 1, true, .01F},
+        {{2, 3, .001F}, {0, 0, -1}, 1, true, .01F},
+        {{2, 3, 5.01F}, {0, 0, 1}, 2, false, 5},
+        {{2, 3, 4.99F}, {0, 0, -1}, FCT_NONE, false, 4.99F},
+        {{2, 3, 2}, {0, 0, 1}, FCT_NONE, false, 2},
+        {{10.005F, 3, 5}, {.6F, 0, .8F}, 2, false, 5},
+        {{10.005F, 3, 5}, {.6F, 0, -.8F}, FCT_NONE, false, 5},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        fct_site s = fct_probe_site(scene, cases[i].point, cases[i].normal);
+        if (s.instance != cases[i].instance || (s.instance != FCT_NONE && s.back != cases[i].back))
+            fail_msg("case %zu: instance %u, back %d", i, s.instance, s.back);
+        assert_near(s.point[2], cases[i].height, 1e-5);
+        assert_true(s.offset > 0 && s.offset < 1e-4);
+    }
+    fct_scene_destroy(scene);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(noise_on_flat_surfaces_is_smoothed),
+        cmocka_unit_test(borders_are_relative_and_absolute),
+        cmocka_unit_test(small_scenes_get_more_rays),
+        cmocka_unit_test(radiosity_is_emission_plus_reflection),
+        cmocka_unit_test(the_brighter_side_is_shown),
+        cmocka_unit_test(probes_find_their_surface),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
