@@ -1,9 +1,10 @@
 /* facetree/radiosity.h: hierarchical radiosity on face clusters, and a Monte Carlo reference.
  *
- * Source: Garland 1999, section 8.3.2, after Willmott, Heckbert, Garland, "Face Cluster Radiosity", EGWR
- * 1999. What the solver adds is derived in docs/radiosity.md.
+ * Source: Garland 1999, section 8.3.2, which summarizes Willmott, Heckbert and Garland, "Face Cluster
+ * Radiosity", EGWR 1999. docs/radiosity.md derives the rest.
  *
- * Radiosity B = e + rho E is power leaving per area, E irradiance, both in the unit of emission, RGB.
+ * Radiosity B = e + rho E is the power that leaves a unit of area; E is the irradiance, the power that
+ * arrives per unit of area. Both are RGB and have the unit of the scene's emission e.
  */
 #ifndef FACETREE_RADIOSITY_H
 #define FACETREE_RADIOSITY_H
@@ -14,64 +15,73 @@
 extern "C" {
 #endif
 
-/* FACE: the solver. REFERENCE: path tracing with next-event estimation at every vertex (or probe). */
+/* FACE: the solver. REFERENCE: path tracing with next-event estimation at every vertex and probe. */
 typedef enum fct_bake_method { FCT_BAKE_FACE, FCT_BAKE_REFERENCE } fct_bake_method;
-/* How the output's light is made: NONE from the solution alone; DIRECT with shadow rays to the lamps and
- * indirect light from anchors; GATHER the same with anchors as dense as the surface's relief asks for. */
+/* Light of the output's vertices and probes (FACE only).
+ * NONE: from the links between elements alone: 9 % RMS error on the museum.
+ * DIRECT: shadow rays to the lamps; indirect light from few anchors. For surfaces without relief.
+ * GATHER: the same with enough anchors for contacts and relief. */
 typedef enum fct_final { FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER } fct_final;
 
 typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
-    fct_final final;  /* default GATHER */
-    double error;     /* epsilon: links and elements are split until none is uncertain by more than this share
-                         of the emitted power; rays and anchors of the output grow with 1 / sqrt(error);
-                         default 2e-5 */
-    uint32_t samples; /* REFERENCE: paths per vertex; FACE: gather rays per anchor; 0: the default */
-    uint64_t seed;
-    bool indirect_only; /* leave out e and direct light */
-    double max_edge; /* longest edge of the output's triangles on flat ground, world units; 0: chosen from the
-                        scene */
+    fct_final final; /* default GATHER */
+    double error; /* epsilon, default 2e-5: share of the emitted power that a link may carry as uncertainty.
+                     Numbers of rays and anchors of the output grow with 1 / sqrt(error) */
+    uint32_t samples; /* REFERENCE: paths per vertex, default 256; FACE: gather rays per anchor; 0: default */
+    uint64_t seed;    /* of all random numbers; equal seeds give equal results */
+    bool indirect_only; /* the output leaves out emission and direct light */
+    double max_edge; /* longest edge of the output's triangles far from other instances, world units; 0: the
+                        scene's diagonal / 72 */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);
 
 typedef struct fct_bake_stats {
-    bool converged;
-    uint32_t passes;
-    uint64_t elements, links, rays, output_rays;
-    uint64_t vertices, faces; /* of the output */
-    double seconds_open, seconds_solve, seconds_push,
-        seconds_total;      /* scene to elements and links; iteration; output */
-    uint64_t touched_bytes; /* of hierarchy nodes read by the solve */
-    double power_emitted, power_absorbed,
-        power_escaped;     /* sums over RGB; emitted = absorbed + escaped up to the balance */
-    double error_estimate; /* relative, of the solution, from the last iteration and the links' bounds */
+    bool converged;                       /* the iteration reached its tolerance */
+    uint32_t passes;                      /* sweeps of all iterations */
+    uint64_t elements, links;             /* of the solution */
+    uint64_t rays, output_rays;           /* of the solution; of the output so far */
+    uint64_t vertices, faces;             /* of the output so far */
+    double seconds_open;                  /* refinement of links and elements */
+    double seconds_solve;                 /* iterations and gathers */
+    double seconds_push;                  /* output so far */
+    double seconds_total;                 /* all of fct_bake_create, and the output so far */
+    uint64_t touched_bytes;               /* pages of the hierarchies that were read, without rays */
+    double power_emitted;                 /* area times emission, summed over RGB */
+    double power_absorbed, power_escaped; /* their sum equals power_emitted up to the noise of the rays */
+    double error_estimate;                /* noise of the stored solution: relative standard error (RMS over
+                                             area) of an element's irradiance, plus the last change of the
+                                             iteration. It does not contain the errors of tessellation, anchors
+                                             or shadow rays, and is not the error of a vertex */
 } fct_bake_stats;
 
 typedef struct fct_bake fct_bake;
 
-/* Solves (FACE) or prepares (REFERENCE). The scene must outlive the bake. Errors: DATA (an error that is not
- * positive, a negative max_edge, a scene or a model that is not 1e-15 to 1e18 across), MEMORY, CANCELLED. */
+/* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
+ * (error <= 0, max_edge < 0, a scene or model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
+/* NULL is allowed. */
 FCT_API void fct_bake_destroy(fct_bake *bake);
 FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
 
-/* The lit mesh of one instance, in world space, colours = radiosity per vertex. Large flat triangles are
- * tessellated and vertices on creases are doubled; source_faces tells the face of the mesh as it was added.
- * Of a two-sided instance it is the side that the solution finds brighter as a whole, and triangles wind so
- * that this side is in front. Errors: MEMORY, CANCELLED. */
+/* The lit mesh of one instance in world space; colours are radiosity per vertex. Large flat triangles are
+ * tessellated, and vertices on creases are doubled; source_faces gives the face of the mesh as it was added.
+ * A two-sided instance has the side with more radiosity in the solution, wound so that this side is in front.
+ * The caller releases *out with fct_mesh_release. Errors: MEMORY, CANCELLED; *out is empty then. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
-/* All instances in one mesh, instance after instance; face_counts, if not NULL, receives instance_count
- * numbers of faces. */
+/* All instances in one mesh, in their order. face_counts (may be NULL) receives the number of faces of each
+ * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */
 FCT_API fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts);
 
 typedef struct fct_probe {
     float radiosity[3], irradiance[3];
-    uint32_t instance, face; /* the surface the probe was found on; FCT_NONE: free space, irradiance only */
+    uint32_t instance, face; /* the probe's surface; FCT_NONE in free space, where radiosity is 0 */
 } fct_probe;
-/* Light at points (count x 3) with unit normals (count x 3): on a surface within 1e-3 of the scene's diagonal
- * and facing the same way, else in free space. Errors: MEMORY, CANCELLED. */
+/* Light at points (count x 3) with normals (count x 3, any length). A probe belongs to the surface within
+ * 1e-3 of the scene's diagonal that faces its normal; without such a surface it is in free space. Errors:
+ * MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_probe(fct_bake *bake, size_t count, const float *points, const float *normals,
                                   fct_probe *out);
 

@@ -1,11 +1,13 @@
 /* radiosity/rivals/reference.c: see reference.h.
  *
- * In units of radiosity a cosine-distributed ray returns B of what it hits, and E is the mean of that. A path
- * adds, at each point it visits, the light of an emitter sampled by area (Veach's balance heuristic against
- * the chance that the ray onwards finds it) and the emission the ray onwards hits, weighted likewise. From
- * the fourth bounce on it survives with the probability of the largest reflectance and is weighted up, so
- * that the mean stays what it is. First directions and first emitter points are stratified over a point's
- * paths.
+ * A cosine-distributed ray returns the radiosity B of its hit, and the irradiance E is the mean. At each
+ * point of a path:
+ * 1. add the light of an emitter point that is sampled by area and power;
+ * 2. follow a cosine-distributed ray, and add the emission of its hit. Veach's balance heuristic weighs 1 and
+ * 2 against each other;
+ * 3. multiply by the reflectance of the hit. From the fourth bounce on, the path survives with the
+ * probability of the largest reflectance and is divided by it, which keeps the mean. First directions and
+ * first emitter points are stratified over the paths of a point.
  */
 #include "radiosity/rivals/reference.h"
 
@@ -16,19 +18,22 @@
 #include <float.h>
 #include <string.h>
 
+/* Bounces without Russian roulette. */
 #define SAFE_BOUNCES 3
-#define MAX_BOUNCES  65536 /* what is cut off here is below rho^65536 */
-#define BLOCK        512   /* paths of one work item where points are few */
-#define FEW_POINTS   4096
+/* The light of longer paths is below rho^65536. */
+#define MAX_BOUNCES 65536
+/* Below FEW_POINTS points, a work item is a block of a point's paths, so that all threads have work. */
+#define BLOCK      512
+#define FEW_POINTS 4096
 
-/* An emitting instance: its faces by place, with running sums of world area. */
+/* An emitting instance, with running sums of the world area of its faces. */
 typedef struct emitter {
     uint32_t instance, face_count;
     bool two_sided;
     double emission[3], strength;
     double area;  /* world */
     double *sums; /* face_count */
-    double begin; /* of its share of [0, 1) in proportion to power */
+    double begin; /* its part [begin, begin + share) of [0, 1), in proportion to power */
     double share;
 } emitter;
 
@@ -49,7 +54,7 @@ typedef struct tracer {
     uint64_t *rays; /* per chunk */
 } tracer;
 
-/* A point on a surface, its front normal towards the side in question. */
+/* A point on a surface with the normal of the side that receives light. */
 typedef struct spot {
     v3 p, n;
     double offset;
@@ -71,8 +76,8 @@ static double largest_coordinate(v3 p) {
     return fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z)));
 }
 
-/* Rays start a few units in the last place off the surface, which is where rounding leaves their origin. */
-static double rounding_offset(v3 p, double reach) {
+/* Offset of a ray's origin: the error of its rounded coordinates. */
+static double choose_offset(v3 p, double reach) {
     return 8 * FLT_EPSILON * fmax(largest_coordinate(p), reach);
 }
 
@@ -83,12 +88,12 @@ static fct_ray ray_from(const spot *from, v3 direction, double t_max) {
     return ray;
 }
 
-/* The density by area with which sample_emitter chooses points of an emitter. */
-static double emitter_density(const emitter *e) {
+/* Density per area with which sample_emitter chooses points of an emitter. */
+static double find_emitter_density(const emitter *e) {
     return e->share / e->area;
 }
 
-/* A point of all emitters in proportion to power. */
+/* Chooses a point of all emitters in proportion to power. */
 static const emitter *sample_emitter(const tracer *t, double u, double v, v3 *point, v3 *normal) {
     uint32_t low = 0, high = t->emitter_count - 1;
     while (low < high) {
@@ -128,7 +133,7 @@ static void add_emitter(const tracer *t, const spot *at, const double through[3]
     double r2 = v3_norm2(d), height = v3_dot(d, at->n), toward = -v3_dot(d, ny);
     if (e->two_sided) toward = fabs(toward);
     if (!(height > 0) || !(toward > 0)) return;
-    double kernel = height * toward / (FCT_PI * r2 * r2), density = emitter_density(e);
+    double kernel = height * toward / (FCT_PI * r2 * r2), density = find_emitter_density(e);
     double reach = fmax(largest_coordinate(from), largest_coordinate(y));
     double t_max = 1 - 1e-5 - 4 * FLT_EPSILON * reach / sqrt(r2);
     ++*rays;
@@ -137,10 +142,10 @@ static void add_emitter(const tracer *t, const spot *at, const double through[3]
     for (int k = 0; k < 3; ++k) sum[k] += through[k] * e->emission[k] * kernel / (density + kernel);
 }
 
-/* Where a ray lands: the spot on the hit face, the material and the emitter; false on a miss or a black back.
- */
-static bool land(const tracer *t, const spot *from, v3 direction, spot *to, const fct_material **material,
-                 const emitter **source, double *kernel) {
+/* Follows a ray to its hit: spot, material, emitter (or NULL), and kernel cos cos' / (pi r^2). False on a
+ * miss and on a black back. */
+static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to,
+                       const fct_material **material, const emitter **source, double *kernel) {
     fct_ray ray = ray_from(from, direction, INFINITY);
     fct_scene_hit hit;
     if (!fct_scene_closest_hit(t->scene, &ray, &hit, NULL)) return false;
@@ -148,7 +153,7 @@ static bool land(const tracer *t, const spot *from, v3 direction, spot *to, cons
     world_triangle(t, hit.instance, hit.place, c);
     v3 n = v3_unit(v3_cross(v3_sub(c[1], c[0]), v3_sub(c[2], c[0])));
     v3 origin = v3_load(ray.origin), p = v3_mad(origin, hit.t, direction);
-    /* Back onto the plane: t has a relative error only. */
+    /* Project onto the plane, because t has a relative error. */
     p = v3_mad(p, -v3_dot(v3_sub(p, c[0]), n), n);
     *material = t->view.materials + t->view.instances[hit.instance].material;
     double cosine = -v3_dot(n, direction);
@@ -160,11 +165,11 @@ static bool land(const tracer *t, const spot *from, v3 direction, spot *to, cons
     v3 d = v3_sub(p, origin);
     double r2 = v3_norm2(d);
     *kernel = r2 > 0 ? v3_dot(direction, from->n) * cosine / (FCT_PI * r2) : INFINITY;
-    *to = (spot){p, n, rounding_offset(p, largest_coordinate(c[0]))};
+    *to = (spot){p, n, choose_offset(p, largest_coordinate(c[0]))};
     return true;
 }
 
-/* One path from `at`; adds its estimate of the irradiance. */
+/* Traces one path and adds its estimate of the irradiance. */
 static void trace_path(const tracer *t, const spot *start, const double first[4], fct_random *random,
                        double sum[3], uint64_t *rays) {
     spot at = *start;
@@ -180,9 +185,9 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
         double kernel, survival = 0;
         spot next;
         ++*rays;
-        if (!land(t, &at, direction, &next, &material, &source, &kernel)) return;
+        if (!follow_ray(t, &at, direction, &next, &material, &source, &kernel)) return;
         if (direct && source) {
-            double weight = isfinite(kernel) ? kernel / (kernel + emitter_density(source)) : 1;
+            double weight = isfinite(kernel) ? kernel / (kernel + find_emitter_density(source)) : 1;
             for (int k = 0; k < 3; ++k) sum[k] += through[k] * source->emission[k] * weight;
         }
         for (int k = 0; k < 3; ++k) {
@@ -198,11 +203,11 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
     }
 }
 
-/* Paths [begin, end) of point i. */
+/* Sums the estimates of paths [begin, end) of point i. */
 static void trace_paths(const tracer *t, size_t i, uint32_t begin, uint32_t end, double sum[3],
                         uint64_t *rays) {
     spot start = {v3_load(t->points + 3 * i), v3_unit(v3_load(t->normals + 3 * i)), 0};
-    start.offset = t->offsets ? t->offsets[i] : rounding_offset(start.p, 0);
+    start.offset = t->offsets ? t->offsets[i] : choose_offset(start.p, 0);
     uint64_t seed = fct_hash2(t->seed, i), ways = fct_hash2(seed, 1), lights = fct_hash2(seed, 2);
     sum[0] = sum[1] = sum[2] = 0;
     if (v3_norm2(start.n) == 0) return;
@@ -216,7 +221,7 @@ static void trace_paths(const tracer *t, size_t i, uint32_t begin, uint32_t end,
 }
 
 /* A work item is a point, or a block of a point's paths. */
-static void trace_body(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void trace_items(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     const tracer *t = user;
     uint64_t rays = 0;
@@ -236,7 +241,8 @@ static void trace_body(void *user, size_t begin, size_t end, size_t chunk, uint3
     t->rays[chunk] = rays;
 }
 
-static fct_result add_emitting(tracer *t, uint32_t instance) {
+/* Adds an instance to the emitters if it emits and has area. */
+static fct_result add_emitter_instance(tracer *t, uint32_t instance) {
     const fct_instance *placed = t->view.instances + instance;
     const fct_material *material = t->view.materials + placed->material;
     const fct_tree_view *tree = t->trees + placed->model;
@@ -260,7 +266,8 @@ static fct_result add_emitting(tracer *t, uint32_t instance) {
     return FCT_OK;
 }
 
-static fct_result prepare(tracer *t) {
+/* Lists the emitters and their shares of the power. */
+static fct_result list_emitters(tracer *t) {
     uint32_t instances = t->view.instance_count, models = t->view.model_count;
     t->trees = fct_allocate(t->env, models, sizeof *t->trees);
     t->emitters = fct_allocate(t->env, instances, sizeof *t->emitters);
@@ -270,7 +277,7 @@ static fct_result prepare(tracer *t) {
     fct_result result = FCT_OK;
     for (uint32_t i = 0; i < instances && result == FCT_OK; ++i) {
         t->emitter_of[i] = FCT_NONE;
-        result = add_emitting(t, i);
+        result = add_emitter_instance(t, i);
     }
     double total = 0, begin = 0;
     for (uint32_t i = 0; i < t->emitter_count; ++i) total += t->emitters[i].strength * t->emitters[i].area;
@@ -283,7 +290,7 @@ static fct_result prepare(tracer *t) {
     return result;
 }
 
-/* The blocks' sums, in order. */
+/* Adds the blocks of each point in order. */
 static void join_blocks(tracer *t, size_t count) {
     for (size_t i = 0; i < count; ++i)
         for (int k = 0; k < 3; ++k) {
@@ -315,7 +322,7 @@ fct_result fct_reference_estimate(const fct_env *env, const fct_scene *scene, si
     if (count < FEW_POINTS) t.blocks = (uint32_t)fct_chunk_count(samples, BLOCK);
     size_t items = count * t.blocks, grain = count < FEW_POINTS ? 1 : 16,
            chunks = fct_chunk_count(items, grain);
-    fct_result result = prepare(&t);
+    fct_result result = list_emitters(&t);
     if (result != FCT_OK) goto done;
     t.rays = fct_allocate_zero(env, chunks, sizeof *t.rays);
     if (t.blocks > 1) t.parts = fct_allocate(env, 3 * items, sizeof *t.parts);
@@ -323,7 +330,7 @@ fct_result fct_reference_estimate(const fct_env *env, const fct_scene *scene, si
         result = fct_fail_memory(env, "a reference");
         goto done;
     }
-    result = fct_parallel_for_progress(env, "reference", items, grain, trace_body, &t);
+    result = fct_parallel_for_progress(env, "reference", items, grain, trace_items, &t);
     if (result == FCT_OK && t.parts) join_blocks(&t, count);
     for (size_t i = 0; rays && i < chunks; ++i) *rays += t.rays[i];
 done:
