@@ -1,12 +1,18 @@
-/* tools/bake.c: facetree bake: a scene's radiosity to vertex colours, in one file or one file an object, and
- * to probes. */
+/* tools/bake.c: facetree bake: the radiosity of a scene as vertex colours, in one file or one file per
+ * object, and at probes. */
 #define _GNU_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/commands.h"
 
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+#include "tools/kit/rows.h"
 
 typedef struct bake_options {
     fct_bake_def def;
@@ -29,32 +35,35 @@ enum {
     KEY_ALSO
 };
 
-static const struct argp_option options_table[] = {
+static const struct argp_option bake_options_table[] = {
     {"method", KEY_METHOD, "NAME", 0,
-     "face: face clusters (default); reference: path tracing at every vertex", 0},
+     "face: radiosity of face clusters (default); reference: path tracing at every vertex", 0},
     {"error", KEY_ERROR, "E", 0,
-     "Links are split until none is uncertain by more than this share of the emitted power (default 2e-5); "
-     "smaller is finer, in rays and anchors too",
+     "Split links until the uncertainty of each is at most this share of the emitted power (default 2e-5, "
+     "from "
+     "1e-9 to 1). A smaller E also means more rays and anchors",
      0},
-    {"samples", KEY_SAMPLES, "N", 0, "reference: paths a vertex; face: gather rays an anchor", 0},
-    {"visibility", KEY_VISIBILITY, "NAME", 0, "Rays through obb (default) or embree", 0},
+    {"samples", KEY_SAMPLES, "N", 0,
+     "reference: paths per vertex (default 256); face: gather rays per anchor (default: from --error)", 0},
+    {"visibility", KEY_VISIBILITY, "NAME", 0, "Backend for rays: obb (default) or embree", 0},
     {"backend", KEY_VISIBILITY, NULL, OPTION_ALIAS, NULL, 0},
     {"indirect-only", KEY_INDIRECT, NULL, 0, "Leave out emission and direct light", 0},
     {"final", KEY_FINAL, "HOW", 0,
-     "none: the solution as it is; direct: shadow rays, and indirect light from anchors; gather (default): "
-     "the same "
-     "with anchors as dense as the relief asks for",
+     "none: the solution as it is; direct: shadow rays for direct light, anchors for indirect light; gather "
+     "(default): as direct, with more anchors where the surface has relief",
      0},
     {"probe", KEY_PROBE, "FILE", 0,
-     "Also the light at points, one a line: x y z nx ny nz; - is standard input", 0},
+     "Also compute the light at points, one per line: x y z nx ny nz; - is standard input", 0},
     {"exposure", KEY_EXPOSURE, "F", 0,
-     "Factor on colours for display (default 1); radiosity is stored unchanged", 0},
+     "Factor on the colours for display (default 1); the stored radiosity does not change", 0},
     {"max-edge", KEY_MAX_EDGE, "L", 0,
-     "Longest edge on flat ground, in the scene's unit (default: from the scene)", 0},
-    {"also", KEY_ALSO, "FILE", 0, "Write the mesh to a second file too, in the format of its name", 0},
+     "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
+     "scene)",
+     0},
+    {"also", KEY_ALSO, "FILE", 0, "Also write the mesh to a second file, in the format of its name", 0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const char *const methods[] = {"face", "reference", NULL}, *const finals[] = {"none", "direct",
                                                                                          "gather", NULL};
     static const fct_bake_method method_values[] = {FCT_BAKE_FACE, FCT_BAKE_REFERENCE};
@@ -95,11 +104,12 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* --- One file an object --- */
+/* --- One file per object --- */
 
-/* "NAME.ply" in the folder, with what a file's name cannot hold replaced; objects of one name are numbered.
- */
-static int object_path(tool *t, const fct_scene_view *scene, uint32_t instance, char *path, size_t size) {
+/* "FOLDER/NAME.ply". Characters that a file name cannot hold become _; a second object of the same name gets
+ * "-2". */
+static int make_object_path(tool *t, const fct_scene_view *scene, uint32_t instance, char *path,
+                            size_t size) {
     char name[sizeof scene->instances->name];
     const char *wanted = scene->instances[instance].name;
     uint32_t object = scene->instances[instance].object, same = 0, seen = FCT_NONE;
@@ -120,8 +130,8 @@ static int object_path(tool *t, const fct_scene_view *scene, uint32_t instance, 
                : tool_fail(t, TOOL_OUTPUT, "%s/%s.ply: the name is too long", t->output, name);
 }
 
-/* Puts `part` behind what `all` holds. Only positions, triangles, colours and normals matter for the file. */
-static int append(tool *t, fct_mesh *all, const fct_mesh *part) {
+/* Appends the positions, triangles, colours and normals of `part` to `all`. */
+static int append_part(tool *t, fct_mesh *all, const fct_mesh *part) {
     bool normals = part->normals && (all->normals || !all->vertex_count);
     fct_mesh sum;
     if (all->vertex_count > INT32_MAX - part->vertex_count || all->face_count > INT32_MAX - part->face_count)
@@ -148,18 +158,18 @@ static int append(tool *t, fct_mesh *all, const fct_mesh *part) {
     return TOOL_DONE;
 }
 
-/* The file of the object whose first instance is `first`. */
+/* Writes the file of the object whose first instance is `first`. */
 static int write_object(tool *t, const bake_options *o, fct_bake *bake, const fct_scene_view *scene,
                         uint32_t first) {
     char path[PATH_MAX];
     fct_mesh all = {0};
-    int code = object_path(t, scene, first, path, sizeof path);
+    int code = make_object_path(t, scene, first, path, sizeof path);
     for (uint32_t i = first; i < scene->instance_count && code == TOOL_DONE; ++i) {
         fct_mesh part;
         if (scene->instances[i].object != scene->instances[first].object) continue;
         code = tool_result(t, fct_bake_instance(bake, i, &part));
         if (code != TOOL_DONE) break;
-        code = append(t, &all, &part);
+        code = append_part(t, &all, &part);
         fct_mesh_release(&t->env, &part);
     }
     if (code == TOOL_DONE) code = tool_save_mesh(t, path, &all, o->exposure);
@@ -191,22 +201,24 @@ static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     return code;
 }
 
-static bool folder_wanted(const char *output) {
+/* Whether -o names a folder: one that exists, ends in /, or has no ending of a mesh. */
+static bool is_folder_output(const char *output) {
     return strcmp(output, "-") != 0 && (tool_is_folder(output) || output[strlen(output) - 1] == '/' ||
                                         !(tool_is_mesh_name(output) || tool_ends(output, "fct")));
 }
 
-static int check_output(tool *t, const bake_options *o) {
+static int check_bake_output(tool *t, const bake_options *o) {
     if (o->also) {
-        if (!t->output || folder_wanted(t->output) || !tool_is_mesh_name(o->also) ||
+        if (!t->output || is_folder_output(t->output) || !tool_is_mesh_name(o->also) ||
             tool_ends(o->also, "stl"))
             return tool_fail(t, TOOL_USAGE,
-                             "--also %s: expected a name that ends in .glb or .ply, beside -o FILE", o->also);
+                             "--also %s: expected a name that ends in .glb or .ply, together with -o FILE",
+                             o->also);
         int code = tool_check_output(t, o->also);
         if (code != TOOL_DONE) return code;
     }
     if (!t->output) return TOOL_DONE;
-    if (folder_wanted(t->output)) return tool_check_folder(t, t->output);
+    if (is_folder_output(t->output)) return tool_check_folder(t, t->output);
     if (tool_ends(t->output, "stl") || tool_ends(t->output, "fct"))
         return tool_fail(t, TOOL_USAGE, "%s: expected a name that ends in .glb or .ply, or a folder",
                          t->output);
@@ -215,21 +227,18 @@ static int check_output(tool *t, const bake_options *o) {
 
 /* --- Probes --- */
 
-static json_t *numbers(const float *values) {
-    return json_pack("[f, f, f]", (double)values[0], (double)values[1], (double)values[2]);
-}
-
 static json_t *describe_probes(const fct_scene_view *scene, const float *points, const fct_probe *probes,
                                size_t count) {
     json_t *list = json_array();
     for (size_t i = 0; i < count; ++i) {
         const fct_probe *p = probes + i;
         bool on_surface = p->instance != FCT_NONE;
-        json_t *item = json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "position", numbers(points + 3 * i),
-                                 "radiosity", numbers(p->radiosity), "irradiance", numbers(p->irradiance),
-                                 "instance", on_surface ? json_integer(p->instance) : json_null(), "object",
-                                 on_surface ? json_string(scene->instances[p->instance].name) : json_null(),
-                                 "face", on_surface ? json_integer(p->face) : json_null());
+        json_t *item = json_pack(
+            "{s:o, s:o, s:o, s:o, s:o, s:o}", "position", tool_json_floats(points + 3 * i, 3), "radiosity",
+            tool_json_floats(p->radiosity, 3), "irradiance", tool_json_floats(p->irradiance, 3), "instance",
+            on_surface ? json_integer(p->instance) : json_null(), "object",
+            on_surface ? json_string(scene->instances[p->instance].name) : json_null(), "face",
+            on_surface ? json_integer(p->face) : json_null());
         if (!item || json_array_append_new(list, item)) {
             json_decref(list);
             return NULL;
@@ -254,8 +263,8 @@ static int read_probes(tool *t, const char *path, probe_set *set) {
         const float *row = rows.values + 6 * i;
         double length = sqrt((double)row[3] * row[3] + (double)row[4] * row[4] + (double)row[5] * row[5]);
         if (!(length > 0)) {
-            code =
-                tool_fail(t, TOOL_DATA, "%s: row %zu: expected a normal, found one of length 0", path, i + 1);
+            code = tool_fail(t, TOOL_DATA, "%s: row %zu: expected a normal, found a vector of length 0", path,
+                             i + 1);
             break;
         }
         set->normals = set->points + 3 * rows.count;
@@ -291,9 +300,9 @@ static int run_probes(tool *t, fct_bake *bake, const fct_scene_view *scene, cons
     return code;
 }
 
-/* --- The whole --- */
+/* --- The bake --- */
 
-static int report(tool *t, const bake_options *o, const fct_bake_stats *s, double load, json_t *probes) {
+static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, double load, json_t *probes) {
     double total = tool_seconds() - t->start;
     tool_say(t, "%llu elements, %llu links, %llu rays in %u passes%s; output %llu vertices, %llu rays",
              (unsigned long long)s->elements, (unsigned long long)s->links, (unsigned long long)s->rays,
@@ -330,11 +339,11 @@ static int bake_scene(tool *t, const bake_options *o, const probe_set *set) {
     fct_scene_view view = fct_scene_get(scene);
     code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
     if (code == TOOL_DONE && t->output)
-        code = folder_wanted(t->output) ? write_folder(t, o, bake, &view) : write_file(t, o, bake);
+        code = is_folder_output(t->output) ? write_folder(t, o, bake, &view) : write_file(t, o, bake);
     if (code == TOOL_DONE && o->probes) code = run_probes(t, bake, &view, set, &probes);
     if (code == TOOL_DONE) {
         fct_bake_stats stats = fct_bake_get_stats(bake);
-        code = report(t, o, &stats, load, probes);
+        code = report_bake(t, o, &stats, load, probes);
     }
     json_decref(probes);
     fct_bake_destroy(bake);
@@ -342,12 +351,12 @@ static int bake_scene(tool *t, const bake_options *o, const probe_set *set) {
     return code;
 }
 
-static int run(tool *t, void *options) {
+static int run_bake(tool *t, void *options) {
     bake_options *o = options;
     probe_set set = {0};
     if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
     o->def.seed = t->seed;
-    int code = check_output(t, o);
+    int code = check_bake_output(t, o);
     if (code == TOOL_DONE && o->probes) code = read_probes(t, o->probes, &set);
     if (code == TOOL_DONE) code = bake_scene(t, o, &set);
     tool_release(t, set.points);
@@ -358,22 +367,26 @@ int tool_bake(int argc, char **argv) {
     static const tool_command command = {
         .name = "bake",
         .synopsis = "SCENE -o OUT\nSCENE --probe FILE",
-        .summary = "radiosity of a scene to vertex colours",
-        .text = "SCENE is scene.json, OBJ with its MTL, glTF (.gltf, .glb) or a mesh. OUT is a mesh in world "
-                "space "
-                "(.glb: COLOR_0 exposed, clamped and linear, and _RADIOSITY; .ply: sRGB bytes, and float "
-                "radiosity_r/g/b), or a folder, which receives one .ply an object. Large flat triangles are "
-                "divided so "
-                "that they can carry shadows. The exit code is 1 when the solution has not converged.\n\n"
+        .summary = "compute the radiosity of a scene as vertex colours",
+        .text = "SCENE is a scene.json, an OBJ with its MTL, a glTF file (.gltf, .glb) or a mesh. OUT is "
+                "either a mesh in world "
+                "space or a folder, which receives one .ply per object. A .glb holds linear COLOR_0, exposed "
+                "and clamped, "
+                "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
+                "triangles are divided, so "
+                "that they can carry shadows. The exit code is 1 if the solution has not converged.\n\n"
+                "A probe belongs to a surface that lies at its point and faces its normal. In free space it "
+                "has irradiance "
+                "and no radiosity.\n\n"
                 "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
-                "seconds{load, open, solve, push, total}, peak_bytes, touched_bytes, power{emitted, "
-                "absorbed, escaped}, "
-                "error_estimate, probes[]{position, radiosity, irradiance, instance, object, face}. A probe "
-                "is on the "
-                "surface that lies at its point and faces its way; in free space it has irradiance alone.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+                "seconds{load, open, "
+                "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
+                "error_estimate, "
+                "probes[]{position, radiosity, irradiance, instance, object, face}. Powers are sums over "
+                "red, green and blue.",
+        .options = bake_options_table,
+        .parse = parse_bake,
+        .run = run_bake,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

@@ -1,7 +1,13 @@
-/* tools/boxes.c: facetree boxes: the oriented boxes of clusters, as JSON or as a mesh of boxes. */
-#include "tools/kit/tool.h"
+/* tools/boxes.c: facetree boxes: the oriented boxes of clusters, as JSON or as a mesh. */
+#include "tools/commands.h"
 
 #include <string.h>
+
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/labels.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
 
 typedef struct box_options {
     uint32_t clusters; /* 0: not given */
@@ -10,15 +16,16 @@ typedef struct box_options {
 
 enum { KEY_MAX_DISTANCE = TOOL_KEY };
 
-static const struct argp_option options_table[] = {
-    {"clusters", 'k', "K", 0, "The boxes of K clusters", 0},
+static const struct argp_option box_options_table[] = {
+    {"clusters", 'k', "K", 0, "Write the boxes of K clusters", 0},
     {"max-distance", KEY_MAX_DISTANCE, "D", 0,
-     "Of the fewest clusters without a vertex farther than D from its cluster's plane; D% is a share of the "
-     "diagonal",
+     "Write the boxes of the fewest clusters whose vertices are all within D of the cluster's plane, in the "
+     "mesh's unit; "
+     "D% is a share of the diagonal",
      0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_boxes(int key, char *text, struct argp_state *state) {
     box_options *o = state->input;
     switch (key) {
     case 'k':
@@ -30,23 +37,18 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-static json_t *numbers(const float *values, int count) {
-    json_t *array = json_array();
-    for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));
-    return array;
-}
-
-static json_t *describe(const fct_cluster *clusters, uint32_t count) {
+static json_t *describe_boxes(const fct_cluster *clusters, uint32_t count) {
     json_t *list = json_array();
     for (uint32_t i = 0; i < count; ++i) {
         fct_box box;
         const fct_cluster *cluster = &clusters[i];
         fct_cluster_box(cluster, &box);
         json_t *item =
-            json_pack("{s:o, s:[o, o, o], s:o, s:o, s:f, s:I}", "center", numbers(box.center, 3), "axes",
-                      numbers(box.axes[0], 3), numbers(box.axes[1], 3), numbers(box.axes[2], 3),
-                      "half_extents", numbers(box.half, 3), "plane", numbers(cluster->plane, 4), "area",
-                      (double)cluster->area, "faces", (json_int_t)cluster->count);
+            json_pack("{s:o, s:[o, o, o], s:o, s:o, s:f, s:I}", "center", tool_json_floats(box.center, 3),
+                      "axes", tool_json_floats(box.axes[0], 3), tool_json_floats(box.axes[1], 3),
+                      tool_json_floats(box.axes[2], 3), "half_extents", tool_json_floats(box.half, 3),
+                      "plane", tool_json_floats(cluster->plane, 4), "area", (double)cluster->area, "faces",
+                      (json_int_t)cluster->count);
         if (!item || json_array_append_new(list, item)) {
             json_decref(list);
             return NULL;
@@ -55,7 +57,7 @@ static json_t *describe(const fct_cluster *clusters, uint32_t count) {
     return json_pack("{s:I, s:o}", "clusters", (json_int_t)count, "boxes", list);
 }
 
-static int write_json(tool *t, json_t *object) {
+static int write_boxes_json(tool *t, json_t *object) {
     tool_writer writer;
     int code = tool_writer_open(t, t->output ? t->output : "-", &writer);
     if (code == TOOL_DONE) {
@@ -67,7 +69,7 @@ static int write_json(tool *t, json_t *object) {
     return code;
 }
 
-/* Corner c is at the side of axis i that bit i of c tells; the sides' triangles look outwards when the axes
+/* Corner c lies on the positive side of axis i if bit i of c is set. The triangles face outwards if the axes
  * are right-handed. */
 static void add_box(const fct_box *box, uint32_t index, fct_mesh *mesh) {
     static const uint8_t sides[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
@@ -86,7 +88,7 @@ static void add_box(const fct_box *box, uint32_t index, fct_mesh *mesh) {
             mesh->triangles[3 * (12 * (size_t)index + f) + c] = 8 * index + sides[f][c];
 }
 
-static int write_mesh(tool *t, const fct_cluster *clusters, uint32_t count) {
+static int write_boxes_mesh(tool *t, const fct_cluster *clusters, uint32_t count) {
     fct_mesh mesh;
     if (count > FCT_NONE / 48) return tool_fail(t, TOOL_USAGE, "-k %u: too many boxes for one mesh", count);
     int code = tool_result(t, fct_mesh_create(&t->env, 8 * count, 12 * count, FCT_MESH_COLORS, &mesh));
@@ -103,18 +105,19 @@ static int write_mesh(tool *t, const fct_cluster *clusters, uint32_t count) {
 
 static int write_boxes(tool *t, const fct_cluster *clusters, uint32_t count) {
     bool as_mesh = t->output && tool_is_mesh_name(t->output);
-    int code = as_mesh ? write_mesh(t, clusters, count) : TOOL_DONE;
-    json_t *object = as_mesh && !t->json ? NULL : describe(clusters, count);
+    int code = as_mesh ? write_boxes_mesh(t, clusters, count) : TOOL_DONE;
+    json_t *object = as_mesh && !t->json ? NULL : describe_boxes(clusters, count);
     if (code == TOOL_DONE && !object && !as_mesh)
         return tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output");
-    if (code == TOOL_DONE && !as_mesh && (t->output || !t->json)) code = write_json(t, object);
+    if (code == TOOL_DONE && !as_mesh && (t->output || !t->json)) code = write_boxes_json(t, object);
     if (code == TOOL_DONE && t->json) return tool_json(t, object);
     json_decref(object);
     return code;
 }
 
-/* For -k nothing of a hierarchy file is read but the clusters asked for and those above them. */
-static int cut(tool *t, const fct_tree *tree, const box_options *o, uint32_t **nodes, uint32_t *count) {
+/* -k reads only the chosen clusters and their ancestors from a hierarchy file. */
+static int choose_clusters(tool *t, const fct_tree *tree, const box_options *o, uint32_t **nodes,
+                           uint32_t *count) {
     fct_tree_view view = fct_tree_get(tree);
     if (o->clusters && (o->clusters < view.root_count || o->clusters > view.face_count))
         return tool_fail(t, TOOL_USAGE, "-k %u: %s can be cut into %u to %u clusters", o->clusters,
@@ -126,7 +129,7 @@ static int cut(tool *t, const fct_tree *tree, const box_options *o, uint32_t **n
                                                    *nodes, count, NULL));
 }
 
-static int run(tool *t, void *options) {
+static int run_boxes(tool *t, void *options) {
     const box_options *o = options;
     if ((o->clusters > 0) == (o->max_distance.value >= 0))
         return tool_fail(t, TOOL_USAGE, "expected either -k K or --max-distance D");
@@ -134,7 +137,7 @@ static int run(tool *t, void *options) {
     uint32_t *nodes = NULL, count = 0;
     fct_cluster *clusters = NULL;
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
-    if (code == TOOL_DONE) code = cut(t, tree, o, &nodes, &count);
+    if (code == TOOL_DONE) code = choose_clusters(t, tree, o, &nodes, &count);
     if (code == TOOL_DONE && !(clusters = tool_allocate(t, count, sizeof *clusters))) code = TOOL_MEMORY;
     for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)
         code = tool_result(t, fct_tree_cluster(tree, nodes[i], &clusters[i]));
@@ -149,16 +152,16 @@ int tool_boxes(int argc, char **argv) {
     static const tool_command command = {
         .name = "boxes",
         .synopsis = "IN (-k K | --max-distance D) [-o OUT]",
-        .summary = "oriented boxes of clusters",
-        .text =
-            "IN is a mesh or a hierarchy file (.fct). OUT is JSON, or, when it is named as a mesh, a mesh of "
-            "boxes "
-            "with a colour for each. Without -o the JSON goes to standard output.\n\n"
-            "JSON keys: clusters, boxes[]{center, axes (three unit vectors), half_extents, plane (n, d with "
-            "n.x + d = 0), area (of the surface inside), faces}.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+        .summary = "write the oriented boxes of clusters",
+        .text = "IN is a mesh or a hierarchy file (.fct). OUT is a JSON file or, if it is named as a mesh, a "
+                "mesh of boxes with a "
+                "colour per box. Without -o the JSON goes to standard output.\n\n"
+                "JSON keys: clusters, boxes[]{center, axes (three unit vectors), half_extents, plane (n, d "
+                "with n.x + d = 0), "
+                "area (of the surface inside), faces}.",
+        .options = box_options_table,
+        .parse = parse_boxes,
+        .run = run_boxes,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL};

@@ -1,8 +1,14 @@
-/* tools/closest.c: facetree closest: the surface point nearest to each point of a text file. */
-#include "tools/kit/tool.h"
+/* tools/closest.c: facetree closest: the nearest surface point for each point of a text file. */
+#include "tools/commands.h"
 
 #include <math.h>
 #include <string.h>
+
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+#include "tools/kit/rows.h"
 
 typedef struct closest_options {
     const char *points;
@@ -11,12 +17,14 @@ typedef struct closest_options {
 
 enum { KEY_POINTS = TOOL_KEY, KEY_MAX_DISTANCE };
 
-static const struct argp_option options_table[] = {
-    {"points", KEY_POINTS, "FILE", 0, "Points, one a line: x y z; - is standard input", 0},
-    {"max-distance", KEY_MAX_DISTANCE, "D", 0, "Look no further; -1 is written where nothing is as near", 0},
+static const struct argp_option closest_options_table[] = {
+    {"points", KEY_POINTS, "FILE", 0, "Points, one per line: x y z; - is standard input", 0},
+    {"max-distance", KEY_MAX_DISTANCE, "D", 0,
+     "Search only within D, in the mesh's unit (default: no limit); the answer is -1 if nothing is that near",
+     0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_closest(int key, char *text, struct argp_state *state) {
     closest_options *o = state->input;
     switch (key) {
     case KEY_POINTS:
@@ -79,7 +87,7 @@ static int write_found(tool *t, const fct_closest *found, const uint32_t *instan
     return wanted ? tool_writer_close(t, &writer, TOOL_DONE) : TOOL_DONE;
 }
 
-static int run(tool *t, void *options) {
+static int run_closest(tool *t, void *options) {
     const closest_options *o = options;
     if (!o->points) return tool_fail(t, TOOL_USAGE, "expected --points FILE");
     if (!strcmp(o->points, "-") && !strcmp(t->inputs[0], "-"))
@@ -111,15 +119,15 @@ int tool_closest(int argc, char **argv) {
         .name = "closest",
         .synopsis = "IN --points FILE [-o FILE]",
         .summary = "find the nearest surface points",
-        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of every point the nearest "
-                "point of "
-                "the surface is written as 'face x y z distance', in a scene 'instance face x y z distance'. "
-                "Without "
-                "-o they go to standard output; with --json they are only counted.\n\n"
-                "JSON keys: points, found, seconds (with opening or building the hierarchy).",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). For each point the output "
+                "has one line: 'face x y z "
+                "distance', or 'instance face x y z distance' for a scene. Without -o the lines go to "
+                "standard output; with "
+                "--json the answers are only counted.\n\n"
+                "JSON keys: points, found, seconds (including the opening or building of the hierarchy).",
+        .options = closest_options_table,
+        .parse = parse_closest,
+        .run = run_closest,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL};

@@ -1,17 +1,22 @@
 /* tools/compare.c: facetree compare: the distance between two surfaces, and between their colours. */
-#include "tools/kit/tool.h"
+#include "tools/commands.h"
+
+#include "tools/kit/command.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
 
 enum { KEY_SAMPLES = TOOL_KEY };
 
-static const struct argp_option options_table[] = {
-    {"samples", KEY_SAMPLES, "N", 0, "Samples on each face, beside the vertices (default 100)", 0}, {0}};
+static const struct argp_option compare_options_table[] = {
+    {"samples", KEY_SAMPLES, "N", 0, "Random samples per face, in addition to the vertices (default 100)", 0},
+    {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_compare(int key, char *text, struct argp_state *state) {
     if (key != KEY_SAMPLES) return ARGP_ERR_UNKNOWN;
     return tool_parse_count32(state, "--samples", text, 0, 1000000, state->input);
 }
 
-static json_t *report(const fct_mesh_error *e, double seconds) {
+static json_t *report_error(const fct_mesh_error *e, double seconds) {
     double d = e->diameter > 0 ? e->diameter : 1;
     return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:f}", "e_avg",
                      e->e_avg, "e_max", e->e_max, "e_avg_ab", e->e_avg_ab, "e_avg_ba", e->e_avg_ba,
@@ -21,7 +26,7 @@ static json_t *report(const fct_mesh_error *e, double seconds) {
                      (json_int_t)e->samples, "seconds", seconds);
 }
 
-static int run(tool *t, void *options) {
+static int run_compare(tool *t, void *options) {
     fct_tree *trees[2] = {NULL, NULL};
     fct_bvh *bvhs[2] = {NULL, NULL};
     fct_mesh_error error;
@@ -35,7 +40,7 @@ static int run(tool *t, void *options) {
     if (code == TOOL_DONE)
         code = tool_result(
             t, fct_mesh_compare(&t->env, bvhs[0], bvhs[1], *(uint32_t *)options, t->seed, &error));
-    if (code == TOOL_DONE) code = tool_print(t, report(&error, tool_seconds() - start));
+    if (code == TOOL_DONE) code = tool_print(t, report_error(&error, tool_seconds() - start));
     for (int i = 0; i < 2; ++i) {
         fct_bvh_destroy(bvhs[i]);
         fct_tree_destroy(trees[i]);
@@ -44,26 +49,28 @@ static int run(tool *t, void *options) {
 }
 
 int tool_compare(int argc, char **argv) {
-    static const tool_command command = {
-        .name = "compare",
-        .synopsis = "A B",
-        .summary = "measure how far two meshes lie apart",
-        .text = "Samples every vertex and N points of every face of each mesh, and takes the distance to the "
-                "other. "
-                "e_avg is the mean squared distance, e_max the largest distance; _ab is from A to B, _ba "
-                "from B to A; "
-                "e_avg_relative is over the squared diameter (the diagonal of A's bounds), e_max_relative "
-                "over the "
-                "diameter. Colours are compared where both meshes have them on their vertices.\n\n"
-                "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, e_max_ba, e_avg_relative, "
-                "e_max_relative, "
-                "diameter, color_rms, color_max, color_rms_relative, samples, seconds.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
-        .inputs_min = 2,
-        .inputs_max = 2,
-        .output = TOOL_OUTPUT_UNUSED};
+    static const tool_command command = {.name = "compare",
+                                         .synopsis = "A B",
+                                         .summary = "measure the distance between two meshes",
+                                         .text =
+                                             "Measures the distance from every vertex and from N random "
+                                             "points per face of each mesh to the other mesh.\n\n"
+                                             "e_avg is the mean squared distance and e_max the largest "
+                                             "distance, of both directions; _ab is from A to B, _ba from "
+                                             "B to A. Lengths are in the mesh's unit. e_avg_relative is "
+                                             "e_avg divided by the squared diameter, e_max_relative is "
+                                             "e_max divided by the diameter, where the diameter is the "
+                                             "diagonal of A's bounds. Colours are compared if both "
+                                             "meshes have them on their vertices.\n\n"
+                                             "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, "
+                                             "e_max_ba, e_avg_relative, e_max_relative, diameter, "
+                                             "color_rms, color_max, color_rms_relative, samples, seconds.",
+                                         .options = compare_options_table,
+                                         .parse = parse_compare,
+                                         .run = run_compare,
+                                         .inputs_min = 2,
+                                         .inputs_max = 2,
+                                         .output = TOOL_OUTPUT_UNUSED};
     uint32_t samples = 100;
     return tool_main(&command, argc, argv, &samples);
 }

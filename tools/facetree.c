@@ -1,8 +1,10 @@
-/* tools/facetree.c: the program: finds the subcommand and hands over. */
-#include "tools/kit/tool.h"
-
+/* tools/facetree.c: the program: finds the subcommand and runs it. */
 #include <stdlib.h>
 #include <string.h>
+
+#include "tools/commands.h"
+#include "tools/kit/command.h"
+#include "tools/kit/options.h"
 
 static const struct {
     const char *name, *summary;
@@ -13,13 +15,13 @@ static const struct {
     {"cluster", "build the hierarchy of face clusters of a mesh", tool_cluster},
     {"partition", "cut a mesh into clusters, flat pieces or charts", tool_partition},
     {"meshlets", "cut a mesh into meshlets for mesh shaders", tool_meshlets},
-    {"boxes", "oriented boxes of clusters", tool_boxes},
-    {"raycast", "shoot rays; check one backend against the other", tool_raycast},
+    {"boxes", "write the oriented boxes of clusters", tool_boxes},
+    {"raycast", "shoot rays; compare both backends", tool_raycast},
     {"closest", "find the nearest surface points", tool_closest},
-    {"bake", "radiosity of a scene to vertex colours", tool_bake},
+    {"bake", "compute the radiosity of a scene as vertex colours", tool_bake},
     {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
-    {"compare", "measure how far two meshes lie apart", tool_compare},
-    {"render", "draw a mesh, a scene, clusters or boxes", tool_render},
+    {"compare", "measure the distance between two meshes", tool_compare},
+    {"render", "draw a mesh, a scene, its clusters or its boxes", tool_render},
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
@@ -30,13 +32,13 @@ static int run_command(int index, int argc, char **argv) {
     return commands[index].run(argc, argv);
 }
 
-static int find(const char *name) {
+static int find_command(const char *name) {
     for (int i = 0; i < COMMANDS; ++i)
         if (!strcmp(name, commands[i].name)) return i;
     return -1;
 }
 
-static int unknown(const char *name) {
+static int reject_command(const char *name) {
     const char *names[COMMANDS + 2] = {"help"};
     for (int i = 0; i < COMMANDS; ++i) names[i + 1] = commands[i].name;
     const char *nearest = tool_nearest(name, names);
@@ -49,7 +51,8 @@ static int unknown(const char *name) {
 
 static int print_overview(void) {
     puts("Usage: facetree COMMAND [OPTION...] ...\n"
-         "Trees of face clusters of triangle meshes, for rays, radiosity and simplification.\n");
+         "Groups the triangles of a mesh into a tree of face clusters, for rays, radiosity and "
+         "simplification.\n");
     for (int i = 0; i < COMMANDS; ++i) printf("  %-10s %s\n", commands[i].name, commands[i].summary);
     puts("  help       explain a command: facetree help COMMAND\n\n"
          "      --help     print this\n"
@@ -57,7 +60,7 @@ static int print_overview(void) {
     return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 
-static int print_man(void) {
+static int print_overview_page(void) {
     printf(".TH FACETREE 1 \"\" \"facetree %s\"\n"
            ".SH NAME\nfacetree \\- trees of face clusters of triangle meshes\n"
            ".SH SYNOPSIS\n\\fBfacetree\\fR \\fICOMMAND\\fR [\\fIOPTION\\fR...] ...\n"
@@ -70,17 +73,17 @@ static int print_man(void) {
     return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 
-/* help [COMMAND], and help --man [COMMAND] for the build. */
-static int help(int argc, char **argv) {
+/* help [COMMAND]; the build also calls help --man [COMMAND]. */
+static int run_help(int argc, char **argv) {
     bool man = argc > 1 && !strcmp(argv[1], "--man");
     const char *name = argc > 1 + man ? argv[1 + man] : NULL;
     if (argc > 2 + man) {
         fprintf(stderr, "facetree help: expected one command, found %d\n", argc - 1 - man);
         return TOOL_USAGE;
     }
-    if (!name) return man ? print_man() : print_overview();
-    int index = find(name);
-    if (index < 0) return unknown(name);
+    if (!name) return man ? print_overview_page() : print_overview();
+    int index = find_command(name);
+    if (index < 0) return reject_command(name);
     char action[8];
     snprintf(action, sizeof action, "%s", man ? "--man" : "--help");
     char *words[] = {NULL, action, NULL};
@@ -93,8 +96,8 @@ typedef struct top {
     int code;
 } top;
 
-/* In order: the first word that is no option is the command, and the rest is its own. */
-static error_t parse(int key, char *text, struct argp_state *state) {
+/* The first word that is not an option is the command; the remaining words belong to it. */
+static error_t parse_word(int key, char *text, struct argp_state *state) {
     top *t = state->input;
     int first = state->next - 1, index;
     switch (key) {
@@ -107,11 +110,11 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         break;
     case ARGP_KEY_ARG:
         if (!strcmp(text, "help"))
-            t->code = help(t->argc - first, t->argv + first);
-        else if ((index = find(text)) >= 0)
+            t->code = run_help(t->argc - first, t->argv + first);
+        else if ((index = find_command(text)) >= 0)
             t->code = run_command(index, t->argc - first, t->argv + first);
         else
-            t->code = unknown(text);
+            t->code = reject_command(text);
         break;
     case ARGP_KEY_NO_ARGS:
         t->code = TOOL_USAGE;
@@ -120,7 +123,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     default:
         return ARGP_ERR_UNKNOWN;
     }
-    return ECANCELED; /* argp has nothing more to do */
+    return ECANCELED; /* the command line is done */
 }
 
 static void print_message(void *user, fct_severity severity, const char *text) {
@@ -134,7 +137,7 @@ int main(int argc, char **argv) {
     if (fct_simd_check(&env) != FCT_OK) return TOOL_USAGE;
     static const struct argp_option options[] = {
         {"help", 'h', NULL, 0, NULL, 0}, {"version", 'V', NULL, 0, NULL, 0}, {0}};
-    const struct argp argp = {.options = options, .parser = parse};
+    const struct argp argp = {.options = options, .parser = parse_word};
     top t = {argc, argv, TOOL_USAGE};
     error_t error =
         argp_parse(&argp, argc, argv, ARGP_IN_ORDER | ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &t);

@@ -1,5 +1,5 @@
-/* tools/info.c: facetree info: what a mesh, a hierarchy file or a scene holds. */
-#include "tools/kit/tool.h"
+/* tools/info.c: facetree info: the contents of a mesh, a hierarchy file or a scene. */
+#include "tools/commands.h"
 
 #include <inttypes.h>
 #include <limits.h>
@@ -7,24 +7,24 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+
 enum { KEY_VERIFY = TOOL_KEY };
 
-static const struct argp_option options_table[] = {
+static const struct argp_option info_options_table[] = {
     {"verify", KEY_VERIFY, NULL, 0,
-     "Read a hierarchy file throughout: checksums, structure, and every node's numbers against its faces", 0},
+     "Read a whole hierarchy file: check checksums, structure, and the numbers of every node against its "
+     "faces",
+     0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_info(int key, char *text, struct argp_state *state) {
     (void)text;
     if (key != KEY_VERIFY) return ARGP_ERR_UNKNOWN;
     *(bool *)state->input = true;
     return 0;
-}
-
-static json_t *numbers(const float *values, int count) {
-    json_t *array = json_array();
-    for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));
-    return array;
 }
 
 static void set_count(json_t *object, const char *key, uint64_t value) {
@@ -32,13 +32,13 @@ static void set_count(json_t *object, const char *key, uint64_t value) {
 }
 
 static void set_bounds(json_t *object, const fct_bounds *bounds) {
-    json_object_set_new(
-        object, "bounds",
-        json_pack("{s:o, s:o}", "lower", numbers(bounds->lower, 3), "upper", numbers(bounds->upper, 3)));
+    json_object_set_new(object, "bounds",
+                        json_pack("{s:o, s:o}", "lower", tool_json_floats(bounds->lower, 3), "upper",
+                                  tool_json_floats(bounds->upper, 3)));
 }
 
-/* Polygons of the file: runs of the same number in source_faces. */
-static uint32_t polygons(const fct_mesh *mesh) {
+/* The number of polygons in the file: of runs of equal source_faces. */
+static uint32_t count_polygons(const fct_mesh *mesh) {
     uint32_t count = mesh->face_count ? 1 : 0;
     if (!mesh->source_faces) return mesh->face_count;
     for (uint32_t f = 1; f < mesh->face_count; ++f)
@@ -52,7 +52,7 @@ static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     if (code != TOOL_DONE) return code;
     set_count(object, "vertices", r.vertices);
     set_count(object, "faces", r.faces);
-    set_count(object, "polygons", polygons(mesh));
+    set_count(object, "polygons", count_polygons(mesh));
     set_count(object, "edges", r.edges);
     set_count(object, "boundary_edges", r.boundary_edges);
     set_count(object, "boundary_loops", r.boundary_loops);
@@ -74,7 +74,7 @@ static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     return TOOL_DONE;
 }
 
-static json_t *build_options(const fct_tree_def *def) {
+static json_t *describe_build(const fct_tree_def *def) {
     json_t *object =
         json_pack("{s:s, s:s, s:s, s:f, s:f, s:f, s:I}", "method",
                   def->method == FCT_CLUSTER_ROUNDS ? "rounds" : "greedy", "cost",
@@ -85,7 +85,7 @@ static json_t *build_options(const fct_tree_def *def) {
     return object;
 }
 
-/* The area of the roots, and of nothing else. */
+/* The area of the surface, read from the roots alone. */
 static int sum_area(tool *t, const fct_tree *tree, double *area) {
     fct_tree_view view = fct_tree_get(tree);
     int code = TOOL_DONE;
@@ -101,7 +101,7 @@ static int sum_area(tool *t, const fct_tree *tree, double *area) {
     return code;
 }
 
-/* What the header tells. */
+/* The header alone, so that a large file answers at once. */
 static int describe_header(tool *t, const fct_tree *tree, json_t *object) {
     fct_tree_view view = fct_tree_get(tree);
     double area, square = 0;
@@ -129,7 +129,7 @@ static int describe_header(tool *t, const fct_tree *tree, json_t *object) {
     json_object_set_new(object, "mean_depth", json_real(view.mean_depth));
     json_object_set_new(object, "source", json_string(view.source));
     json_object_set_new(object, "source_hash", json_string(hash));
-    json_object_set_new(object, "build", build_options(&view.def));
+    json_object_set_new(object, "build", describe_build(&view.def));
     return TOOL_DONE;
 }
 
@@ -170,7 +170,7 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     return TOOL_DONE;
 }
 
-static int run(tool *t, void *options) {
+static int run_info(tool *t, void *options) {
     const char *path = t->inputs[0];
     bool verify = *(bool *)options, tree = tool_ends(path, "fct"), scene = tool_is_scene_name(path);
     fct_mesh mesh = {0};
@@ -182,7 +182,7 @@ static int run(tool *t, void *options) {
                                        : "mesh");
     int code;
     if (!object) {
-        code = tool_fail(t, TOOL_DATA, "the file's name is not UTF-8");
+        code = tool_fail(t, TOOL_DATA, "the name of the file is not UTF-8");
     } else if (tree) {
         code = describe_tree(t, path, verify, object);
     } else if (scene) {
@@ -202,17 +202,22 @@ int tool_info(int argc, char **argv) {
         .name = "info",
         .synopsis = "FILE",
         .summary = "count what a file holds; check a hierarchy file",
-        .text = "FILE is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of a mesh: vertices, "
-                "faces, polygons before they became triangles, boundary, non-manifold and misoriented edges, "
-                "components, degenerate and duplicate faces. Of a hierarchy what its header tells, at once "
-                "however large the file is: vertices, faces, boundary and non-manifold edges, components, "
-                "bounds, depth, roots, and the source and the options of its build.\n\n--verify reads all of "
-                "a hierarchy: checksums, links, ranges and depth, and of every node that its box and cone "
-                "hold its faces and that its area, moment, centroid and plane are theirs. What is wrong is "
-                "said, and the exit code is 65.\n\nJSON keys: as printed.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+        .text = "FILE is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf).\n\n"
+                "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
+                "(boundary, non-manifold and "
+                "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
+                "prints the header, which is "
+                "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
+                "bounds, depth, roots, and "
+                "the source and options of the build.\n\n"
+                "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
+                "node it checks that box "
+                "and cone contain the faces, and that area, moment, centroid and plane match them. If a "
+                "check fails, the message says "
+                "which, and the exit code is 65.\n\nJSON keys: as printed.",
+        .options = info_options_table,
+        .parse = parse_info,
+        .run = run_info,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_UNUSED};

@@ -1,24 +1,31 @@
 /* tools/meshlets.c: facetree meshlets: meshlets with their bounds, as JSON, as arrays for the GPU, or as a
- * mesh of many colours. */
+ * coloured mesh. */
 #define _DEFAULT_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/commands.h"
 
 #include <endian.h>
 #include <math.h>
 #include <string.h>
 
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/labels.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+
 enum { KEY_VERTICES = TOOL_KEY, KEY_TRIANGLES, KEY_FLATNESS };
 
-static const struct argp_option options_table[] = {
-    {"vertices", KEY_VERTICES, "N", 0, "At most N vertices a meshlet, 3 to 256 (default 64)", 0},
-    {"triangles", KEY_TRIANGLES, "M", 0, "At most M triangles a meshlet, 1 to 512 (default 124)", 0},
+static const struct argp_option meshlet_options_table[] = {
+    {"vertices", KEY_VERTICES, "N", 0, "At most N vertices per meshlet, 3 to 256 (default 64)", 0},
+    {"triangles", KEY_TRIANGLES, "M", 0, "At most M triangles per meshlet, 1 to 512 (default 124)", 0},
     {"flatness", KEY_FLATNESS, "W", 0,
-     "Weight of like normals against short distances: more makes narrower cones and a few more meshlets "
-     "(default 1)",
+     "Weight of similar normals against short distances (default 1). A larger weight makes narrower cones "
+     "and a few "
+     "more meshlets",
      0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_meshlets(int key, char *text, struct argp_state *state) {
     fct_meshlet_def *def = state->input;
     switch (key) {
     case KEY_VERTICES:
@@ -34,6 +41,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 
 /* --- Arrays --- */
 
+/* 32-bit words in little-endian order. */
 static void write_words(FILE *stream, const void *words, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         uint32_t word;
@@ -74,8 +82,8 @@ static void write_numbers(FILE *stream, const char *name, const float *values, i
     fputs("],", stream);
 }
 
-/* A line a meshlet. */
-static int write_json(tool *t, const fct_meshlets *m) {
+/* One line per meshlet. */
+static int write_meshlets_json(tool *t, const fct_meshlets *m) {
     tool_writer writer;
     int code = tool_writer_open(t, t->output, &writer);
     if (code != TOOL_DONE) return code;
@@ -122,16 +130,17 @@ static int write_colors(tool *t, const fct_tree *tree, const fct_meshlets *m) {
 
 /* --- Report --- */
 
-/* The share of triangles that cones cull, over all directions from which a far eye may look. */
-static double culled_share(const fct_meshlets *m, uint32_t faces) {
+/* The share of triangles that the cones cull, as a mean over all directions of a distant eye. A cone with the
+ * cutoff c culls for the share (1 - c) / 2 of directions. */
+static double measure_culled_share(const fct_meshlets *m, uint32_t faces) {
     double culled = 0;
     for (uint32_t i = 0; i < m->count; ++i)
         culled += m->meshlets[i].triangle_count * 0.5 * (1 - fmin((double)m->bounds[i].cone_cutoff, 1));
     return culled / faces;
 }
 
-static int report(tool *t, const fct_tree *tree, const fct_meshlet_def *def, const fct_meshlets *m,
-                  double seconds) {
+static int report_meshlets(tool *t, const fct_tree *tree, const fct_meshlet_def *def, const fct_meshlets *m,
+                           double seconds) {
     fct_tree_view view = fct_tree_get(tree);
     double vertices = (double)m->vertex_count / m->count, triangles = (double)view.face_count / m->count;
     double radius = 0;
@@ -140,10 +149,11 @@ static int report(tool *t, const fct_tree *tree, const fct_meshlet_def *def, con
         radius += (double)m->bounds[i].radius / m->count;
         without += !(m->bounds[i].cone_cutoff < 1);
     }
-    double share = culled_share(m, view.face_count);
+    double share = measure_culled_share(m, view.face_count);
     tool_say(t,
-             "%u meshlets of %.1f vertices (%.0f%%) and %.1f triangles (%.0f%%); %u without a cone; %.1f%% "
-             "of triangles culled by cones from afar",
+             "%u meshlets with %.1f vertices (%.0f%%) and %.1f triangles (%.0f%%) on average; %u without a "
+             "cone; cones cull "
+             "%.1f%% of triangles for a distant eye",
              m->count, vertices, 100 * vertices / def->max_vertices, triangles,
              100 * triangles / def->max_triangles, without, 100 * share);
     return tool_json(t, json_pack("{s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:I, s:f, s:{s:f}}", "meshlets",
@@ -154,13 +164,15 @@ static int report(tool *t, const fct_tree *tree, const fct_meshlet_def *def, con
                                   (json_int_t)without, "culled", share, "seconds", "meshlets", seconds));
 }
 
-static int run(tool *t, void *options) {
+static int run_meshlets(tool *t, void *options) {
     const fct_meshlet_def *def = options;
     bool json = tool_ends(t->output, "json") || !strcmp(t->output, "-"), binary = tool_ends(t->output, "bin");
     if (!json && !binary && !tool_is_mesh_name(t->output))
-        return tool_fail(t, TOOL_USAGE, "%s: expected a name that ends in .json or .bin, or that of a mesh",
+        return tool_fail(t, TOOL_USAGE, "%s: expected a name that ends in .json, in .bin, or as a mesh does",
                          t->output);
-    if (tool_ends(t->output, "stl")) return tool_fail(t, TOOL_USAGE, "%s: STL holds no colours", t->output);
+    if (tool_ends(t->output, "stl"))
+        return tool_fail(t, TOOL_USAGE,
+                         "%s: STL cannot store colours; expected .ply, .off, .obj, .glb or .om", t->output);
     fct_tree *tree;
     fct_meshlets meshlets = {0};
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
@@ -171,8 +183,8 @@ static int run(tool *t, void *options) {
     if (code == TOOL_DONE && binary)
         code = write_binary(t, &meshlets, def, fct_tree_get(tree));
     else if (code == TOOL_DONE)
-        code = json ? write_json(t, &meshlets) : write_colors(t, tree, &meshlets);
-    if (code == TOOL_DONE) code = report(t, tree, def, &meshlets, seconds);
+        code = json ? write_meshlets_json(t, &meshlets) : write_colors(t, tree, &meshlets);
+    if (code == TOOL_DONE) code = report_meshlets(t, tree, def, &meshlets, seconds);
     fct_meshlets_release(&t->env, &meshlets);
     fct_tree_destroy(tree);
     return code;
@@ -185,21 +197,26 @@ int tool_meshlets(int argc, char **argv) {
         .summary = "cut a mesh into meshlets for mesh shaders",
         .text =
             "IN is a mesh or a hierarchy file (.fct). OUT is JSON (.json, or -), the arrays that a mesh "
-            "shader "
-            "reads (.bin; docs/clustering.md), or the mesh with a colour for each meshlet (.ply, .off, .obj, "
-            ".glb, .om).\n\n"
-            "Every triangle is in one meshlet; a meshlet is of one material. The sphere and the boxes hold "
-            "its vertices. Seen from an eye E it turns its back if dot(normalize(cone_apex - E), cone_axis) "
-            ">= cone_cutoff; without a cone the axis is 0 and the cutoff 1.\n\n"
+            "shader reads (.bin; see "
+            "docs/clustering.md), or the mesh with a colour per meshlet (.ply, .off, .obj, .glb, .om).\n\n"
+            "Every triangle is in one meshlet, and a meshlet has one material. The sphere and the boxes "
+            "contain its vertices. "
+            "An eye E sees only back faces if dot(normalize(cone_apex - E), cone_axis) >= cone_cutoff. A "
+            "meshlet without a cone "
+            "has the axis 0 and the cutoff 1.\n\n"
             "OUT.json: count, meshlets[]{center, radius, cone_apex, cone_axis, cone_cutoff, lower, upper, "
-            "box_center, box_axes (three unit vectors in a row), box_half_extents, vertices (of the input), "
-            "triangles (three places in `vertices` each), faces (of the input)}.\n\n"
+            "box_center, box_axes "
+            "(three unit vectors in a row), box_half_extents, vertices (of the input), triangles (three "
+            "positions in `vertices` "
+            "each), faces (of the input)}.\n\n"
             "JSON keys: meshlets, faces, vertices (over all meshlets), mean_vertices, mean_triangles, "
-            "vertex_fill, triangle_fill (of the limits), mean_radius, without_cone, culled (share of "
-            "triangles that cones cull, mean over all directions), seconds{meshlets}.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+            "vertex_fill, triangle_fill "
+            "(shares of the limits), mean_radius, without_cone, culled (share of triangles that cones cull, "
+            "mean over all "
+            "directions), seconds{meshlets}.",
+        .options = meshlet_options_table,
+        .parse = parse_meshlets,
+        .run = run_meshlets,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED};

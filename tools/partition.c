@@ -1,10 +1,16 @@
-/* tools/partition.c: facetree partition: clusters, flat pieces or charts, as labels or as a mesh of many
- * colours; which of them are neighbours. */
-#include "tools/kit/tool.h"
+/* tools/partition.c: facetree partition: clusters, flat pieces or charts, as labels or as a coloured mesh;
+ * their neighbours. */
+#include "tools/commands.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/labels.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
 
 static const double degree = 3.14159265358979323846 / 180;
 
@@ -13,11 +19,11 @@ typedef struct partition_options {
     double max_cost;   /* negative: not given */
     tool_length max_distance;
     double chart_angle;    /* degrees; negative: not given */
-    fct_chart_def charts;  /* its other fields */
-    bool chart_options;    /* one of them was given */
+    fct_chart_def charts;  /* all fields except the angle */
+    bool chart_options;    /* one of these fields was given */
     const char *adjacency; /* a file, or NULL */
-    fct_refine_def refine; /* sweep_count 0: none */
-    bool refine_options;   /* one of its other fields was given */
+    fct_refine_def refine; /* sweep_count 0: no refinement */
+    bool refine_options;   /* a field other than sweep_count was given */
 } partition_options;
 
 typedef struct refinement {
@@ -25,10 +31,10 @@ typedef struct refinement {
     fct_refine_stats stats;
 } refinement;
 
-/* A number for each face, and what is known of them. */
+/* A label per face, and figures about the clusters. */
 typedef struct partition {
     fct_tree *tree;
-    uint32_t *nodes, *labels; /* nodes: NULL where labels are no cut of the tree */
+    uint32_t *nodes, *labels; /* nodes: NULL if the labels are not a cut of the tree */
     uint32_t count;
     double largest_distance;
     fct_chart_stats charts;
@@ -50,30 +56,33 @@ enum {
     KEY_IRREGULARITY
 };
 
-static const struct argp_option options_table[] = {
+static const struct argp_option partition_options_table[] = {
     {"clusters", 'k', "K", 0, "Cut into K clusters", 0},
-    {"max-cost", KEY_MAX_COST, "C", 0, "Make all merges that cost at most C", 0},
+    {"max-cost", KEY_MAX_COST, "C", 0,
+     "Make all merges that cost at most C (the unit of the cost of the build)", 0},
     {"max-distance", KEY_MAX_DISTANCE, "D", 0,
-     "The fewest clusters of the tree without a vertex farther than D from its cluster's plane; D% is a "
-     "share "
-     "of the diagonal",
+     "Cut into the fewest clusters of the tree whose vertices are all within D of the cluster's plane, in "
+     "the mesh's "
+     "unit; D% is a share of the diagonal",
      0},
     {"charts", KEY_CHARTS, "DEGREES", 0,
-     "Charts: disks with every face normal within DEGREES of the chart's mean normal", 0},
-    {"max-faces", KEY_MAX_FACES, "N", 0, "With --charts: at most N faces in each", 0},
-    {"max-area", KEY_MAX_AREA, "A", 0, "With --charts: at most the area A in each of several faces", 0},
-    {"any-topology", KEY_ANY_TOPOLOGY, NULL, 0, "With --charts: they need not be disks", 0},
-    {"keep-cuts", KEY_KEEP_CUTS, NULL, 0, "With --charts: clusters of the tree, without merging neighbours",
-     0},
-    {"adjacency", KEY_ADJACENCY, "FILE", 0, "Write neighbours to FILE: A B LENGTH EDGES a line, A < B", 0},
+     "Cut into charts: disks whose face normals are all within DEGREES of the chart's mean normal", 0},
+    {"max-faces", KEY_MAX_FACES, "N", 0, "With --charts: at most N faces per chart (default: no limit)", 0},
+    {"max-area", KEY_MAX_AREA, "A", 0,
+     "With --charts: at most the area A per chart, unless it is one face (default: no limit)", 0},
+    {"any-topology", KEY_ANY_TOPOLOGY, NULL, 0, "With --charts: allow charts that are not disks", 0},
+    {"keep-cuts", KEY_KEEP_CUTS, NULL, 0,
+     "With --charts: keep the clusters of the tree; do not merge neighbours", 0},
+    {"adjacency", KEY_ADJACENCY, "FILE", 0,
+     "Write pairs of neighbours to FILE, one per line: A B LENGTH EDGES, with A < B", 0},
     {"refine", KEY_REFINE, "N", 0,
-     "Let what is on borders change sides, in at most N sweeps a cut (4 are plenty)", 0},
+     "Move clusters and faces across borders in at most N sweeps per cut (default 0; 4 are plenty)", 0},
     {"perimeter", KEY_PERIMETER, "W", 0, "With --refine: weight of short borders (default 0.1)", 0},
     {"irregularity", KEY_IRREGULARITY, "R", 0,
-     "With --refine: irregularity may grow to R times its start, or inf (default 1)", 0},
+     "With --refine: let irregularity grow to at most R times its initial value, 1 to inf (default 1)", 0},
     {0}};
 
-static error_t parse_chart(int key, char *text, struct argp_state *state, partition_options *o) {
+static error_t parse_chart_limit(int key, char *text, struct argp_state *state, partition_options *o) {
     o->chart_options = true;
     switch (key) {
     case KEY_MAX_FACES:
@@ -89,7 +98,7 @@ static error_t parse_chart(int key, char *text, struct argp_state *state, partit
     }
 }
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_partition(int key, char *text, struct argp_state *state) {
     partition_options *o = state->input;
     switch (key) {
     case 'k':
@@ -104,7 +113,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_MAX_AREA:
     case KEY_ANY_TOPOLOGY:
     case KEY_KEEP_CUTS:
-        return parse_chart(key, text, state, o);
+        return parse_chart_limit(key, text, state, o);
     case KEY_ADJACENCY:
         o->adjacency = text;
         return 0;
@@ -123,7 +132,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* --- Making it --- */
+/* --- The partition --- */
 
 static int cut_by_count(tool *t, const partition_options *o, partition *p) {
     fct_tree_view view = fct_tree_get(p->tree);
@@ -159,9 +168,9 @@ static int make_partition(tool *t, const partition_options *o, partition *p) {
     return tool_result(t, fct_tree_labels(&t->env, p->tree, p->nodes, p->count, p->labels));
 }
 
-/* --- Telling of it --- */
+/* --- The report --- */
 
-static json_t *quality_json(const fct_partition_quality *q, uint32_t count) {
+static json_t *describe_quality(const fct_partition_quality *q, uint32_t count) {
     return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:b}", "clusters", (json_int_t)count, "mean_fit",
                      q->mean_fit, "mean_direction", q->mean_direction, "mean_irregularity",
                      q->mean_irregularity, "mean_normal_deviation", q->mean_normal_deviation, "box_area",
@@ -174,8 +183,8 @@ static void say_quality(tool *t, const char *what, const fct_partition_quality *
              q->mean_irregularity, q->mean_normal_deviation);
 }
 
-/* Refines the labels, and measures them before and after with the same ruler. */
-static int refine(tool *t, const fct_refine_def *def, partition *p, refinement *out) {
+/* Refines the labels, and measures them before and after with the same function. */
+static int refine_labels(tool *t, const fct_refine_def *def, partition *p, refinement *out) {
     fct_mesh mesh;
     int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
     if (code != TOOL_DONE) return code;
@@ -220,15 +229,16 @@ static void report_refined(tool *t, const refinement *r, uint32_t count, json_t 
     json_object_set_new(object, "moves", json_integer((json_int_t)s->moves));
     json_object_set_new(object, "seconds",
                         json_pack("{s:f, s:f}", "dual", s->seconds_dual, "refine", s->seconds_sweeps));
-    json_object_set_new(object, "before", quality_json(&r->before, count));
+    json_object_set_new(object, "before", describe_quality(&r->before, count));
 }
 
 static void report_charts(tool *t, const fct_chart_stats *s, json_t *object) {
     tool_say(t,
-             "%u charts, %u of them no disk; opened %u clusters for angle, %u for size, %u for topology; %u "
-             "merged",
+             "%u charts, %u of them not disks; opened %u clusters because of their angle, %u because of "
+             "their size, %u because of "
+             "their topology; %u merged",
              s->charts, s->non_disks, s->opened_angle, s->opened_limit, s->opened_topology, s->merged);
-    tool_say(t, "largest angle %.4g degrees, seams %.6g long, borders of the surface %.6g",
+    tool_say(t, "largest angle %.4g degrees; length of seams %.6g, of the boundary of the surface %.6g",
              s->largest_angle / degree, s->seam_length, s->boundary_length);
     json_object_update_new(
         object, json_pack("{s:I, s:I, s:{s:I, s:I, s:I}, s:I, s:I, s:f, s:f, s:f}", "charts",
@@ -239,8 +249,8 @@ static void report_charts(tool *t, const fct_chart_stats *s, json_t *object) {
                           "seam_length", s->seam_length, "boundary_length", s->boundary_length));
 }
 
-/* Quality of a cut from the tree, of other labels from the mesh. */
-static int measure(tool *t, const partition *p, fct_partition_quality *q) {
+/* The quality of a cut comes from the tree, that of other labels from the mesh. */
+static int measure_quality(tool *t, const partition *p, fct_partition_quality *q) {
     if (p->nodes) return tool_result(t, fct_tree_quality(&t->env, p->tree, p->nodes, p->count, q));
     fct_mesh mesh;
     int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
@@ -250,12 +260,12 @@ static int measure(tool *t, const partition *p, fct_partition_quality *q) {
     return code;
 }
 
-static int report(tool *t, const partition_options *o, const partition *p) {
+static int report_partition(tool *t, const partition_options *o, const partition *p) {
     bool refined = o->refine.sweep_count > 0;
     fct_partition_quality q = p->refined.after;
-    int code = refined ? TOOL_DONE : measure(t, p, &q);
+    int code = refined ? TOOL_DONE : measure_quality(t, p, &q);
     if (code != TOOL_DONE) return code;
-    json_t *object = quality_json(&q, p->count);
+    json_t *object = describe_quality(&q, p->count);
     if (refined)
         report_refined(t, &p->refined, p->count, object);
     else
@@ -275,33 +285,36 @@ static int report(tool *t, const partition_options *o, const partition *p) {
     return tool_json(t, object);
 }
 
-static int check_options(tool *t, const partition_options *o) {
+static int check_partition_options(tool *t, const partition_options *o) {
     int ways = (o->clusters > 0) + (o->max_cost >= 0) + (o->max_distance.value >= 0) + (o->chart_angle >= 0);
     if (ways != 1)
         return tool_fail(t, TOOL_USAGE,
-                         "expected one of -k K, --max-cost C, --max-distance D and --charts DEGREES");
+                         "expected exactly one of -k K, --max-cost C, --max-distance D and --charts DEGREES");
     if (o->chart_angle < 0 && o->chart_options)
-        return tool_fail(t, TOOL_USAGE, "expected --charts beside its options");
+        return tool_fail(t, TOOL_USAGE,
+                         "--max-faces, --max-area, --any-topology and --keep-cuts need --charts");
     if (o->refine.sweep_count == 0 && o->refine_options)
-        return tool_fail(t, TOOL_USAGE, "expected --refine beside --perimeter and --irregularity");
+        return tool_fail(t, TOOL_USAGE, "--perimeter and --irregularity need --refine");
     if (o->refine.sweep_count > 0 && (o->chart_angle >= 0 || o->max_distance.value >= 0))
-        return tool_fail(t, TOOL_USAGE, "--refine would not keep what --charts or --max-distance promise");
-    if (tool_ends(t->output, "stl")) return tool_fail(t, TOOL_USAGE, "%s: STL holds no colours", t->output);
+        return tool_fail(t, TOOL_USAGE, "--refine would break the limits of --charts and --max-distance");
+    if (tool_ends(t->output, "stl"))
+        return tool_fail(t, TOOL_USAGE,
+                         "%s: STL cannot store colours; expected .ply, .off, .obj, .glb or .om", t->output);
     if (o->adjacency && !strcmp(o->adjacency, t->output))
-        return tool_fail(t, TOOL_USAGE, "--adjacency: expected another file than that of -o");
+        return tool_fail(t, TOOL_USAGE, "--adjacency: expected a file other than that of -o");
     return o->adjacency ? tool_check_output(t, o->adjacency) : TOOL_DONE;
 }
 
-static int run(tool *t, void *options) {
+static int run_partition(tool *t, void *options) {
     const partition_options *o = options;
     partition p = {0};
-    int code = check_options(t, o);
+    int code = check_partition_options(t, o);
     if (code == TOOL_DONE) code = tool_open_tree(t, t->inputs[0], NULL, &p.tree);
     if (code == TOOL_DONE) code = make_partition(t, o, &p);
-    if (code == TOOL_DONE && o->refine.sweep_count > 0) code = refine(t, &o->refine, &p, &p.refined);
+    if (code == TOOL_DONE && o->refine.sweep_count > 0) code = refine_labels(t, &o->refine, &p, &p.refined);
     if (code == TOOL_DONE) code = tool_save_labels(t, t->output, p.tree, p.labels, p.count);
     if (code == TOOL_DONE && o->adjacency) code = write_adjacency(t, o->adjacency, &p);
-    if (code == TOOL_DONE) code = report(t, o, &p);
+    if (code == TOOL_DONE) code = report_partition(t, o, &p);
     tool_release(t, p.nodes);
     tool_release(t, p.labels);
     fct_tree_destroy(p.tree);
@@ -314,43 +327,49 @@ int tool_partition(int argc, char **argv) {
         .synopsis = "IN (-k K | --max-cost C | --max-distance D | --charts DEGREES) -o OUT",
         .summary = "cut a mesh into clusters, flat pieces or charts",
         .text =
-            "IN is a mesh or a hierarchy file (.fct). OUT receives one cluster number a line, in the "
-            "order of the "
-            "input's triangles; when it is named as a mesh (.ply, .off, .obj, .glb, .om), it is the mesh "
-            "with a "
-            "colour for each cluster: on the faces in .ply and .off, else on vertices, doubled along "
-            "borders.\n\n"
+            "IN is a mesh or a hierarchy file (.fct). OUT receives one cluster number per line, in the order "
+            "of the input's "
+            "triangles. If OUT is named as a mesh (.ply, .off, .obj, .glb, .om), it is the mesh with a "
+            "colour per cluster: on "
+            "the faces in .ply and .off, else on vertices, which are doubled along borders.\n\n"
             "--max-distance opens clusters from the root until no vertex is farther than D from the plane of "
-            "its cluster (least squares; that of `facetree boxes`). D is in the mesh's unit, 0.1% of its "
-            "diagonal. Every vertex is measured where the boxes do not decide.\n\n"
-            "--charts is for lightmaps and texture atlases. Clusters are opened until each is a disk "
-            "(connected through edges, at most two faces an edge, one border, no handle, no vertex where the "
-            "border touches itself), of one material, with normals within the angle of its mean normal; then "
-            "neighbours whose union still is such a chart are merged. non_disks counts what could not be "
-            "made a disk: faces with a vertex twice.\n\n"
+            "its cluster (the "
+            "least-squares plane that `facetree boxes` prints). D is in the mesh's unit; 0.1% is a "
+            "thousandth of the diagonal. "
+            "The distance is measured for each vertex if the boxes cannot decide.\n\n"
+            "--charts serves lightmaps and texture atlases. Clusters are opened until each is a disk "
+            "(connected through edges, "
+            "at most two faces per edge, one border, no handle, no vertex where the border touches itself), "
+            "has one material, "
+            "and has its normals within the angle of its mean normal. Then neighbours are merged if their "
+            "union is such a "
+            "chart. non_disks counts charts that cannot be disks, because a face has a vertex twice.\n\n"
             "--adjacency writes the pairs of clusters that share edges of the mesh, with the length of their "
-            "common border and the number of its edges; where three faces or more meet at an edge, each face "
-            "is a neighbour of the next one only, over half its length.\n\n"
-            "--refine starts from that cut and lets what lies on the borders between clusters change sides, "
-            "the "
-            "most gainful first, so that the squared deviation of normals falls and borders stay short: "
-            "first "
-            "the clusters of finer cuts, then faces, in at most N sweeps each. Clusters stay in one piece "
-            "and "
-            "keep at least a face; a face follows only neighbours of its own material. The result is no "
-            "longer "
-            "a cut of the tree.\n\n"
+            "common border and "
+            "its number of edges. At an edge of three or more faces, each face is a neighbour of the next "
+            "face only, over half "
+            "of its length.\n\n"
+            "--refine starts from the cut. It moves pieces across the borders between clusters, the most "
+            "profitable first, so "
+            "that the squared deviation of normals decreases and borders stay short: first the clusters of "
+            "finer cuts, then "
+            "faces, in at most N sweeps each. Clusters stay connected and keep at least one face. A face "
+            "moves only to a "
+            "neighbour of its own material. The result is no longer a cut of the tree.\n\n"
             "JSON keys: clusters, mean_fit, mean_direction, mean_irregularity, mean_normal_deviation, "
-            "box_area, connected; with --refine those of the refined clusters, and sweeps, moves, "
-            "seconds{dual,refine} and before{...}, the same keys for the cut; with --max-distance "
-            "largest_distance, diagonal; with --charts charts, non_disks, opened{angle,limit,topology} "
-            "(clusters opened, by first reason), merged, largest_faces, largest_angle (degrees), seam_length "
-            "(of edges between charts), boundary_length (of edges with one face); with --adjacency pairs. "
-            "Means are weighted by area; "
-            "mean_fit and box_area are over the squared diagonal.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+            "box_area, connected. "
+            "--refine prints these for the refined clusters, and adds sweeps, moves, seconds{dual, refine} "
+            "and before{...}, "
+            "the same keys for the cut. --max-distance adds largest_distance and diagonal. --charts adds "
+            "charts, non_disks, "
+            "opened{angle, limit, topology} (opened clusters by their first reason), merged, largest_faces, "
+            "largest_angle "
+            "(degrees), seam_length (of edges between charts) and boundary_length (of edges with one face). "
+            "--adjacency adds "
+            "pairs. Means are weighted by area; mean_fit and box_area are divided by the squared diagonal.",
+        .options = partition_options_table,
+        .parse = parse_partition,
+        .run = run_partition,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED};

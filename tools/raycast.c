@@ -1,30 +1,37 @@
-/* tools/raycast.c: facetree raycast: rays from a text file to hits, and the check of one backend against the
- * other. */
-#include "tools/kit/tool.h"
+/* tools/raycast.c: facetree raycast: the hits of rays from a text file, and the comparison of both backends.
+ */
+#include "tools/commands.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+#include "tools/kit/rows.h"
+
 typedef struct ray_options {
     const char *rays;
     fct_backend backend;
     bool backend_given, occlusion, check;
-    uint64_t count; /* of made rays; 0: not given */
+    uint64_t count; /* of generated rays; 0: not given */
 } ray_options;
 
 enum { KEY_RAYS = TOOL_KEY, KEY_OCCLUSION, KEY_BACKEND, KEY_CHECK, KEY_COUNT };
 
-static const struct argp_option options_table[] = {
-    {"rays", KEY_RAYS, "FILE", 0, "Rays, one a line: ox oy oz dx dy dz [tmin tmax]; - is standard input", 0},
-    {"occlusion", KEY_OCCLUSION, NULL, 0, "Only tell whether anything is hit: 1 or 0 a line", 0},
-    {"backend", KEY_BACKEND, "NAME", 0, "obb (default) or embree", 0},
-    {"check", KEY_CHECK, NULL, 0, "Shoot the rays through both backends and count differences", 0},
+static const struct argp_option ray_options_table[] = {
+    {"rays", KEY_RAYS, "FILE", 0,
+     "Rays, one per line: ox oy oz dx dy dz [tmin tmax] (default 0 and inf); - is standard input", 0},
+    {"occlusion", KEY_OCCLUSION, NULL, 0, "Print only whether the ray hits anything: 1 or 0 per line", 0},
+    {"backend", KEY_BACKEND, "NAME", 0, "Backend: obb (default) or embree", 0},
+    {"check", KEY_CHECK, NULL, 0, "Shoot the rays with both backends and count the differences", 0},
     {"count", KEY_COUNT, "N", 0,
-     "With --check and without --rays: make N rays of all kinds (default 1000000)", 0},
+     "With --check and without --rays: generate N rays of several kinds (default 1000000)", 0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_raycast(int key, char *text, struct argp_state *state) {
     ray_options *o = state->input;
     switch (key) {
     case KEY_RAYS:
@@ -46,15 +53,14 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* What the options ask for together. */
-static int check_options(tool *t, const ray_options *o) {
+static int check_ray_options(tool *t, const ray_options *o) {
     if (o->check && o->backend_given)
-        return tool_fail(t, TOOL_USAGE, "--check runs both backends; --backend chooses one");
+        return tool_fail(t, TOOL_USAGE, "--check uses both backends: remove --backend");
     if (o->check && o->occlusion)
-        return tool_fail(t, TOOL_USAGE, "--check includes occlusion; --occlusion is for output");
-    if (o->check && t->output) return tool_fail(t, TOOL_USAGE, "--check writes no hits; -o is for hits");
+        return tool_fail(t, TOOL_USAGE, "--check includes occlusion: remove --occlusion");
+    if (o->check && t->output) return tool_fail(t, TOOL_USAGE, "--check writes no hits: remove -o");
     if (o->count && (!o->check || o->rays))
-        return tool_fail(t, TOOL_USAGE, "--count: expected --check without --rays beside it");
+        return tool_fail(t, TOOL_USAGE, "--count: expected --check, and no --rays");
     if (!o->check && !o->rays) return tool_fail(t, TOOL_USAGE, "expected --rays FILE or --check");
     if (o->check && tool_is_scene_name(t->inputs[0]))
         return tool_fail(t, TOOL_USAGE, "--check: expected a mesh or a hierarchy file, found the scene '%s'",
@@ -88,20 +94,20 @@ typedef struct outcome {
     double seconds; /* of the queries alone */
 } outcome;
 
-static int report(tool *t, size_t rays, const outcome *o) {
+static int report_hits(tool *t, size_t rays, const outcome *o) {
     double rate = o->seconds > 0 ? (double)rays / o->seconds : 0;
     return tool_json(t, json_pack("{s:I, s:I, s:f, s:f, s:I}", "rays", (json_int_t)rays, "hits",
                                   (json_int_t)o->hits, "seconds", o->seconds, "rays_per_second", rate,
                                   "peak_bytes", (json_int_t)tool_peak_bytes()));
 }
 
-/* NULL where hits go nowhere: --json without -o. */
-static int open_output(tool *t, tool_writer *writer) {
+/* The stream is NULL if hits are only counted: --json without -o. */
+static int open_hits(tool *t, tool_writer *writer) {
     *writer = (tool_writer){0};
     return t->json && !t->output ? TOOL_DONE : tool_writer_open(t, t->output ? t->output : "-", writer);
 }
 
-static int close_output(tool *t, tool_writer *writer) {
+static int close_hits(tool *t, tool_writer *writer) {
     return writer->stream ? tool_writer_close(t, writer, TOOL_DONE) : TOOL_DONE;
 }
 
@@ -112,7 +118,7 @@ static int closest_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, si
     double start = tool_seconds();
     fct_bvh_closest_hits(bvh, count, rays, hits);
     o->seconds = tool_seconds() - start;
-    int code = open_output(t, &writer);
+    int code = open_hits(t, &writer);
     for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
         bool hit = hits[i].face != FCT_NONE;
         o->hits += hit;
@@ -123,7 +129,7 @@ static int closest_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, si
         else
             fputs("-1\n", writer.stream);
     }
-    if (code == TOOL_DONE) code = close_output(t, &writer);
+    if (code == TOOL_DONE) code = close_hits(t, &writer);
     tool_release(t, hits);
     return code;
 }
@@ -135,13 +141,13 @@ static int occlusion_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, 
     double start = tool_seconds();
     fct_bvh_any_hits(bvh, count, rays, bits);
     o->seconds = tool_seconds() - start;
-    int code = open_output(t, &writer);
+    int code = open_hits(t, &writer);
     for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
         bool hit = bits[i / 64] >> (i % 64) & 1;
         o->hits += hit;
         if (writer.stream) fputs(hit ? "1\n" : "0\n", writer.stream);
     }
-    if (code == TOOL_DONE) code = close_output(t, &writer);
+    if (code == TOOL_DONE) code = close_hits(t, &writer);
     tool_release(t, bits);
     return code;
 }
@@ -156,7 +162,7 @@ static int cast_in_model(tool *t, const ray_options *options, const fct_ray *ray
     if (code == TOOL_DONE)
         code = options->occlusion ? occlusion_in_model(t, bvh, rays, count, &o)
                                   : closest_in_model(t, bvh, rays, count, &o);
-    if (code == TOOL_DONE) code = report(t, count, &o);
+    if (code == TOOL_DONE) code = report_hits(t, count, &o);
     fct_bvh_destroy(bvh);
     fct_tree_destroy(tree);
     return code;
@@ -168,7 +174,7 @@ static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *ray
     outcome o = {0};
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], options->backend, &scene));
     if (code != TOOL_DONE) return code;
-    code = open_output(t, &writer);
+    code = open_hits(t, &writer);
     double start = tool_seconds();
     for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
         fct_scene_hit hit;
@@ -185,8 +191,8 @@ static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *ray
             fputs("-1\n", writer.stream);
     }
     o.seconds = tool_seconds() - start;
-    if (code == TOOL_DONE) code = close_output(t, &writer);
-    if (code == TOOL_DONE) code = report(t, count, &o);
+    if (code == TOOL_DONE) code = close_hits(t, &writer);
+    if (code == TOOL_DONE) code = report_hits(t, count, &o);
     fct_scene_destroy(scene);
     return code;
 }
@@ -194,8 +200,10 @@ static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *ray
 /* --- Check --- */
 
 static int report_check(tool *t, const fct_ray_check *c) {
-    tool_say(t, "%zu rays, %zu hits, %zu differences: %zu explained, %zu unexplained; %zu in occlusion",
-             c->rays, c->hits, c->differences, c->explained, c->unexplained, c->occlusion_differences);
+    tool_say(
+        t,
+        "%zu rays, %zu hits, %zu differences: %zu explained, %zu unexplained; %zu differences in occlusion",
+        c->rays, c->hits, c->differences, c->explained, c->unexplained, c->occlusion_differences);
     tool_say(t, "obb %.3f s (%.2f M rays/s), embree %.3f s (%.2f M rays/s)", c->seconds_obb,
              (double)c->rays / fmax(c->seconds_obb, 1e-9) / 1e6, c->seconds_embree,
              (double)c->rays / fmax(c->seconds_embree, 1e-9) / 1e6);
@@ -209,7 +217,7 @@ static int report_check(tool *t, const fct_ray_check *c) {
     return c->unexplained || c->occlusion_differences ? TOOL_NO : TOOL_DONE;
 }
 
-static int check(tool *t, const ray_options *options, fct_ray *rays, size_t count) {
+static int check_backends(tool *t, const ray_options *options, fct_ray *rays, size_t count) {
     fct_tree *tree;
     fct_bvh *obb = NULL, *embree = NULL;
     fct_ray *made = NULL;
@@ -235,15 +243,15 @@ static int check(tool *t, const ray_options *options, fct_ray *rays, size_t coun
     return code;
 }
 
-static int run(tool *t, void *user) {
+static int run_raycast(tool *t, void *user) {
     const ray_options *options = user;
     fct_ray *rays = NULL;
     size_t count = 0;
-    int code = check_options(t, options);
+    int code = check_ray_options(t, options);
     if (code == TOOL_DONE && options->rays) code = read_rays(t, options->rays, &rays, &count);
     if (code == TOOL_DONE) {
         if (options->check)
-            code = check(t, options, rays, count);
+            code = check_backends(t, options, rays, count);
         else if (tool_is_scene_name(t->inputs[0]))
             code = cast_in_scene(t, options, rays, count);
         else
@@ -254,29 +262,29 @@ static int run(tool *t, void *user) {
 }
 
 int tool_raycast(int argc, char **argv) {
-    static const tool_command command = {
-        .name = "raycast",
-        .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]",
-        .summary = "shoot rays; check one backend against the other",
-        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). Of every ray the closest "
-                "hit with "
-                "tmin <= t <= tmax is written as 'face t u v', -1 on a miss; the hit is (1 - u - v) p0 + u "
-                "p1 + v p2. "
-                "In a scene it is 'instance face t u v'. Without -o hits go to standard output; with --json "
-                "they are "
-                "only counted.\n\n"
-                "--check settles every difference between the backends in double precision; the exit code is "
-                "1 when "
-                "one is left unexplained.\n\n"
-                "JSON keys: rays, hits, seconds, rays_per_second, peak_bytes; with --check rays, hits, "
-                "differences, "
-                "explained, unexplained, occlusion_differences, seconds{obb, embree}.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
-        .inputs_min = 1,
-        .inputs_max = 1,
-        .output = TOOL_OUTPUT_OPTIONAL};
+    static const tool_command command = {.name = "raycast",
+                                         .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]",
+                                         .summary = "shoot rays; compare both backends",
+                                         .text =
+                                             "IN is a mesh, a hierarchy file (.fct) or a scene (.json, "
+                                             ".gltf). For each ray the output has one line with the closest "
+                                             "hit for tmin <= t <= tmax: 'face t u v', or 'instance face t u "
+                                             "v' for a scene, or -1 if the ray misses. The hit "
+                                             "point is (1 - u - v) p0 + u p1 + v p2. Without -o the hits go "
+                                             "to standard output; with --json they are only "
+                                             "counted.\n\n"
+                                             "--check decides every difference between the backends in "
+                                             "double precision. The exit code is 1 if a difference "
+                                             "stays unexplained.\n\n"
+                                             "JSON keys: rays, hits, seconds, rays_per_second, peak_bytes. "
+                                             "--check prints rays, hits, differences, explained, "
+                                             "unexplained, occlusion_differences, seconds{obb, embree}.",
+                                         .options = ray_options_table,
+                                         .parse = parse_raycast,
+                                         .run = run_raycast,
+                                         .inputs_min = 1,
+                                         .inputs_max = 1,
+                                         .output = TOOL_OUTPUT_OPTIONAL};
     ray_options options = {.backend = FCT_BACKEND_OBB};
     return tool_main(&command, argc, argv, &options);
 }

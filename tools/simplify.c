@@ -1,15 +1,20 @@
-/* tools/simplify.c: facetree simplify: fewer triangles, same shape and colours. */
-#include "tools/kit/tool.h"
+/* tools/simplify.c: facetree simplify: fewer triangles with the same shape and colours. */
+#include "tools/commands.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+
 typedef struct simplify_options {
     fct_simplify_def def;
     bool faces_given, error_given, attributes_given;
     double ratio;      /* 0: not given */
-    double weights[3]; /* color, uv, normal: negative: the default; NAN: not named */
+    double weights[3]; /* of color, uv, normal; negative: the default; NAN: not in the list */
 } simplify_options;
 
 enum {
@@ -25,24 +30,35 @@ enum {
     KEY_REFIT
 };
 
-static const struct argp_option options_table[] = {
+static const struct argp_option simplify_options_table[] = {
     {"faces", KEY_FACES, "N", 0, "Stop at N faces or fewer", 0},
-    {"ratio", KEY_RATIO, "R", 0, "Stop at R times the faces of the input", 0},
+    {"ratio", KEY_RATIO, "R", 0, "Stop at R times the faces of the input, above 0 and at most 1", 0},
     {"max-error", KEY_MAX_ERROR, "E", 0,
-     "Make no contraction with a larger error, in the mesh's unit of length", 0},
+     "Make no contraction whose error is above E, in the mesh's unit. The error is the root of the quadric "
+     "error over "
+     "the area; it includes attributes and boundary planes (default: no limit)",
+     0},
     {"attributes", KEY_ATTRIBUTES, "LIST", 0,
-     "What steers beside the shape: color, uv, normal, each with a weight if wanted: "
-     "color=.1,uv=.1,normal=.01; none "
-     "for the shape alone. Default: all that the mesh has",
+     "The attributes that count in the error, with optional weights, such as color=.1,uv=.1,normal=.01; "
+     "none: only the "
+     "shape counts. Default: all attributes of the mesh, with the weights of this example",
      0},
-    {"placement", KEY_PLACEMENT, "WHERE", 0, "Of the new vertex: optimal (default), segment, ends or subset",
+    {"placement", KEY_PLACEMENT, "WHERE", 0,
+     "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
+     "midpoint) or subset "
+     "(either end)",
      0},
-    {"boundary", KEY_BOUNDARY, "W", 0, "Weight that holds boundaries and colour borders (default 1000)", 0},
+    {"boundary", KEY_BOUNDARY, "W", 0,
+     "Weight of the planes that keep boundaries and borders in place (default 1000)", 0},
     {"feature-threshold", KEY_FEATURE, "T", 0,
-     "Faces whose colours differ by more make a border (default .1; inf for none)", 0},
-    {"regularize", KEY_REGULARIZE, "G", 0, "Weight of the pull to the edge's middle (default 1e-9)", 0},
-    {"keep-topology", KEY_TOPOLOGY, NULL, 0, "Join and close nothing", 0},
-    {"refit", KEY_REFIT, "N", 0, "Fit the vertices to the input N times afterwards (default 2)", 0},
+     "Two faces whose colours differ by more than T in |dr| + |dg| + |db| make a border (default .1; inf: "
+     "none)",
+     0},
+    {"regularize", KEY_REGULARIZE, "G", 0,
+     "Weight of the distance to the edge's midpoint, 0 to 1 (default 1e-9)", 0},
+    {"keep-topology", KEY_TOPOLOGY, NULL, 0, "Refuse contractions that change the topology", 0},
+    {"refit", KEY_REFIT, "N", 0, "Passes that fit the vertices to the input afterwards, 0 to 100 (default 2)",
+     0},
     {0}};
 
 static const char *const attribute_names[] = {"color", "uv", "normal", NULL};
@@ -67,7 +83,7 @@ static error_t parse_attributes(simplify_options *o, char *list, struct argp_sta
     return 0;
 }
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
     static const fct_placement values[] = {FCT_PLACE_OPTIMAL, FCT_PLACE_SEGMENT, FCT_PLACE_ENDS,
                                            FCT_PLACE_SUBSET};
@@ -112,8 +128,8 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* Weights of named attributes, which the mesh must have; those not named do not steer. */
-static int set_attributes(tool *t, simplify_options *o, const fct_mesh *mesh) {
+/* The mesh must have the named attributes. Attributes that are not named get weight 0. */
+static int set_attribute_weights(tool *t, simplify_options *o, const fct_mesh *mesh) {
     const void *arrays[3] = {mesh->colors, mesh->texcoords, mesh->normals};
     double *weights[3] = {&o->def.color_weight, &o->def.texcoord_weight, &o->def.normal_weight};
     for (int i = 0; i < 3 && o->attributes_given; ++i) {
@@ -129,7 +145,7 @@ static int set_attributes(tool *t, simplify_options *o, const fct_mesh *mesh) {
     return TOOL_DONE;
 }
 
-static int report(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
+static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
     static const char *const reasons[] = {
         [FCT_STOP_FACES] = "faces", [FCT_STOP_ERROR] = "error", [FCT_STOP_EXHAUSTED] = "exhausted"};
     double total = tool_seconds() - t->start;
@@ -143,7 +159,7 @@ static int report(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
                                   "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
 }
 
-static int run(tool *t, void *options) {
+static int run_simplify(tool *t, void *options) {
     simplify_options *o = options;
     if (!o->faces_given && !(o->ratio > 0) && !o->error_given)
         return tool_fail(t, TOOL_USAGE, "expected --faces N, --ratio R or --max-error E");
@@ -157,13 +173,13 @@ static int run(tool *t, void *options) {
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);
     t->items = mesh.face_count;
     t->unit = "faces";
-    code = set_attributes(t, o, &mesh);
+    code = set_attribute_weights(t, o, &mesh);
     if (code == TOOL_DONE) code = tool_result(t, fct_simplify(&t->env, &mesh, &o->def, &simple, &stats));
     if (code == TOOL_DONE) code = tool_save_mesh(t, t->output, &simple, 1);
     if (code == TOOL_DONE && stats.faces_after > o->def.target_faces &&
         stats.stopped_because == FCT_STOP_EXHAUSTED)
-        tool_warn(t, "no contraction is allowed below %u faces", stats.faces_after);
-    if (code == TOOL_DONE) code = report(t, &simple, &stats);
+        tool_warn(t, "stopped at %u faces, because no more contractions are allowed", stats.faces_after);
+    if (code == TOOL_DONE) code = report_simplify(t, &simple, &stats);
     fct_mesh_release(&t->env, &simple);
     fct_mesh_release(&t->env, &mesh);
     return code;
@@ -174,17 +190,17 @@ int tool_simplify(int argc, char **argv) {
         .name = "simplify",
         .synopsis = "IN -o OUT",
         .summary = "reduce a mesh, keeping its shape and colours",
-        .text =
-            "IN is a mesh or a hierarchy file (.fct), OUT a mesh; their endings choose the formats. Edges "
-            "are "
-            "contracted in the order of their quadric error, until there are as few faces as --faces or "
-            "--ratio "
-            "ask for, or the error exceeds --max-error.\n\n"
-            "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or exhausted), "
-            "max_cost, seconds{init, contract, refit, total}, peak_bytes.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+        .text = "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. "
+                "Edges are contracted in the "
+                "order of their quadric error until the faces are as few as --faces or --ratio says, or "
+                "until the error would "
+                "exceed --max-error.\n\n"
+                "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
+                "exhausted), max_cost (the largest "
+                "error of a contraction), seconds{init, contract, refit, total}, peak_bytes.",
+        .options = simplify_options_table,
+        .parse = parse_simplify,
+        .run = run_simplify,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED};

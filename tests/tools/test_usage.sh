@@ -69,12 +69,12 @@ expect 64 cluster cube.off -o x.fct --roots 0
 expect 64 cluster cube.off -o x.fct --roots 13
 says "only 12 faces"
 expect 64 cluster cube.off -o - --json
-says "both want standard output"
+says "cannot both write to standard output"
 check "no file was made" test ! -e x.fct
 
 expect 64 info
 expect 64 info cube.off cube.off
-says "one argument too many"
+says "unexpected argument 'cube.off'"
 expect 64 info cube.off -o x
 expect 64 info cube.off --verify
 says "expected a hierarchy file"

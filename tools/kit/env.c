@@ -1,11 +1,10 @@
-/* tools/kit/env.c: the environment of a command: memory under a limit, the bar, messages, interruption, and
- * the outcome as an exit code with one line on stderr.
+/* tools/kit/env.c: see env.h.
  *
- * --max-memory counts the program itself and what the library allocates (not files that are mapped); the
- * process's data limit, somewhat above it, catches what wrapped C++ libraries allocate behind its back.
+ * --max-memory counts the program itself and the library's allocations, but not mapped files. A data limit of
+ * the process, somewhat higher, stops wrapped C++ libraries that allocate by themselves.
  */
 #define _GNU_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/kit/env.h"
 
 #include <malloc.h>
 #include <math.h>
@@ -17,7 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Beside the counted memory: code's data, buffers of C and C++, and each thread's stack and heap. */
+/* Bytes beside the counted memory: data of the code, buffers of C and C++, and stack and heap per thread. */
 enum { DATA_SLACK = 64 << 20, DATA_SLACK_THREAD = 16 << 20 };
 
 static volatile sig_atomic_t interrupted;
@@ -39,7 +38,7 @@ static void *limited_allocate(void *user, size_t size) {
         t->memory_refused = true;
         return NULL;
     }
-    /* What is released is counted by its usable size, so what is allocated is, too. */
+    /* Released memory is counted by its usable size, so allocated memory must be too. */
     size_t usable = malloc_usable_size(memory);
     now = __atomic_add_fetch(&t->memory_now, usable - size, __ATOMIC_RELAXED);
     if (now > t->memory_peak) t->memory_peak = now;
@@ -52,7 +51,7 @@ static void limited_release(void *user, void *memory) {
     free(memory);
 }
 
-/* Sanitizers map terabytes of data for themselves, so no limit holds beside them. */
+/* Sanitizers map terabytes of data, which no limit allows. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 enum { DATA_LIMITED = 0 };
 #else
@@ -82,7 +81,8 @@ void tool_release(tool *t, void *memory) {
     if (memory) limited_release(t, memory);
 }
 
-static size_t status_bytes(const char *format) {
+/* A line of /proc/self/status, in bytes. */
+static size_t read_status_bytes(const char *format) {
     size_t kilobytes = 0;
     FILE *file = fopen("/proc/self/status", "re");
     char line[256];
@@ -92,15 +92,15 @@ static size_t status_bytes(const char *format) {
     return kilobytes * 1024;
 }
 
-/* VmHWM is of this program alone; getrusage's figure would include what was there before exec. */
+/* VmHWM counts this program alone; getrusage would include the memory from before exec. */
 size_t tool_peak_bytes(void) {
-    size_t peak = status_bytes("VmHWM: %zu");
+    size_t peak = read_status_bytes("VmHWM: %zu");
     if (peak) return peak;
     struct rusage usage;
     return getrusage(RUSAGE_SELF, &usage) ? 0 : (size_t)usage.ru_maxrss * 1024;
 }
 
-/* --- The bar --- */
+/* --- Progress bar --- */
 
 static void clear_bar(tool *t) {
     if (t->bar_visible) fputs("\r\033[K", stderr);
@@ -137,7 +137,8 @@ static void draw_bar(tool *t, double done, double now, bool terminal) {
     t->drawn = now;
 }
 
-/* Ten times a second on a terminal, once a second elsewhere, and at the end of a phase that was shown. */
+/* The progress hook. Draws ten times per second on a terminal, once per second elsewhere, and at the end of a
+ * phase. False cancels the library call. */
 static bool show_progress(void *user, const char *phase, double done) {
     tool *t = user;
     if (interrupted) return false;
@@ -154,14 +155,14 @@ static bool show_progress(void *user, const char *phase, double done) {
     return true;
 }
 
-static void interrupt(int signal_number) {
+static void note_signal(int signal_number) {
     interrupted = signal_number;
 }
 
 /* --- Messages --- */
 
-/* Appends to the recorded error, with what would break the line replaced. */
-static void record(tool *t, const char *format, va_list values) {
+/* Appends to the recorded error. Control characters become ?, so that the error stays one line. */
+static void record_error(tool *t, const char *format, va_list values) {
     char text[1024];
     vsnprintf(text, sizeof text, format, values);
     for (char *c = text; *c; ++c)
@@ -174,7 +175,7 @@ static void record(tool *t, const char *format, va_list values) {
 int tool_fail(tool *t, int code, const char *format, ...) {
     va_list values;
     va_start(values, format);
-    record(t, format, values);
+    record_error(t, format, values);
     va_end(values);
     return code;
 }
@@ -187,7 +188,8 @@ int tool_context(tool *t, int code, const char *path) {
     return tool_fail(t, code, "%s: %s", path, text);
 }
 
-/* Errors are kept for the end: the library may recover, and a failed call may be told in two steps. */
+/* The message hook. Errors are kept until the end, because the library may recover, and because a failed call
+ * may send two messages. */
 static void take_message(void *user, fct_severity severity, const char *text) {
     tool *t = user;
     if (severity == FCT_MESSAGE_ERROR) {
@@ -246,6 +248,60 @@ int tool_json(tool *t, json_t *object) {
     return code;
 }
 
+/* --- Answers --- */
+
+static void print_value(const json_t *value) {
+    if (json_is_string(value)) {
+        fputs(json_string_value(value), stdout);
+    } else if (json_is_boolean(value)) {
+        fputs(json_is_true(value) ? "yes" : "no", stdout);
+    } else if (json_is_integer(value)) {
+        printf("%" JSON_INTEGER_FORMAT, json_integer_value(value));
+    } else if (json_is_real(value)) {
+        printf("%.6g", json_real_value(value));
+    } else {
+        size_t i;
+        json_t *item;
+        json_array_foreach(value, i, item) {
+            if (i) putchar(' ');
+            if (json_is_number(item)) printf("%.6g", json_number_value(item));
+        }
+    }
+}
+
+/* One line per member; members of an inner object print as "outer inner". Objects nest no deeper. */
+static void print_lines(json_t *object) {
+    const char *key, *inner;
+    json_t *value, *inner_value;
+    json_object_foreach(object, key, value) {
+        if (!json_is_object(value)) {
+            printf("%-24s", key);
+            print_value(value);
+            putchar('\n');
+            continue;
+        }
+        json_object_foreach(value, inner, inner_value) {
+            int used = printf("%s %s", key, inner);
+            printf("%*s", used < 24 ? 24 - used : 1, "");
+            print_value(inner_value);
+            putchar('\n');
+        }
+    }
+}
+
+int tool_print(tool *t, json_t *object) {
+    if (!t->json && object) print_lines(object);
+    return tool_json(t, object);
+}
+
+json_t *tool_json_floats(const float *values, int count) {
+    json_t *array = json_array();
+    for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));
+    return array;
+}
+
+/* --- Open and close --- */
+
 void tool_env_open(tool *t) {
     t->env = fct_env_default();
     t->env.thread_count = t->threads;
@@ -255,11 +311,11 @@ void tool_env_open(tool *t) {
     t->env.message = take_message;
     t->env.memory_user = t->env.progress_user = t->env.message_user = t;
     if (t->max_memory) {
-        t->memory_now = status_bytes("VmRSS: %zu"); /* the program itself counts, too */
+        t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */
         limit_data(t);
     }
-    /* The first signal lets the command clean up, the second ends it. */
-    struct sigaction action = {.sa_handler = interrupt, .sa_flags = SA_RESETHAND};
+    /* The first signal lets the command clean up, the second one ends it. */
+    struct sigaction action = {.sa_handler = note_signal, .sa_flags = SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);

@@ -1,7 +1,6 @@
-/* tools/kit/file.c: names of files, checks of outputs before work starts, text files that appear only when
- * they are complete, and the hash of a file. */
+/* tools/kit/file.c: see file.h. */
 #define _GNU_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/kit/file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -26,6 +25,10 @@ bool tool_is_mesh_name(const char *path) {
     return false;
 }
 
+bool tool_is_scene_name(const char *path) {
+    return tool_ends(path, "json") || tool_ends(path, "gltf");
+}
+
 bool tool_is_folder(const char *path) {
     struct stat status;
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
@@ -43,7 +46,8 @@ static int fail_write(tool *t, const char *path, int error) {
     return tool_fail(t, TOOL_OUTPUT, "%s: cannot be written: %s", path, strerror(error));
 }
 
-/* Opens a new file beside `path`, whose name goes to *temporary (to be freed); -1 and errno on failure. */
+/* Creates a file beside `path`; *temporary receives its name, which the caller frees. Returns -1 and sets
+ * errno on failure. */
 static int open_beside(const char *path, char **temporary) {
     size_t size = strlen(path) + 16;
     *temporary = malloc(size);

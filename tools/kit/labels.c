@@ -1,7 +1,23 @@
-/* tools/kit/labels.c: a number for each face, written as text or as a mesh of many colours. */
-#include "tools/kit/tool.h"
+/* tools/kit/labels.c: see labels.h. Cost: linear in the faces. */
+#include "tools/kit/labels.h"
 
+#include <math.h>
 #include <string.h>
+
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+
+/* Walks through the 192^3 colours with bytes from 64 to 255. The step has no common divisor with their
+ * number, so no colour repeats; it is near the golden section of it, so neighbouring indices are far apart.
+ */
+void tool_palette(uint32_t index, float color[3]) {
+    const uint64_t side = 192, count = side * side * side, step = 4373987;
+    uint64_t place = ((index + 1) * step) % count;
+    for (int c = 0; c < 3; ++c, place /= side) {
+        double s = (double)(64 + place % side) / 255;
+        color[c] = (float)pow((s + 0.055) / 1.055, 2.4);
+    }
+}
 
 static int write_labels(tool *t, const char *path, const uint32_t *labels, uint32_t count) {
     tool_writer writer;
@@ -11,7 +27,7 @@ static int write_labels(tool *t, const char *path, const uint32_t *labels, uint3
     return tool_writer_close(t, &writer, TOOL_DONE);
 }
 
-/* A colour per face, where the format has one. */
+/* A colour per face, for formats that store one. */
 static int write_face_colors(tool *t, const char *path, fct_mesh mesh, const uint32_t *labels) {
     float *colors = tool_allocate(t, mesh.face_count, 3 * sizeof *colors);
     if (!colors) return TOOL_MEMORY;
@@ -23,8 +39,8 @@ static int write_face_colors(tool *t, const char *path, fct_mesh mesh, const uin
     return code;
 }
 
-/* Numbers the vertices of each cluster for itself: labels do not decrease along face_ids, so one stamp a
- * vertex tells whether it has its copy. Returns how many there are. */
+/* Gives each label its own copy of the vertices it uses. Labels do not decrease along face_ids, so one stamp
+ * per vertex tells whether the current label has its copy. Returns the number of copies. */
 static uint32_t split_vertices(const fct_mesh *mesh, const uint32_t *face_ids, const uint32_t *labels,
                                uint32_t *stamps, uint32_t *copies, uint32_t *triangles, uint32_t *originals) {
     uint32_t count = 0;
@@ -44,7 +60,7 @@ static uint32_t split_vertices(const fct_mesh *mesh, const uint32_t *face_ids, c
     return count;
 }
 
-/* A colour per vertex, with the vertices on borders doubled, for formats without colours of faces. */
+/* A colour per vertex, with doubled vertices on borders, for formats without face colours. */
 static int write_vertex_colors(tool *t, const char *path, const fct_mesh *mesh, const uint32_t *face_ids,
                                const uint32_t *labels) {
     const size_t corners = 3 * (size_t)mesh->face_count;
@@ -67,7 +83,7 @@ done:
     return code;
 }
 
-/* The faces grouped by label, in order of label. */
+/* The faces in the order of their labels. NULL after a recorded error. */
 static uint32_t *group_faces(tool *t, const uint32_t *labels, uint32_t faces, uint32_t count) {
     uint32_t *order = tool_allocate(t, faces, sizeof *order);
     uint32_t *ends = tool_allocate(t, (size_t)count + 1, sizeof *ends);

@@ -1,6 +1,5 @@
-/* tools/kit/options.c: values of options: counts, numbers, sizes, words; each mistake is one line on stderr.
- */
-#include "tools/kit/tool.h"
+/* tools/kit/options.c: see options.h. */
+#include "tools/kit/options.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -78,6 +77,15 @@ error_t tool_parse_choice(struct argp_state *state, const char *name, const char
     return tool_usage(state, "%s: expected %s, found '%s'", name, list, text);
 }
 
+error_t tool_parse_backend(struct argp_state *state, const char *name, const char *text,
+                           fct_backend *backend) {
+    static const char *const names[] = {"obb", "embree", NULL};
+    int index;
+    error_t error = tool_parse_choice(state, name, text, names, &index);
+    if (!error) *backend = index ? FCT_BACKEND_EMBREE : FCT_BACKEND_OBB;
+    return error;
+}
+
 bool tool_size(const char *text, size_t *bytes) {
     char *end = NULL;
     double number = isdigit((unsigned char)*text) || *text == '.' ? strtod(text, &end) : -1;
@@ -94,8 +102,8 @@ bool tool_size(const char *text, size_t *bytes) {
     return true;
 }
 
-/* Levenshtein's distance of two words of fewer than 32 letters. */
-static int distance(const char *a, const char *b) {
+/* The Levenshtein distance of two words of fewer than 32 letters. */
+static int measure_distance(const char *a, const char *b) {
     int row[33];
     int columns = (int)strlen(b);
     for (int j = 0; j <= columns; ++j) row[j] = j;
@@ -118,7 +126,7 @@ const char *tool_nearest(const char *word, const char *const *names) {
     int best_distance = 3;
     for (; *names; ++names) {
         if (strlen(*names) > 31) continue;
-        int d = distance(word, *names);
+        int d = measure_distance(word, *names);
         if (d < best_distance && d < (int)strlen(*names)) best = *names, best_distance = d;
     }
     return best;

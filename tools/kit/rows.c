@@ -1,15 +1,14 @@
-/* tools/kit/rows.c: rows of numbers in a text file: rays, points, probes. Every mistake is told with file,
- * line, what was expected and what was found. Cost: one pass over the file's text. */
+/* tools/kit/rows.c: see rows.h. An error states the file, the line, the expected value and the found one. */
 #define _GNU_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/kit/rows.h"
 
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The word at `text`, cut for a message. */
-static const char *word_at(const char *text, char word[40]) {
+/* The word at `text`, shortened for a message. */
+static const char *copy_word(const char *text, char word[40]) {
     size_t length = strcspn(text, " \t\r\n,;#");
     if (length > 32)
         snprintf(word, 40, "%.29s...", text);
@@ -26,8 +25,8 @@ typedef struct reader {
     const float *missing;
 } reader;
 
-/* Numbers of one line into `row`; *found is how many there are. */
-static int parse_line(const reader *r, const char *text, float *row, int *found) {
+/* Reads the numbers of one line into `row`; *found receives their count. */
+static int parse_row(const reader *r, const char *text, float *row, int *found) {
     char word[40];
     *found = 0;
     for (;;) {
@@ -37,15 +36,15 @@ static int parse_line(const reader *r, const char *text, float *row, int *found)
         float value = strtof(text, &end);
         if (end == text || !strchr(" \t\r\n\v\f#", *end))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number, found '%s'", r->path, r->line,
-                             word_at(text, word));
+                             copy_word(text, word));
         bool must_be_finite = *found < r->least || isnan(value);
         bool written_infinite = strncasecmp(text + strspn(text, "+-"), "inf", 3) == 0;
         if (!isfinite(value) && (must_be_finite || !written_infinite))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a finite number, found '%s'", r->path,
-                             r->line, word_at(text, word));
+                             r->line, copy_word(text, word));
         if (*found == r->columns)
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers at most, found more: '%s'",
-                             r->path, r->line, r->columns, word_at(text, word));
+                             r->path, r->line, r->columns, copy_word(text, word));
         row[(*found)++] = value;
         text = end;
     }
@@ -56,7 +55,7 @@ static int parse_line(const reader *r, const char *text, float *row, int *found)
     return TOOL_DONE;
 }
 
-static int make_room(tool *t, tool_rows *rows, size_t *capacity, int columns) {
+static int reserve_row(tool *t, tool_rows *rows, size_t *capacity, int columns) {
     if (rows->count < *capacity) return TOOL_DONE;
     size_t larger = *capacity ? *capacity + *capacity / 2 : 1024;
     float *values = tool_allocate(t, larger, (size_t)columns * sizeof *values);
@@ -80,9 +79,9 @@ static int read_rows(reader *r, FILE *file, tool_rows *rows) {
             code = tool_fail(r->t, TOOL_DATA, "%s:%zu: expected text, found a zero byte", r->path, r->line);
             break;
         }
-        code = make_room(r->t, rows, &capacity, r->columns);
+        code = reserve_row(r->t, rows, &capacity, r->columns);
         if (code == TOOL_DONE)
-            code = parse_line(r, text, rows->values + rows->count * (size_t)r->columns, &found);
+            code = parse_row(r, text, rows->values + rows->count * (size_t)r->columns, &found);
         if (code == TOOL_DONE && found) ++rows->count;
     }
     if (code == TOOL_DONE && (ferror(file) || !feof(file)))

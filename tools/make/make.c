@@ -5,6 +5,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "tools/commands.h"
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/options.h"
+
 typedef struct make_options {
     uint32_t triangles; /* 0: the default of what is made */
     bool inside;

@@ -4,7 +4,7 @@
 #ifndef FCT_TOOLS_MAKE_H
 #define FCT_TOOLS_MAKE_H
 
-#include "tools/kit/tool.h"
+#include "tools/kit/env.h"
 
 typedef struct make_point {
     double x, y, z;

@@ -4,6 +4,8 @@
 #include <limits.h>
 #include <string.h>
 
+#include "tools/kit/file.h"
+
 static bool grow(make_mesh *m, void **array, size_t *capacity, size_t needed, size_t size) {
     if (needed <= *capacity) return true;
     size_t larger = *capacity + *capacity / 2 + 1024;

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "tools/kit/file.h"
+
 enum { BUFFER = 1 << 18, RECORD = 13 };
 
 typedef struct sheet_writer {

@@ -1,29 +1,33 @@
-/* tools/render/camera.c: where the eye is: as given, as a scene says, or so that the whole mesh fills the
- * picture. */
+/* tools/render/camera.c: see camera.h. The eye is where the user or the scene puts it, else the mesh fills
+ * the picture.
+ */
+#include "tools/render/camera.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "tools/render/drawing.h"
-
 const char *const drawing_views[] = {"corner", "front", "back", "left", "right", "top", "bottom", NULL};
 
-/* Towards the eye, for y up; the corner view is a little right of the front and a little above. */
+/* Directions towards the eye if y is up. The corner view is right of the front view and above it. */
 static const double view_directions[][3] = {{.5, .38, .86}, {0, 0, 1}, {0, 0, -1}, {-1, 0, 0},
                                             {1, 0, 0},      {0, 1, 0}, {0, -1, 0}};
 
 static const double degree = 3.14159265358979323846 / 180;
 
-static double dot(const double a[3], const double b[3]) {
+/* The room around a mesh that fills the picture, as a factor on the distance. */
+#define MARGIN 1.06
+
+static double dot3(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void cross(const double a[3], const double b[3], double out[3]) {
+static void cross3(const double a[3], const double b[3], double out[3]) {
     for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
-static bool normalize(double a[3]) {
-    double length = sqrt(dot(a, a));
+static bool normalize3(double a[3]) {
+    double length = sqrt(dot3(a, a));
     if (!(length > 0)) return false;
     for (int k = 0; k < 3; ++k) a[k] /= length;
     return true;
@@ -72,30 +76,32 @@ static void find_bounds(const fct_mesh *mesh, double lower[3], double upper[3]) 
         for (int k = 0; k < 3; ++k) lower[k] = upper[k] = 0;
 }
 
-/* Rows right, up, forward. */
+/* axes: rows right, up and forward. */
 static void look_along(const double direction[3], const double up[3], double axes[3][3]) {
     memcpy(axes[2], direction, sizeof axes[2]);
-    cross(axes[2], up, axes[0]);
-    if (dot(axes[0], axes[0]) < 1e-12 || !normalize(axes[0])) {
-        /* Looking straight up or down: any other direction will do for the top of the picture. */
+    cross3(axes[2], up, axes[0]);
+    if (dot3(axes[0], axes[0]) < 1e-12 || !normalize3(axes[0])) {
+        /* The eye looks straight up or down: any other direction can be the top of the picture. */
         double other[3] = {-up[1], -up[2], -up[0]};
-        cross(axes[2], other, axes[0]);
-        normalize(axes[0]);
+        cross3(axes[2], other, axes[0]);
+        normalize3(axes[0]);
     }
-    cross(axes[0], axes[2], axes[1]);
+    cross3(axes[0], axes[2], axes[1]);
 }
 
-/* The nearest eye along -forward from which every corner of a face is in the picture. */
-static void fit(const fct_mesh *mesh, const double center[3], double extent, raster_camera *camera) {
+/* The nearest eye, with the given axes, that has every corner of a face in the picture. */
+static void fit_eye(const fct_mesh *mesh, const double center[3], double extent, raster_camera *camera) {
     double slope[2] = {.5 * camera->width / camera->focal, .5 * camera->height / camera->focal};
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}; /* of x/slope -+ z: see below */
+    double low[2] = {INFINITY, INFINITY},
+           high[2] = {-INFINITY, -INFINITY}; /* of x / slope + z and x / slope - z */
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) {
         const float *p = mesh->positions + 3 * (size_t)mesh->triangles[c];
         double d[3] = {p[0] - center[0], p[1] - center[1], p[2] - center[2]};
-        double z = dot(camera->axes[2], d);
+        double z = dot3(camera->axes[2], d);
         for (int i = 0; i < 2; ++i) {
-            /* |x - e| <= slope (z + distance) for an eye moved by e and back by distance: two planes. */
-            double x = dot(camera->axes[i], d) / slope[i];
+            /* A corner is in the picture if |x - e| <= slope (z + distance), for an eye at e, moved back by
+             * distance. */
+            double x = dot3(camera->axes[i], d) / slope[i];
             low[i] = fmin(low[i], x + z);
             high[i] = fmax(high[i], x - z);
         }
@@ -105,7 +111,7 @@ static void fit(const fct_mesh *mesh, const double center[3], double extent, ras
         distance = fmax(distance, .5 * (high[i] - low[i]));
         shift[i] = .5 * (high[i] + low[i]) * slope[i];
     }
-    distance = fmax(1.06 * distance, 1e-3 * extent);
+    distance = fmax(MARGIN * distance, 1e-3 * extent);
     for (int k = 0; k < 3; ++k)
         camera->eye[k] = center[k] + shift[0] * camera->axes[0][k] + shift[1] * camera->axes[1][k] -
                          distance * camera->axes[2][k];
@@ -117,7 +123,7 @@ static void set_light(drawing *d, const raster_camera *camera) {
         double world[3] = {0, 0, 0};
         for (int j = 0; j < 3; ++j)
             for (int k = 0; k < 3; ++k) world[k] += towards[i][j] * camera->axes[j][k];
-        normalize(world);
+        normalize3(world);
         for (int k = 0; k < 3; ++k) d->light[i][k] = (float)world[k];
     }
 }
@@ -134,12 +140,12 @@ void drawing_aim(drawing *d, const drawing_frame *frame, raster_camera *out, boo
     double from[3] = {view[0], frame->up == 2 ? -view[2] : view[1], frame->up == 2 ? view[1] : view[2]};
     for (int k = 0; k < 3; ++k)
         direction[k] = frame->given ? frame->target[k] - frame->position[k] : -from[k];
-    normalize(direction);
+    normalize3(direction);
     look_along(direction, frame->up_vector, out->axes);
     if (frame->given)
         memcpy(out->eye, frame->position, sizeof out->eye);
     else
-        fit(&d->mesh, center, extent, out);
+        fit_eye(&d->mesh, center, extent, out);
     *outside = false;
     for (int k = 0; k < 3; ++k) *outside |= out->eye[k] < lower[k] || out->eye[k] > upper[k];
     set_light(d, out);

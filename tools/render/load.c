@@ -1,27 +1,31 @@
-/* tools/render/load.c: from a file to one mesh in the world with the looks of its faces.
+/* tools/render/load.c: see load.h.
  *
- * A mesh is drawn as it is. Hierarchies and scenes become parts, each a tree under a transform, and their
- * faces are laid one after another in the trees' order, so that a cluster is a range of them.
+ * A mesh is drawn as it is. A hierarchy or a scene becomes parts: trees with a transform. Their faces are
+ * copied one part after another, in the order of the trees, so that a cluster is a range of faces.
  */
+#include "tools/render/load.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "tools/render/drawing.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/render/palette.h"
 
 typedef struct part {
     const fct_tree *tree;
-    const fct_instance *instance; /* NULL: where the tree is */
+    const fct_instance *instance; /* NULL: in the tree's own frame */
     const fct_material *material; /* NULL: none */
     uint32_t first_face;
-    double scale; /* of areas, roughly */
+    double scale; /* by which the transform scales areas, roughly */
 } part;
 
 /* One cluster of a cut. */
 typedef struct cut {
     uint32_t part, node, first, count; /* first: in the part's faces */
-    double relief; /* area whose normals the cluster's mean normal leaves out: what opening it would win */
+    double relief; /* area minus |area vector|^2 / area: what opening the cluster can improve */
 } cut;
 
 typedef struct loader {
@@ -33,9 +37,9 @@ typedef struct loader {
     uint32_t cut_count;
 } loader;
 
-/* --- what kind of file it is --- */
+/* --- Kinds of files --- */
 
-/* The file an OBJ's first mtllib line names lies beside it. */
+/* Whether the file that the first mtllib line of an OBJ names is readable. */
 static bool has_materials(const char *path) {
     FILE *file = fopen(path, "rb");
     if (!file) return false;
@@ -53,11 +57,11 @@ static bool has_materials(const char *path) {
     return found;
 }
 
-static bool is_scene(const char *path) {
+static bool is_scene_file(const char *path) {
     return tool_is_scene_name(path) || (tool_ends(path, "obj") && has_materials(path));
 }
 
-/* --- parts --- */
+/* --- Parts --- */
 
 static int use_scene(tool *t, const char *path, loader *l, drawing *out) {
     int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &l->scene));
@@ -88,7 +92,7 @@ static int use_tree(tool *t, const drawing_source *source, loader *l) {
     return TOOL_DONE;
 }
 
-static void transform(const part *p, const float *in, float *out) {
+static void transform_point(const part *p, const float *in, float *out) {
     if (!p->instance) {
         memcpy(out, in, 3 * sizeof *out);
         return;
@@ -104,7 +108,7 @@ static void transform(const part *p, const float *in, float *out) {
 static void lay_part(const part *p, fct_mesh *mesh, uint32_t first_vertex) {
     fct_tree_view tree = fct_tree_get(p->tree);
     for (uint32_t v = 0; v < tree.vertex_count; ++v)
-        transform(p, tree.positions + 3 * (size_t)v, mesh->positions + 3 * ((size_t)first_vertex + v));
+        transform_point(p, tree.positions + 3 * (size_t)v, mesh->positions + 3 * ((size_t)first_vertex + v));
     if (mesh->colors)
         memcpy(mesh->colors + 3 * (size_t)first_vertex, tree.colors,
                (size_t)tree.vertex_count * 3 * sizeof(float));
@@ -115,7 +119,7 @@ static void lay_part(const part *p, fct_mesh *mesh, uint32_t first_vertex) {
                 first_vertex + tree.triangles[3 * (size_t)f + (mirrored ? 2 - i : i)];
 }
 
-/* All parts' faces in one mesh. */
+/* Copies the faces of all parts into one mesh. */
 static int lay_out(tool *t, loader *l, drawing *out) {
     uint64_t vertices = 0, faces = 0;
     for (uint32_t i = 0; i < l->part_count; ++i) {
@@ -125,7 +129,7 @@ static int lay_out(tool *t, loader *l, drawing *out) {
         faces += tree.face_count;
     }
     if (vertices >= INT32_MAX || faces >= INT32_MAX)
-        return tool_fail(t, TOOL_DATA, "the scene has %llu faces, a picture takes fewer than 2^31",
+        return tool_fail(t, TOOL_DATA, "the scene has %llu faces, expected fewer than 2^31",
                          (unsigned long long)faces);
     bool colors = l->part_count == 1 && !l->parts[0].instance && fct_tree_get(l->parts[0].tree).colors;
     int code = tool_result(t, fct_mesh_create(&t->env, (uint32_t)vertices, (uint32_t)faces,
@@ -154,7 +158,7 @@ static int paint_materials(tool *t, const loader *l, drawing *out) {
     return TOOL_DONE;
 }
 
-/* --- clusters --- */
+/* --- Clusters --- */
 
 static cut make_cut(const loader *l, uint32_t number, uint32_t node) {
     const part *p = l->parts + number;
@@ -163,36 +167,36 @@ static cut make_cut(const loader *l, uint32_t number, uint32_t node) {
     double s2 = 0, area = c.area;
     for (int k = 0; k < 3; ++k) s2 += (double)c.area_vector[k] * c.area_vector[k];
     double relief = area > 0 && c.count > 1 ? fmax(0, area - s2 / area) * p->scale : 0;
-    /* Flat clusters too are opened in the end, the largest first. */
+    /* Flat clusters are opened last, the largest first. */
     if (c.count > 1) relief += 1e-9 * area * p->scale;
     return (cut){number, node, c.first, c.count, relief};
 }
 
-/* A max-heap on (relief, lower part, lower node). */
-static bool before(const cut *a, const cut *b) {
+/* The order of the heap: larger relief, then lower part, then lower node. */
+static bool precedes(const cut *a, const cut *b) {
     if (a->relief != b->relief) return a->relief > b->relief;
     return a->part != b->part ? a->part < b->part : a->node < b->node;
 }
 
-static void sift_down(cut *heap, uint32_t count, uint32_t i) {
+static void sift_cut_down(cut *heap, uint32_t count, uint32_t i) {
     for (uint32_t child; (child = 2 * i + 1) < count; i = child) {
-        if (child + 1 < count && before(heap + child + 1, heap + child)) ++child;
-        if (!before(heap + child, heap + i)) return;
+        if (child + 1 < count && precedes(heap + child + 1, heap + child)) ++child;
+        if (!precedes(heap + child, heap + i)) return;
         cut swap = heap[i];
         heap[i] = heap[child], heap[child] = swap;
     }
 }
 
-static void sift_up(cut *heap, uint32_t i) {
-    while (i && before(heap + i, heap + (i - 1) / 2)) {
+static void sift_cut_up(cut *heap, uint32_t i) {
+    while (i && precedes(heap + i, heap + (i - 1) / 2)) {
         cut swap = heap[i];
         heap[i] = heap[(i - 1) / 2], heap[(i - 1) / 2] = swap;
         i = (i - 1) / 2;
     }
 }
 
-/* One tree: its partition. Several: from all roots, the cluster with the most relief is opened until there
- * are `count`. */
+/* One tree gives its partition. With several trees the cluster with the most relief is opened, from all roots
+ * on, until there are `count`. */
 static int make_cuts(tool *t, loader *l, uint32_t count) {
     uint64_t roots = 0, faces = 0;
     for (uint32_t i = 0; i < l->part_count; ++i) {
@@ -217,27 +221,27 @@ static int make_cuts(tool *t, loader *l, uint32_t count) {
     }
     tool_release(t, nodes);
     if (code != TOOL_DONE) return code;
-    for (uint32_t i = n / 2; i-- > 0 && l->part_count > 1;) sift_down(l->cuts, n, i);
+    for (uint32_t i = n / 2; i-- > 0 && l->part_count > 1;) sift_cut_down(l->cuts, n, i);
     while (n < most && l->cuts[0].count > 1) {
         cut top = l->cuts[0];
         fct_cluster c;
         fct_tree_cluster(l->parts[top.part].tree, top.node, &c);
         l->cuts[0] = make_cut(l, top.part, c.child[0]);
-        sift_down(l->cuts, n, 0);
+        sift_cut_down(l->cuts, n, 0);
         l->cuts[n] = make_cut(l, top.part, c.child[1]);
-        sift_up(l->cuts, n++);
+        sift_cut_up(l->cuts, n++);
     }
     l->cut_count = n;
     return TOOL_DONE;
 }
 
-/* Ascending through the faces of all parts; the colours come with the lines between them. */
+/* Labels ascend through the faces of all parts. drawing_prepare fills the paint. */
 static int label_clusters(tool *t, const loader *l, drawing *out) {
     out->labels = tool_allocate(t, out->mesh.face_count, sizeof *out->labels);
     out->paint = tool_allocate(t, out->mesh.face_count, 3 * sizeof *out->paint);
     if (!out->labels || !out->paint) return TOOL_MEMORY;
     memset(out->labels, 0, out->mesh.face_count * sizeof *out->labels);
-    /* A cluster's number is how many begin before it. */
+    /* The number of a cluster is the number of clusters that begin before it. */
     for (uint32_t i = 0; i < l->cut_count; ++i)
         ++out->labels[(size_t)l->parts[l->cuts[i].part].first_face + l->cuts[i].first];
     for (uint32_t f = 0, number = 0; f < out->mesh.face_count; ++f) {
@@ -247,13 +251,13 @@ static int label_clusters(tool *t, const loader *l, drawing *out) {
     return TOOL_DONE;
 }
 
-/* The triangles of a box whose corner i has sign bit k of i along axis k; each one's diagonal is opposite its
- * middle corner. */
+/* Corner i of a box lies on the positive side of axis k if bit k of i is set. The diagonal of each triangle
+ * is opposite its middle corner. */
 static const uint8_t box_sides[12][3] = {{0, 4, 6}, {6, 2, 0}, {1, 3, 7}, {7, 5, 1}, {0, 1, 5}, {5, 4, 0},
                                          {2, 6, 7}, {7, 3, 2}, {0, 2, 3}, {3, 1, 0}, {4, 5, 7}, {7, 6, 4}};
 
-/* Of its largest side, in the world. */
-static double box_area(const loader *l, const cut *c) {
+/* The area of the largest side of a box, in the world. */
+static double find_box_area(const loader *l, const cut *c) {
     const part *p = l->parts + c->part;
     fct_cluster cluster;
     fct_tree_cluster(p->tree, c->node, &cluster);
@@ -261,7 +265,7 @@ static double box_area(const loader *l, const cut *c) {
     return 4 * fmax(x * y, fmax(x * z, y * z)) * p->scale;
 }
 
-/* `pad` is added to each half extent: of boxes that lie in one plane the smaller stands out by a hair. */
+/* `pad` is added to each half extent, so that of two boxes in one plane the smaller one stays visible. */
 static void lay_box(const part *p, const cut *c, uint32_t number, double pad, drawing *out) {
     fct_cluster cluster;
     fct_box box;
@@ -274,7 +278,7 @@ static void lay_box(const part *p, const cut *c, uint32_t number, double pad, dr
             for (int a = 0; a < 3; ++a) x += (i >> a & 1 ? 1 : -1) * (box.half[a] + pad) * box.axes[a][k];
             corner[k] = (float)x;
         }
-        transform(p, corner, out->mesh.positions + 3 * (8 * (size_t)number + (size_t)i));
+        transform_point(p, corner, out->mesh.positions + 3 * (8 * (size_t)number + (size_t)i));
     }
     float color[3];
     drawing_color(number, color);
@@ -290,17 +294,17 @@ static void lay_box(const part *p, const cut *c, uint32_t number, double pad, dr
 
 static int draw_boxes(tool *t, const loader *l, drawing *out) {
     uint32_t n = l->cut_count;
-    if (n >= INT32_MAX / 12) return tool_fail(t, TOOL_DATA, "%u boxes are too many for a picture", n);
+    if (n >= INT32_MAX / 12) return tool_fail(t, TOOL_DATA, "%u boxes are too many for one picture", n);
     int code = tool_result(t, fct_mesh_create(&t->env, 8 * n, 12 * n, 0, &out->mesh));
     if (code != TOOL_DONE) return code;
     out->paint = tool_allocate(t, 12 * (size_t)n, 3 * sizeof *out->paint);
     out->lines = tool_allocate(t, 12 * (size_t)n, 1);
     if (!out->paint || !out->lines) return TOOL_MEMORY;
     double largest = 0;
-    for (uint32_t i = 0; i < n; ++i) largest = fmax(largest, box_area(l, l->cuts + i));
+    for (uint32_t i = 0; i < n; ++i) largest = fmax(largest, find_box_area(l, l->cuts + i));
     for (uint32_t i = 0; i < n; ++i) {
         const part *p = l->parts + l->cuts[i].part;
-        double part_of_all = largest > 0 ? box_area(l, l->cuts + i) / largest : 1;
+        double part_of_all = largest > 0 ? find_box_area(l, l->cuts + i) / largest : 1;
         lay_box(p, l->cuts + i, i, 3e-4 * sqrt(largest / p->scale) * (1 - sqrt(part_of_all)), out);
     }
     out->shading = DRAWING_FLAT;
@@ -319,11 +323,11 @@ static int draw_parts(tool *t, const drawing_source *source, loader *l, drawing 
 
 int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     loader l = {0};
-    bool surface = source->subject == DRAWING_SURFACE, scene = is_scene(source->path);
+    bool surface = source->subject == DRAWING_SURFACE, scene = is_scene_file(source->path);
     int code = TOOL_DONE;
     if (surface && !scene && !tool_ends(source->path, "fct")) {
         code = tool_load_mesh(t, source->path, &out->mesh);
-        /* A glTF file that nobody has baked is a scene with materials. */
+        /* A glTF file without a bake is a scene with materials. */
         scene = code == TOOL_DONE && tool_ends(source->path, "glb") && !out->mesh.colors;
         if (!scene) return code;
         fct_mesh_release(&t->env, &out->mesh);

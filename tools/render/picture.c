@@ -1,4 +1,4 @@
-/* tools/render/picture.c: tone curves, background, sRGB bytes, PNG. */
+/* tools/render/picture.c: see picture.h. Cost: linear in the pixels. */
 #include "tools/render/picture.h"
 
 #include <math.h>
@@ -6,34 +6,37 @@
 #include <stdlib.h>
 #include <string.h>
 
-static float soft_peak(float peak, float knee) {
+#include "tools/kit/file.h"
+
+/* Values above the knee approach 1: the slope is 1 at the knee. */
+static float compress_peak(float peak, float knee) {
     float room = 1 - knee;
     return 1 - room * room / (peak + room - knee);
 }
 
-static void tone_soft(float rgb[3]) {
+static void apply_soft_tone(float rgb[3]) {
     const float knee = .7F, fade = .12F;
     float peak = fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
     if (peak <= knee) return;
-    float bent = soft_peak(peak, knee), white = 1 - 1 / (1 + fade * (peak - bent));
+    float bent = compress_peak(peak, knee), white = 1 - 1 / (1 + fade * (peak - bent));
     for (int k = 0; k < 3; ++k) rgb[k] = rgb[k] * (bent / peak) * (1 - white) + bent * white;
 }
 
 /* A rational fit of the ACES curve (Narkowicz 2015). */
-static float tone_filmic(float x) {
+static float apply_filmic_tone(float x) {
     return x * (2.51F * x + .03F) / (x * (2.43F * x + .59F) + .14F);
 }
 
 void picture_apply_tone(picture_tone tone, float rgb[3]) {
     for (int k = 0; k < 3; ++k) rgb[k] = fminf(fmaxf(rgb[k], 0), 1e6F);
-    if (tone == PICTURE_TONE_SOFT) tone_soft(rgb);
+    if (tone == PICTURE_TONE_SOFT) apply_soft_tone(rgb);
     for (int k = 0; k < 3; ++k) {
-        if (tone == PICTURE_TONE_FILMIC) rgb[k] = tone_filmic(rgb[k]);
+        if (tone == PICTURE_TONE_FILMIC) rgb[k] = apply_filmic_tone(rgb[k]);
         rgb[k] = fminf(rgb[k], 1);
     }
 }
 
-static float srgb_to_linear(float s) {
+static float convert_srgb(float s) {
     return s <= .04045F ? s / 12.92F : powf((s + .055F) / 1.055F, 2.4F);
 }
 
@@ -45,20 +48,21 @@ bool picture_parse_background(const char *text, picture_background *out) {
     if (text[0] != '#' || strlen(text) != 7 || strspn(text + 1, "0123456789abcdefABCDEF") != 6) return false;
     unsigned long value = strtoul(text + 1, NULL, 16);
     for (int k = 0; k < 3; ++k)
-        out->top[k] = out->bottom[k] = srgb_to_linear((float)(value >> (16 - 8 * k) & 255) / 255);
+        out->top[k] = out->bottom[k] = convert_srgb((float)(value >> (16 - 8 * k) & 255) / 255);
     out->transparent = false;
     return true;
 }
 
-/* Linear [0, 1] in 4095 steps -> sRGB byte: finer than a byte's steps everywhere but in the first three. */
-static void make_table(unsigned char table[4096]) {
+/* From linear light in 4095 steps to sRGB bytes. A step is finer than a byte, except in the first three
+ * bytes. */
+static void fill_srgb_table(unsigned char table[4096]) {
     for (int i = 0; i < 4096; ++i) {
         double x = i / 4095., s = x <= .0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - .055;
         table[i] = (unsigned char)lrint(255 * s);
     }
 }
 
-static unsigned char to_byte(const unsigned char table[4096], float x) {
+static unsigned char encode_byte(const unsigned char table[4096], float x) {
     return table[(int)(4095 * fminf(fmaxf(x, 0), 1) + .5F)];
 }
 
@@ -67,22 +71,22 @@ static void encode_row(const unsigned char table[4096], const float *pixels, uin
     for (uint32_t x = 0; x < width; ++x, pixels += 4) {
         float cover = pixels[3];
         if (background->transparent) {
-            for (int k = 0; k < 3; ++k) *row++ = to_byte(table, cover > 0 ? pixels[k] / cover : 0);
+            for (int k = 0; k < 3; ++k) *row++ = encode_byte(table, cover > 0 ? pixels[k] / cover : 0);
             *row++ = (unsigned char)lrintf(255 * fminf(cover, 1));
         } else {
             for (int k = 0; k < 3; ++k) {
                 float behind = background->top[k] + down * (background->bottom[k] - background->top[k]);
-                *row++ = to_byte(table, pixels[k] + (1 - cover) * behind);
+                *row++ = encode_byte(table, pixels[k] + (1 - cover) * behind);
             }
         }
     }
 }
 
-/* Returns false when libpng gives up; nothing here needs freeing after its long jump. */
+/* False if libpng fails. It then jumps out of this function, which owns no memory. */
 static bool write_png(png_structp png, png_infop info, FILE *stream, uint32_t width, uint32_t height,
                       const float *image, const picture_background *background, unsigned char *row) {
     unsigned char table[4096];
-    make_table(table);
+    fill_srgb_table(table);
     if (setjmp(png_jmpbuf(png))) return false;
     png_init_io(png, stream);
     png_set_IHDR(png, info, width, height, 8,
@@ -99,7 +103,7 @@ static bool write_png(png_structp png, png_infop info, FILE *stream, uint32_t wi
     return true;
 }
 
-/* What libpng has to say arrives as the outcome of the call. */
+/* The result of the call reports errors; libpng must not print. */
 static void png_error_jump(png_structp png, png_const_charp text) {
     (void)text;
     png_longjmp(png, 1);

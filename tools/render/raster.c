@@ -1,22 +1,31 @@
-/* tools/render/raster.c: scan conversion with exact coverage.
+/* tools/render/raster.c: see raster.h. Scan conversion with integer coverage.
  *
- * Corners are snapped to 1/4096 pixel and clipped against the near plane and a guard band; edge functions are
- * 64-bit integers, so every sample belongs to exactly one of two faces that share a side. The samples of a
- * pixel lie one on each of `samples` sub-rows, shifted by the van der Corput sequence: edges of any slope get
- * as many grey levels as there are samples, and a face still covers one span a sub-row. A sample keeps 1/z
- * and the number of its face; light is computed afterwards, once for each face that a pixel sees. Cost: O(V +
- * F) and the covered samples; memory 29 bytes a vertex and face, and one band of samples.
+ * 1. Project the vertices, snap them to 1/4096 pixel, and clip faces against the near plane and a guard band.
+ * 2. Edge functions are 64-bit integers, so each sample belongs to exactly one of two faces that share a
+ * side. A pixel has one sample per sub-row, shifted by the van der Corput sequence: sides of any slope get as
+ * many grey levels as there are samples, and a face still covers one span per sub-row.
+ * 3. A sample keeps 1/z and its face. Light is computed afterwards, once per face that a pixel sees.
+ * Cost: O(V + F + covered samples). Memory: 29 bytes per vertex and face, and one band of samples.
  */
 #include "tools/render/raster.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { SUBPIXEL = 12, ONE = 1 << SUBPIXEL, BAND = 8, POLYGON = 3 + 5 };
+#include "tools/render/point.h"
 
+enum {
+    SUBPIXEL = 12, /* bits of a pixel's fraction */
+    ONE = 1 << SUBPIXEL,
+    BAND = 8,       /* rows of pixels that are drawn at a time */
+    POLYGON = 3 + 5 /* corners of a triangle after five clips */
+};
+
+/* In units of the camera. */
 static const double near_plane = 1e-4;
 
-/* Which planes a corner lies outside of: the view's four, the guard band's four, near. */
+/* The planes that a corner is outside of: the four of the view, any of the guard band's four, the near plane.
+ */
 enum { OUT_VIEW = 15, OUT_GUARD = 16, OUT_NEAR = 32 };
 
 typedef struct corner {
@@ -24,7 +33,7 @@ typedef struct corner {
     float depth; /* 1/z */
 } corner;
 
-/* A face, or a part of one that clipping has left. */
+/* A face, or a triangle of a clipped face. */
 typedef struct piece {
     uint32_t corner[3], face;
 } piece;
@@ -33,33 +42,27 @@ typedef struct raster {
     tool *t;
     const raster_camera *camera;
     const fct_mesh *mesh;
-    double guard[2]; /* largest |slope| that is not clipped, in x and in y */
-    int32_t shift[RASTER_MAX_SAMPLES], rise[RASTER_MAX_SAMPLES]; /* of the samples in their pixel */
+    double guard[2]; /* slopes beyond these are clipped, in x and in y */
+    int32_t shift[RASTER_MAX_SAMPLES],
+        rise[RASTER_MAX_SAMPLES]; /* position of each sample in its pixel, in ONE */
     corner *corners;
     uint8_t *out;
     piece *pieces;
     size_t corner_count, corner_capacity, piece_count, piece_capacity;
-    size_t *band_first;    /* band -> its first place in band_pieces; one more than there are bands */
+    size_t *band_first;    /* per band: its first entry in band_pieces; one more at the end */
     uint32_t *band_pieces; /* piece numbers, band after band */
     float *depth;          /* BAND * samples sub-rows of width */
     uint32_t *seen;        /* piece numbers, likewise */
 } raster;
 
-static void to_camera(const raster_camera *camera, const float *p, double out[3]) {
-    double d[3];
-    for (int k = 0; k < 3; ++k) d[k] = (p[k] - camera->eye[k]) / camera->unit;
-    for (int i = 0; i < 3; ++i)
-        out[i] = camera->axes[i][0] * d[0] + camera->axes[i][1] * d[1] + camera->axes[i][2] * d[2];
-}
-
-/* p in camera space, in front of the near plane and within the guard band. */
-static corner project(const raster_camera *camera, const double p[3]) {
+/* p: in camera space, in front of the near plane and inside the guard band. */
+static corner project_corner(const raster_camera *camera, const double p[3]) {
     double x = .5 * camera->width + camera->focal * p[0] / p[2];
     double y = .5 * camera->height - camera->focal * p[1] / p[2];
     return (corner){(int32_t)lrint(x * ONE), (int32_t)lrint(y * ONE), (float)(1 / p[2])};
 }
 
-static uint8_t outside(const raster *r, const double p[3]) {
+static uint8_t find_outside(const raster *r, const double p[3]) {
     double x = .5 * r->camera->width / r->camera->focal * p[2];
     double y = .5 * r->camera->height / r->camera->focal * p[2];
     unsigned out = (p[0] > x) | (p[0] < -x) << 1 | (p[1] > y) << 2 | (p[1] < -y) << 3;
@@ -68,7 +71,7 @@ static uint8_t outside(const raster *r, const double p[3]) {
     return (uint8_t)out;
 }
 
-static int reserve(tool *t, void **array, size_t *capacity, size_t needed, size_t size) {
+static int reserve_array(tool *t, void **array, size_t *capacity, size_t needed, size_t size) {
     if (needed <= *capacity) return TOOL_DONE;
     size_t larger = needed + *capacity / 2 + 64;
     void *memory = tool_allocate(t, larger, size);
@@ -88,57 +91,58 @@ static int project_vertices(raster *r) {
     if (!r->corners || !r->out) return TOOL_MEMORY;
     for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
         double p[3];
-        to_camera(r->camera, mesh->positions + 3 * (size_t)v, p);
-        r->out[v] = outside(r, p);
-        if (!(r->out[v] & (OUT_GUARD | OUT_NEAR))) r->corners[v] = project(r->camera, p);
+        raster_to_camera(r->camera, mesh->positions + 3 * (size_t)v, p);
+        r->out[v] = find_outside(r, p);
+        if (!(r->out[v] & (OUT_GUARD | OUT_NEAR))) r->corners[v] = project_corner(r->camera, p);
     }
     r->corner_count = mesh->vertex_count;
     return TOOL_DONE;
 }
 
-static int64_t area2(corner a, corner b, corner c) {
+static int64_t find_twice_area(corner a, corner b, corner c) {
     return (int64_t)(b.x - a.x) * (c.y - a.y) - (int64_t)(c.x - a.x) * (b.y - a.y);
 }
 
 /* Sub-rows are numbered through the picture from its top. */
-static int64_t row_y(const raster *r, int64_t row) {
+static int64_t find_row_y(const raster *r, int64_t row) {
     return (row / r->camera->samples) * ONE + r->rise[row % r->camera->samples];
 }
 
 /* The first sub-row at or below y, within the picture. */
-static int64_t first_row(const raster *r, int64_t y) {
+static int64_t find_first_row(const raster *r, int64_t y) {
     int64_t end = (int64_t)r->camera->height * r->camera->samples;
     int64_t row = y <= 0 ? 0 : (y >> SUBPIXEL) * r->camera->samples;
-    while (row < end && row_y(r, row) < y) ++row;
+    while (row < end && find_row_y(r, row) < y) ++row;
     return row < end ? row : end;
 }
 
-static void piece_rows(const raster *r, const piece *p, int64_t *begin, int64_t *end) {
+static void find_piece_rows(const raster *r, const piece *p, int64_t *begin, int64_t *end) {
     int32_t low = INT32_MAX, high = INT32_MIN;
     for (int i = 0; i < 3; ++i) {
         int32_t y = r->corners[p->corner[i]].y;
         if (y < low) low = y;
         if (y > high) high = y;
     }
-    *begin = first_row(r, low);
-    *end = first_row(r, (int64_t)high + 1);
+    *begin = find_first_row(r, low);
+    *end = find_first_row(r, (int64_t)high + 1);
 }
 
-/* Keeps the piece unless it covers nothing or is to be culled. */
+/* Adds the piece unless it covers no sample row or is culled. */
 static int add_piece(raster *r, piece p) {
-    int64_t area = area2(r->corners[p.corner[0]], r->corners[p.corner[1]], r->corners[p.corner[2]]);
-    /* y grows downwards in the picture: a face that runs counter-clockwise has a negative area. */
+    int64_t area = find_twice_area(r->corners[p.corner[0]], r->corners[p.corner[1]], r->corners[p.corner[2]]);
+    /* y points down in the picture, so a counter-clockwise face has a negative area. */
     if (area == 0 || (r->camera->cull && area > 0)) return TOOL_DONE;
     int64_t begin, end;
-    piece_rows(r, &p, &begin, &end);
+    find_piece_rows(r, &p, &begin, &end);
     if (begin >= end) return TOOL_DONE;
-    int result = reserve(r->t, (void **)&r->pieces, &r->piece_capacity, r->piece_count + 1, sizeof p);
+    int result = reserve_array(r->t, (void **)&r->pieces, &r->piece_capacity, r->piece_count + 1, sizeof p);
     if (result == TOOL_DONE) r->pieces[r->piece_count++] = p;
     return result;
 }
 
-/* Clips a convex polygon of *count points against a.x >= 0; the cut of a side depends on its ends alone. */
-static void clip(double polygon[POLYGON][3], int *count, const double a[3], double offset) {
+/* Clips a convex polygon of *count corners to a.x >= offset. The cut of a side depends only on its ends, so
+ * that neighbours stay watertight. */
+static void clip_polygon(double polygon[POLYGON][3], int *count, const double a[3], double offset) {
     double in[POLYGON][3];
     int n = *count, m = 0;
     memcpy(in, polygon, sizeof in);
@@ -161,20 +165,20 @@ static int add_clipped(raster *r, uint32_t face) {
     double polygon[POLYGON][3];
     int count = 3;
     for (int i = 0; i < 3; ++i)
-        to_camera(r->camera, r->mesh->positions + 3 * (size_t)r->mesh->triangles[3 * (size_t)face + i],
-                  polygon[i]);
+        raster_to_camera(r->camera, r->mesh->positions + 3 * (size_t)r->mesh->triangles[3 * (size_t)face + i],
+                         polygon[i]);
     double gx = r->guard[0], gy = r->guard[1];
-    clip(polygon, &count, (double[3]){0, 0, 1}, near_plane);
-    clip(polygon, &count, (double[3]){-1, 0, gx}, 0);
-    clip(polygon, &count, (double[3]){1, 0, gx}, 0);
-    clip(polygon, &count, (double[3]){0, -1, gy}, 0);
-    clip(polygon, &count, (double[3]){0, 1, gy}, 0);
+    clip_polygon(polygon, &count, (double[3]){0, 0, 1}, near_plane);
+    clip_polygon(polygon, &count, (double[3]){-1, 0, gx}, 0);
+    clip_polygon(polygon, &count, (double[3]){1, 0, gx}, 0);
+    clip_polygon(polygon, &count, (double[3]){0, -1, gy}, 0);
+    clip_polygon(polygon, &count, (double[3]){0, 1, gy}, 0);
     if (count < 3) return TOOL_DONE;
     size_t first = r->corner_count;
-    int result =
-        reserve(r->t, (void **)&r->corners, &r->corner_capacity, first + (size_t)count, sizeof *r->corners);
+    int result = reserve_array(r->t, (void **)&r->corners, &r->corner_capacity, first + (size_t)count,
+                               sizeof *r->corners);
     for (int i = 0; i < count && result == TOOL_DONE; ++i)
-        r->corners[r->corner_count++] = project(r->camera, polygon[i]);
+        r->corners[r->corner_count++] = project_corner(r->camera, polygon[i]);
     for (int i = 2; i < count && result == TOOL_DONE; ++i)
         result = add_piece(
             r, (piece){{(uint32_t)first, (uint32_t)first + (uint32_t)i - 1, (uint32_t)first + (uint32_t)i},
@@ -196,7 +200,7 @@ static int make_pieces(raster *r) {
     return TOOL_DONE;
 }
 
-/* Lists each band's pieces in ascending order. */
+/* Lists the pieces of each band in ascending order. */
 static int sort_into_bands(raster *r) {
     int64_t band_rows = (int64_t)BAND * r->camera->samples;
     size_t bands = (r->camera->height + BAND - 1) / BAND;
@@ -206,7 +210,7 @@ static int sort_into_bands(raster *r) {
     for (int fill = 0; fill < 2; ++fill) {
         for (size_t i = 0; i < r->piece_count; ++i) {
             int64_t begin, end;
-            piece_rows(r, r->pieces + i, &begin, &end);
+            find_piece_rows(r, r->pieces + i, &begin, &end);
             for (int64_t band = begin / band_rows; band <= (end - 1) / band_rows; ++band) {
                 size_t place = r->band_first[band + (fill ? 1 : 2)]++;
                 if (fill) r->band_pieces[place] = (uint32_t)i;
@@ -234,12 +238,12 @@ typedef struct edges {
 
 static edges make_edges(const raster *r, const piece *p) {
     corner v[3] = {r->corners[p->corner[0]], r->corners[p->corner[1]], r->corners[p->corner[2]]};
-    if (area2(v[0], v[1], v[2]) < 0) {
+    if (find_twice_area(v[0], v[1], v[2]) < 0) {
         corner swap = v[1];
         v[1] = v[2], v[2] = swap;
     }
     edges e = {.origin = v[0], .z0 = v[0].depth};
-    double area = (double)area2(v[0], v[1], v[2]);
+    double area = (double)find_twice_area(v[0], v[1], v[2]);
     double z1 = (double)v[1].depth - v[0].depth, z2 = (double)v[2].depth - v[0].depth;
     e.zx = (z1 * (v[2].y - v[0].y) - z2 * (v[1].y - v[0].y)) / area;
     e.zy = (z2 * (v[1].x - v[0].x) - z1 * (v[2].x - v[0].x)) / area;
@@ -250,14 +254,15 @@ static edges make_edges(const raster *r, const piece *p) {
         e.a[i] = (int64_t)s.y - t.y;
         e.b[i] = (int64_t)t.x - s.x;
         e.c[i] = -(e.a[i] * s.x + e.b[i] * s.y);
-        /* A sample on a side belongs to the face on one side of it, told by the side's direction. */
+        /* A sample exactly on a side belongs to one of its two faces, chosen by the direction of the side. */
         bool owner = e.a[i] > 0 || (e.a[i] == 0 && e.b[i] > 0);
         if (!owner) --e.c[i];
     }
     return e;
 }
 
-/* Pixels [*begin, *end) whose sample on the sub-row at y, shifted by `shift`, is covered. */
+/* The pixels [*begin, *end) whose sample on the sub-row at y is covered. shift: the sample's x in its pixel.
+ */
 static void find_span(const edges *e, int64_t y, int64_t shift, int64_t width, int64_t *begin, int64_t *end) {
     *begin = 0, *end = width;
     for (int i = 0; i < 3; ++i) {
@@ -288,12 +293,12 @@ static void fill_span(float *restrict depth, uint32_t *restrict seen, int64_t co
 static void draw_piece(raster *r, uint32_t number, int64_t band_begin, int64_t band_end) {
     const piece *p = r->pieces + number;
     int64_t begin, end, width = r->camera->width;
-    piece_rows(r, p, &begin, &end);
+    find_piece_rows(r, p, &begin, &end);
     if (begin < band_begin) begin = band_begin;
     if (end > band_end) end = band_end;
     edges e = make_edges(r, p);
     for (int64_t row = begin; row < end; ++row) {
-        int64_t y = row_y(r, row), shift = r->shift[row % r->camera->samples], x0, x1;
+        int64_t y = find_row_y(r, row), shift = r->shift[row % r->camera->samples], x0, x1;
         find_span(&e, y, shift, width, &x0, &x1);
         if (x0 >= x1) continue;
         double z = e.z0 + e.zx * (double)(x0 * ONE + shift - e.origin.x) + e.zy * (double)(y - e.origin.y);
@@ -302,56 +307,12 @@ static void draw_piece(raster *r, uint32_t number, int64_t band_begin, int64_t b
     }
 }
 
-/* Barycentric coordinates along a ray r of camera space are n_i . r over their sum, n_i = v_j x v_k. */
-typedef struct plane {
-    uint32_t face;
-    double n[3][3], sum[3];
-    bool back;
-} plane;
-
-static plane make_plane(const raster *r, uint32_t face) {
-    plane out = {.face = face};
-    double v[3][3];
-    for (int i = 0; i < 3; ++i)
-        to_camera(r->camera, r->mesh->positions + 3 * (size_t)r->mesh->triangles[3 * (size_t)face + i], v[i]);
-    for (int i = 0; i < 3; ++i) {
-        const double *a = v[(i + 1) % 3], *b = v[(i + 2) % 3];
-        for (int k = 0; k < 3; ++k) {
-            int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-            out.n[i][k] = a[k1] * b[k2] - a[k2] * b[k1];
-            out.sum[k] += out.n[i][k];
-        }
-    }
-    /* x right, y up, z forward is left-handed: the front is where the volume v0 . (v1 x v2) is positive. */
-    out.back = v[0][0] * out.n[0][0] + v[0][1] * out.n[0][1] + v[0][2] * out.n[0][2] < 0;
-    return out;
-}
-
-/* The point of a plane under the picture's (x, y), pulled into the face where rounding has left it. */
-static raster_point find_point(const raster_camera *camera, const plane *p, double x, double y) {
-    double ray[3] = {(x - .5 * camera->width) / camera->focal, (.5 * camera->height - y) / camera->focal, 1};
-    double sum = p->sum[0] * ray[0] + p->sum[1] * ray[1] + p->sum[2] * ray[2];
-    raster_point point = {.face = p->face, .back = p->back};
-    double total = 0;
-    for (int i = 0; i < 3; ++i) {
-        const double *n = p->n[i];
-        double along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2], slope = hypot(n[0], n[1]),
-               w = along / sum;
-        point.side[i] = w > 0 && slope > 0 ? camera->focal * fabs(along) / slope : 0;
-        w = w > 0 ? w < 1 ? w : 1 : 0; /* a NaN becomes 0 too */
-        point.weight[i] = w;
-        total += w;
-    }
-    for (int i = 0; i < 3; ++i) point.weight[i] = total > 0 ? point.weight[i] / total : 1. / 3;
-    return point;
-}
-
 typedef struct share {
     uint32_t piece, count;
     double x, y; /* sums over the samples, in the pixel */
 } share;
 
-/* Which pieces the samples of one pixel see. */
+/* Lists the pieces that the samples of one pixel see. */
 static int find_shares(const raster *r, const uint32_t *seen, share *shares) {
     uint32_t samples = r->camera->samples;
     int count = 0;
@@ -371,7 +332,7 @@ static int find_shares(const raster *r, const uint32_t *seen, share *shares) {
 static void resolve_band(const raster *r, uint32_t y0, uint32_t y1, raster_shade *shade, void *user,
                          float *image) {
     uint32_t width = r->camera->width, samples = r->camera->samples;
-    plane cached = {.face = FCT_NONE};
+    raster_plane cached = {.face = FCT_NONE};
     for (uint32_t y = y0; y < y1; ++y)
         for (uint32_t x = 0; x < width; ++x) {
             share shares[RASTER_MAX_SAMPLES];
@@ -380,10 +341,10 @@ static void resolve_band(const raster *r, uint32_t y0, uint32_t y1, raster_shade
             memset(pixel, 0, 4 * sizeof *pixel);
             for (int i = 0; i < count; ++i) {
                 uint32_t face = r->pieces[shares[i].piece].face;
-                if (cached.face != face) cached = make_plane(r, face);
+                if (cached.face != face) cached = raster_make_plane(r->camera, r->mesh, face);
                 double scale = 1. / ((double)ONE * shares[i].count);
                 raster_point point =
-                    find_point(r->camera, &cached, x + shares[i].x * scale, y + shares[i].y * scale);
+                    raster_find_point(r->camera, &cached, x + shares[i].x * scale, y + shares[i].y * scale);
                 float rgb[3], part = (float)shares[i].count / (float)samples;
                 shade(user, &point, rgb);
                 for (int k = 0; k < 3; ++k) pixel[k] += part * rgb[k];
@@ -413,6 +374,7 @@ static int draw_bands(raster *r, raster_shade *shade, void *user, float *image) 
     return TOOL_DONE;
 }
 
+/* Sample j lies on sub-row j, at the j-th number of the van der Corput sequence in x. */
 static void place_samples(raster *r) {
     uint32_t n = r->camera->samples;
     for (uint32_t j = 0; j < n; ++j) {

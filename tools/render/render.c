@@ -1,10 +1,14 @@
-/* tools/render/render.c: `facetree render`: a picture of a mesh, a scene, a bake, clusters or boxes. */
-#include <errno.h>
+/* tools/render/render.c: facetree render: a picture of a mesh, a scene, a bake, clusters or boxes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "tools/render/drawing.h"
+#include "tools/commands.h"
+#include "tools/kit/command.h"
+#include "tools/kit/options.h"
+#include "tools/render/camera.h"
+#include "tools/render/load.h"
+#include "tools/render/shade.h"
 
 enum {
     KEY_BACKGROUND = TOOL_KEY,
@@ -38,37 +42,43 @@ typedef struct render_options {
     picture_background background;
 } render_options;
 
-static const struct argp_option options[] = {
-    {NULL, 0, NULL, 0, "What is drawn:", 1},
-    {"clusters", KEY_CLUSTERS, "K", 0, "The surface in K clusters, each in a colour of its own", 1},
-    {"boxes", KEY_BOXES, "K", 0, "The oriented boxes of K clusters", 1},
-    {"wireframe", KEY_WIREFRAME, NULL, 0, "The sides of the triangles too", 1},
-    {NULL, 0, NULL, 0, "From where:", 2},
+static const struct argp_option render_options_table[] = {
+    {NULL, 0, NULL, 0, "Subject:", 1},
+    {"clusters", KEY_CLUSTERS, "K", 0, "Draw the surface with a colour per cluster, in K clusters", 1},
+    {"boxes", KEY_BOXES, "K", 0, "Draw the oriented boxes of K clusters", 1},
+    {"wireframe", KEY_WIREFRAME, NULL, 0, "Also draw the sides of the triangles", 1},
+    {NULL, 0, NULL, 0, "Camera:", 2},
     {"camera", KEY_CAMERA, "EX,EY,EZ,TX,TY,TZ[,FOV]", 0,
-     "Eye, target and, in degrees, the vertical field of view (default: the scene's camera, else --view "
+     "Position of the eye, target, and vertical field of view in degrees (default: the scene's camera, else "
+     "--view "
      "corner)",
      2},
-    {"scene", KEY_SCENE, "FILE", 0, "Take the camera from this scene", 2},
-    {"view", KEY_VIEW, "NAME", 0, "The whole from corner, front, back, left, right, top or bottom", 2},
-    {"up", KEY_UP, "AXIS", 0, "y or z points up (default: as the scene's camera has it, else y)", 2},
-    {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 35)", 2},
-    {"cull", KEY_CULL, "WHICH", 0,
-     "Leave out faces seen from behind: back or none (default: back for boxes, and for lit surfaces seen "
-     "from "
-     "outside, so that one looks into a room)",
+    {"scene", KEY_SCENE, "FILE", 0, "Use the camera of this scene", 2},
+    {"view", KEY_VIEW, "NAME", 0,
+     "Show everything, seen from corner, front, back, left, right, top or bottom", 2},
+    {"up", KEY_UP, "AXIS", 0, "The axis that points up: y or z (default: that of the scene's camera, else y)",
      2},
-    {NULL, 0, NULL, 0, "How it looks:", 3},
-    {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x800)", 3},
-    {"samples", KEY_SAMPLES, "N", 0, "Samples a pixel, 1 to 64 (default 16)", 3},
-    {"exposure", KEY_EXPOSURE, "E", 0, "Factor on light (default 1)", 3},
-    {"tone", KEY_TONE, "CURVE", 0, "How bright light is bent: soft, filmic or clamp (default soft)", 3},
+    {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view, 1 to 170 degrees (default 35)", 2},
+    {"cull", KEY_CULL, "WHICH", 0,
+     "Leave out faces that are seen from behind: auto (default), back or none. auto does so for boxes, and "
+     "for lit "
+     "surfaces if the eye is outside, so that one sees into a room",
+     2},
+    {NULL, 0, NULL, 0, "Appearance:", 3},
+    {"size", KEY_SIZE, "WxH", 0, "Width and height in pixels, each 1 to 16384 (default 1280x800)", 3},
+    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel, 1 to 64 (default 16)", 3},
+    {"exposure", KEY_EXPOSURE, "E", 0, "Factor on the light (default 1)", 3},
+    {"tone", KEY_TONE, "CURVE", 0, "Curve for bright light: soft (default), filmic or clamp", 3},
     {"shading", KEY_SHADING, "HOW", 0,
-     "light: colours are light already (default where vertices have colours); smooth or flat: lit as in a "
-     "studio",
+     "auto (default), light, smooth or flat. light shows vertex colours as light; smooth and flat light the "
+     "surface as "
+     "in a studio. auto is light if the vertices have colours, else smooth",
      3},
-    {"crease", KEY_CREASE, "DEGREES", 0, "Edges sharper than this stay sharp in smooth shading (default 40)",
+    {"crease", KEY_CREASE, "DEGREES", 0,
+     "With smooth shading: edges whose faces differ by more stay sharp, 0 to 180 (default 40)", 3},
+    {"background", KEY_BACKGROUND, "COLOUR", 0,
+     "#rrggbb, or none for a transparent background (default: grey behind surfaces, near black behind light)",
      3},
-    {"background", KEY_BACKGROUND, "COLOUR", 0, "#rrggbb, or none for a transparent one", 3},
     {0}};
 
 static error_t parse_size(struct argp_state *state, const char *text, render_options *o) {
@@ -86,12 +96,12 @@ static error_t parse_size(struct argp_state *state, const char *text, render_opt
 static error_t parse_subject(struct argp_state *state, const char *name, const char *text,
                              drawing_subject subject, render_options *o) {
     if (o->subject != DRAWING_SURFACE)
-        return tool_usage(state, "%s: a picture shows clusters or boxes, once", name);
+        return tool_usage(state, "%s: expected only one of --clusters and --boxes, once", name);
     o->subject = subject;
     return tool_parse_count32(state, name, text, 1, INT32_MAX, &o->count);
 }
 
-static error_t parse_view(struct argp_state *state, int key, const char *text, render_options *o) {
+static error_t parse_camera_option(struct argp_state *state, int key, const char *text, render_options *o) {
     static const char *const ups[] = {"y", "z", NULL};
     int index;
     error_t error;
@@ -113,7 +123,7 @@ static error_t parse_view(struct argp_state *state, int key, const char *text, r
     }
 }
 
-static error_t parse_look(struct argp_state *state, int key, const char *text, render_options *o) {
+static error_t parse_look_option(struct argp_state *state, int key, const char *text, render_options *o) {
     static const char *const tones[] = {"soft", "filmic", "clamp", NULL};
     static const char *const shadings[] = {"auto", "light", "smooth", "flat", NULL};
     static const char *const culls[] = {"auto", "back", "none", NULL};
@@ -138,7 +148,7 @@ static error_t parse_look(struct argp_state *state, int key, const char *text, r
     }
 }
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_render(int key, char *text, struct argp_state *state) {
     render_options *o = state->input;
     switch (key) {
     case KEY_CLUSTERS:
@@ -155,7 +165,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_VIEW:
     case KEY_UP:
     case KEY_FOV:
-        return parse_view(state, key, text, o);
+        return parse_camera_option(state, key, text, o);
     case KEY_BACKGROUND:
     case KEY_CREASE:
     case KEY_CULL:
@@ -163,22 +173,22 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_SAMPLES:
     case KEY_SHADING:
     case KEY_TONE:
-        return parse_look(state, key, text, o);
+        return parse_look_option(state, key, text, o);
     case ARGP_KEY_END:
         if (o->camera && !drawing_parse_camera(o->camera, &o->frame))
             return tool_usage(
-                state, "--camera: expected EX,EY,EZ,TX,TY,TZ[,FOV] with an eye off its target, found '%s'",
+                state,
+                "--camera: expected EX,EY,EZ,TX,TY,TZ[,FOV] with an eye away from its target, found '%s'",
                 o->camera);
         if ((o->camera != NULL) + (o->scene != NULL) + (o->frame.view >= 0) > 1)
-            return tool_usage(state,
-                              "--camera, --scene and --view are three ways to say one thing: give one");
+            return tool_usage(state, "expected only one of --camera, --scene and --view");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
 }
 
-/* The camera of --scene. */
+/* Reads the camera of --scene. */
 static int read_camera(tool *t, const char *path, drawing_frame *frame) {
     fct_scene *scene;
     int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &scene));
@@ -203,14 +213,14 @@ static int choose_frame(tool *t, const render_options *o, const drawing *d, draw
     return TOOL_DONE;
 }
 
-/* Light grey behind surfaces, near black behind lit ones. */
-static picture_background default_background(const drawing *d) {
+/* Light grey behind surfaces, near black behind light. */
+static picture_background choose_background(const drawing *d) {
     picture_background light = {{.42F, .46F, .51F}, {.76F, .77F, .78F}, false};
     picture_background dark = {{.008F, .009F, .011F}, {.022F, .023F, .026F}, false};
     return d->shading == DRAWING_LIGHT ? dark : light;
 }
 
-static int report(tool *t, const render_options *o, const drawing *d, const double seconds[4]) {
+static int report_render(tool *t, const render_options *o, const drawing *d, const double seconds[4]) {
     tool_say(t, "%s: %u x %u pixels of %u triangles in %.2f s", t->output, o->width, o->height,
              d->mesh.face_count, seconds[3]);
     return tool_json(t, json_pack("{s:i, s:i, s:I, s:{s:f, s:f, s:f, s:f}, s:I}", "width", (int)o->width,
@@ -219,7 +229,7 @@ static int report(tool *t, const render_options *o, const drawing *d, const doub
                                   "total", seconds[3], "peak_bytes", (json_int_t)tool_peak_bytes()));
 }
 
-static int draw(tool *t, const render_options *o, drawing *d, float *image) {
+static int draw_image(tool *t, const render_options *o, drawing *d, float *image) {
     raster_camera camera = {.width = o->width, .height = o->height, .samples = o->samples};
     drawing_frame frame;
     int code = choose_frame(t, o, d, &frame);
@@ -234,7 +244,7 @@ static int draw(tool *t, const render_options *o, drawing *d, float *image) {
     return raster_draw(t, &camera, &d->mesh, drawing_shade, d, image);
 }
 
-static int run(tool *t, void *input) {
+static int run_render(tool *t, void *input) {
     render_options *o = input;
     drawing d = {.shading = (drawing_shading)o->shading,
                  .tone = (picture_tone)o->tone,
@@ -245,13 +255,13 @@ static int run(tool *t, void *input) {
     float *image = tool_allocate(t, (size_t)o->width * o->height, 4 * sizeof *image);
     int code = image ? drawing_load(t, &source, &d) : TOOL_MEMORY;
     seconds[0] = tool_seconds() - start;
-    if (code == TOOL_DONE) code = draw(t, o, &d, image);
+    if (code == TOOL_DONE) code = draw_image(t, o, &d, image);
     seconds[1] = tool_seconds() - start - seconds[0];
-    picture_background background = o->has_background ? o->background : default_background(&d);
+    picture_background background = o->has_background ? o->background : choose_background(&d);
     if (code == TOOL_DONE) code = picture_save(t, t->output, o->width, o->height, image, &background);
     seconds[3] = tool_seconds() - start;
     seconds[2] = seconds[3] - seconds[0] - seconds[1];
-    if (code == TOOL_DONE) code = report(t, o, &d, seconds);
+    if (code == TOOL_DONE) code = report_render(t, o, &d, seconds);
     drawing_release(t, &d);
     tool_release(t, image);
     return code;
@@ -261,17 +271,16 @@ int tool_render(int argc, char **argv) {
     static const tool_command command = {
         .name = "render",
         .synopsis = "IN -o OUT.png",
-        .summary = "Draw a mesh, a scene, a baked scene, its clusters or its boxes.",
-        .text =
-            "IN is a mesh, a .fct hierarchy or a scene. Vertex colours are shown as light, as a bake leaves "
-            "them; "
-            "surfaces without are shown like plaster in a studio, in the colours of their materials where a "
-            "scene "
-            "gives some. In a scene, clusters and boxes are shared out among the models by how much their "
-            "surfaces turn.",
-        .options = options,
-        .parse = parse,
-        .run = run,
+        .summary = "draw a mesh, a scene, a baked scene, its clusters or its boxes",
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene. Vertex colours are shown as light, as a "
+                "bake writes them. Other "
+                "surfaces look like plaster in a studio, in the colours of their materials if a scene has "
+                "some. In a scene, the "
+                "models share the K clusters or boxes by how much their surfaces turn.\n\n"
+                "JSON keys: width, height, faces, seconds{read, draw, write, total}, peak_bytes.",
+        .options = render_options_table,
+        .parse = parse_render,
+        .run = run_render,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED};

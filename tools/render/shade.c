@@ -1,15 +1,17 @@
-/* tools/render/shade.c: how a face looks: as lit by the bake, or by a key light, a fill and the sky.
+/* tools/render/shade.c: see shade.h.
  *
- * Surfaces without light of their own are shown like plaster in a studio: smooth across edges whose faces
- * differ by less than the crease angle, sharp across others. Lines are drawn by their distance in pixels, so
- * they are as wide near as far.
+ * Baked colours are shown as they are. Other surfaces look like plaster in a studio, with a key light, a fill
+ * light and a sky. Shading is smooth across edges whose faces differ by less than the crease angle. The width
+ * of lines is measured in pixels, so near and far lines are equally wide.
  */
+#include "tools/render/shade.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "tools/render/drawing.h"
+#include "tools/render/palette.h"
 
-/* Faces around each vertex. */
+/* The faces around each vertex. */
 typedef struct fans {
     uint32_t *first; /* vertex_count + 1 */
     uint32_t *faces;
@@ -32,17 +34,17 @@ static void free_fans(tool *t, fans *f) {
     tool_release(t, f->faces);
 }
 
-static float dot(const float a[3], const float b[3]) {
+static float dot_floats(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void normalize(float a[3]) {
-    float length = sqrtf(dot(a, a));
+static void normalize_floats(float a[3]) {
+    float length = sqrtf(dot_floats(a, a));
     for (int k = 0; k < 3 && length > 0; ++k) a[k] /= length;
 }
 
-/* Unit normal, zero for a face without area; returns twice the area. */
-static double face_normal(const fct_mesh *mesh, uint32_t face, float out[3]) {
+/* out: the unit normal, zero for a face without area. Returns twice the area. */
+static double find_face_normal(const fct_mesh *mesh, uint32_t face, float out[3]) {
     const uint32_t *t = mesh->triangles + 3 * (size_t)face;
     const float *p = mesh->positions + 3 * (size_t)t[0], *q = mesh->positions + 3 * (size_t)t[1],
                 *r = mesh->positions + 3 * (size_t)t[2];
@@ -57,16 +59,16 @@ static double face_normal(const fct_mesh *mesh, uint32_t face, float out[3]) {
     return length;
 }
 
-static void corner_normal(const fans *around, const float *normals, const double *areas, uint32_t face,
-                          uint32_t vertex, double crease, float out[3]) {
-    enum { MANY = 64 }; /* faces around a vertex above which the face's own normal must do */
+static void find_corner_normal(const fans *around, const float *normals, const double *areas, uint32_t face,
+                               uint32_t vertex, double crease, float out[3]) {
+    enum { MANY = 64 }; /* a vertex with more faces takes the normal of the face */
     const float *own = normals + 3 * (size_t)face;
     uint32_t begin = around->first[vertex], end = around->first[vertex + 1];
     double sum[3] = {0, 0, 0};
     if (end - begin > MANY) begin = end;
     for (uint32_t i = begin; i < end; ++i) {
         const float *n = normals + 3 * (size_t)around->faces[i];
-        if ((double)dot(own, n) < crease) continue;
+        if ((double)dot_floats(own, n) < crease) continue;
         for (int k = 0; k < 3; ++k) sum[k] += areas[around->faces[i]] * n[k];
     }
     double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
@@ -80,18 +82,18 @@ static int make_normals(tool *t, drawing *d, const fans *around, double crease) 
     d->normals = tool_allocate(t, faces, 9 * sizeof *d->normals);
     int code = normals && areas && d->normals ? TOOL_DONE : TOOL_MEMORY;
     for (uint32_t f = 0; f < faces && code == TOOL_DONE; ++f)
-        areas[f] = face_normal(&d->mesh, f, normals + 3 * (size_t)f);
+        areas[f] = find_face_normal(&d->mesh, f, normals + 3 * (size_t)f);
     for (size_t c = 0; c < 3 * (size_t)faces && code == TOOL_DONE; ++c)
-        corner_normal(around, normals, areas, (uint32_t)(c / 3), d->mesh.triangles[c], crease,
-                      d->normals + 3 * c);
+        find_corner_normal(around, normals, areas, (uint32_t)(c / 3), d->mesh.triangles[c], crease,
+                           d->normals + 3 * c);
     tool_release(t, normals);
     tool_release(t, areas);
     return code;
 }
 
-/* Calls visit(user, label) for each face of another cluster that has the side (a, b) too. */
 typedef void visit_label(void *user, uint32_t label);
 
+/* Calls visit(user, label) for each face of another cluster across the side. */
 static void visit_across(const drawing *d, const fans *around, uint32_t face, int side, visit_label *visit,
                          void *user) {
     const uint32_t *v = d->mesh.triangles + 3 * (size_t)face;
@@ -126,29 +128,8 @@ static int make_lines(tool *t, drawing *d, const fans *around, bool all) {
     return TOOL_DONE;
 }
 
-/* OKLCH to linear sRGB (Ottosson 2020): equal steps look equal, whatever the hue. */
-static void from_oklch(double lightness, double chroma, double hue, float rgb[3]) {
-    double a = chroma * cos(hue), b = chroma * sin(hue);
-    double l = lightness + .3963377774 * a + .2158037573 * b,
-           m = lightness - .1055613458 * a - .0638541728 * b,
-           s = lightness - .0894841775 * a - 1.2914855480 * b;
-    l = l * l * l, m = m * m * m, s = s * s * s;
-    rgb[0] = (float)fmax(0, 4.0767416621 * l - 3.3077115913 * m + .2309699292 * s);
-    rgb[1] = (float)fmax(0, -1.2684380046 * l + 2.6097574011 * m - .3413193965 * s);
-    rgb[2] = (float)fmax(0, -.0041960863 * l - .7034186147 * m + 1.7076147010 * s);
-}
-
-/* Twelve hues; neighbouring ones differ in lightness too. */
-enum { PALETTE = 12 };
-
-void drawing_color(uint32_t i, float rgb[3]) {
-    const double turn = 2 * 3.14159265358979323846;
-    uint32_t hue = i % PALETTE * 5 % PALETTE;
-    from_oklch(hue % 2 ? .68 : .80, hue % 2 ? .12 : .10, (hue + .4) / PALETTE * turn, rgb);
-}
-
 typedef struct coloring {
-    uint8_t *colors; /* of each label; PALETTE: none yet */
+    uint8_t *colors; /* per label; PALETTE: none yet */
     unsigned used[PALETTE];
 } coloring;
 
@@ -157,8 +138,8 @@ static void note_color(void *user, uint32_t label) {
     if (c->colors[label] < PALETTE) ++c->used[c->colors[label]];
 }
 
-/* Gives each cluster, in order, the colour that its borders with coloured clusters have least of. The faces
- * of a cluster follow one another. */
+/* Gives each cluster, in order, the colour that occurs least along its borders. The faces of a cluster are
+ * consecutive. */
 static int paint_labels(tool *t, drawing *d, const fans *around) {
     uint32_t faces = d->mesh.face_count, labels = faces ? d->labels[faces - 1] + 1 : 0;
     coloring c = {.colors = tool_allocate(t, labels, 1)};
@@ -198,33 +179,36 @@ int drawing_prepare(tool *t, drawing *d, double crease, bool wireframe) {
     return code;
 }
 
-/* Light that falls on a unit normal; the sky is cool, the key warm, the ground gives a little back. */
-static void studio(const drawing *d, const float n[3], const float to_eye[3], float rgb[3], float *gloss) {
+/* The light that falls on a unit normal: a cool sky, a warm key light, a fill light, and a little light from
+ * the ground. gloss: the highlight of the key light. */
+static void light_studio(const drawing *d, const float n[3], const float to_eye[3], float rgb[3],
+                         float *gloss) {
     static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.20F, .175F, .155F},
                        key[3] = {.92F, .85F, .75F}, fill[3] = {.07F, .09F, .13F};
-    float up = .5F + .5F * dot(n, d->light[2]), f = fmaxf(dot(n, d->light[1]), 0);
-    float k = fmaxf(dot(n, d->light[0]) + .12F, 0) / 1.12F; /* a lamp of some size */
-    float rim = 1 - fmaxf(dot(n, to_eye), 0);
+    float up = .5F + .5F * dot_floats(n, d->light[2]), f = fmaxf(dot_floats(n, d->light[1]), 0);
+    float k = fmaxf(dot_floats(n, d->light[0]) + .12F, 0) /
+              1.12F; /* a light with some extent reaches beyond its horizon */
+    float rim = 1 - fmaxf(dot_floats(n, to_eye), 0);
     rim = .12F * rim * rim * rim * up;
     for (int i = 0; i < 3; ++i)
         rgb[i] = ground[i] + (sky[i] - ground[i]) * up + key[i] * k + fill[i] * f + rim;
     float half[3];
     for (int i = 0; i < 3; ++i) half[i] = d->light[0][i] + to_eye[i];
-    normalize(half);
-    *gloss = .06F * powf(fmaxf(dot(n, half), 0), 30);
+    normalize_floats(half);
+    *gloss = .06F * powf(fmaxf(dot_floats(n, half), 0), 30);
 }
 
-static void interpolate(const float *a, const float *b, const float *c, const double w[3], float out[3]) {
+static void blend_corners(const float *a, const float *b, const float *c, const double w[3], float out[3]) {
     for (int k = 0; k < 3; ++k) out[k] = (float)(w[0] * a[k] + w[1] * b[k] + w[2] * c[k]);
 }
 
 static void find_normal(const drawing *d, const raster_point *point, float n[3]) {
     const float *corners = d->normals ? d->normals + 9 * (size_t)point->face : NULL;
     if (corners)
-        interpolate(corners, corners + 3, corners + 6, point->weight, n);
+        blend_corners(corners, corners + 3, corners + 6, point->weight, n);
     else
-        face_normal(&d->mesh, point->face, n);
-    normalize(n);
+        find_face_normal(&d->mesh, point->face, n);
+    normalize_floats(n);
     for (int k = 0; k < 3 && point->back; ++k) n[k] = -n[k];
 }
 
@@ -235,8 +219,8 @@ static void find_paint(const drawing *d, const raster_point *point, float rgb[3]
                         : d->mesh.face_colors ? d->mesh.face_colors + 3 * (size_t)point->face
                                               : plaster;
     if (d->mesh.colors && !d->paint)
-        interpolate(d->mesh.colors + 3 * (size_t)v[0], d->mesh.colors + 3 * (size_t)v[1],
-                    d->mesh.colors + 3 * (size_t)v[2], point->weight, rgb);
+        blend_corners(d->mesh.colors + 3 * (size_t)v[0], d->mesh.colors + 3 * (size_t)v[1],
+                      d->mesh.colors + 3 * (size_t)v[2], point->weight, rgb);
     else
         memcpy(rgb, face, 3 * sizeof *rgb);
 }
@@ -245,12 +229,12 @@ static void add_studio_light(const drawing *d, const raster_point *point, float 
     const uint32_t *v = d->mesh.triangles + 3 * (size_t)point->face;
     float n[3], to_eye[3], light[3], gloss;
     find_normal(d, point, n);
-    interpolate(d->mesh.positions + 3 * (size_t)v[0], d->mesh.positions + 3 * (size_t)v[1],
-                d->mesh.positions + 3 * (size_t)v[2], point->weight, to_eye);
+    blend_corners(d->mesh.positions + 3 * (size_t)v[0], d->mesh.positions + 3 * (size_t)v[1],
+                  d->mesh.positions + 3 * (size_t)v[2], point->weight, to_eye);
     for (int k = 0; k < 3; ++k) to_eye[k] = (float)d->eye[k] - to_eye[k];
-    normalize(to_eye);
-    studio(d, n, to_eye, light, &gloss);
-    /* The inside of an open surface is told from its outside by a darker, warmer tone. */
+    normalize_floats(to_eye);
+    light_studio(d, n, to_eye, light, &gloss);
+    /* A darker, warmer tone distinguishes the inside of an open surface. */
     static const float inside[3] = {.62F, .52F, .46F};
     for (int k = 0; k < 3; ++k) rgb[k] = rgb[k] * light[k] * (point->back ? inside[k] : 1) + gloss;
 }

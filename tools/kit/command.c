@@ -1,12 +1,15 @@
-/* tools/kit/main.c: one subcommand from its arguments to its exit code. argp reads the options and is kept
- * silent, so that what it cannot parse is told in one line here. */
+/* tools/kit/command.c: see command.h. argp reads the options and stays silent; the messages about words that
+ * it cannot parse are one line each and come from here. */
 #define _GNU_SOURCE
-#include "tools/kit/tool.h"
+#include "tools/kit/command.h"
 
 #include <ctype.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "tools/kit/file.h"
+#include "tools/kit/options.h"
 
 enum { KEY_JSON = 256, KEY_PROGRESS, KEY_THREADS, KEY_SEED, KEY_MAX_MEMORY, KEY_USAGE, KEY_MAN };
 
@@ -14,11 +17,13 @@ static const struct argp_option common_options[] = {
     {"output", 'o', "FILE", 0, "Write to FILE; - is standard output", 0},
     {NULL, 0, NULL, 0, "Common to all commands:", -2},
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on standard output and nothing else there", -2},
-    {"progress", KEY_PROGRESS, NULL, 0, "Show progress on standard error even where that is no terminal", -2},
-    {"quiet", 'q', NULL, 0, "Say nothing but errors", -2},
-    {"threads", KEY_THREADS, "N", 0, "Use N threads (default: all cores); results do not depend on it", -2},
-    {"seed", KEY_SEED, "N", 0, "Seed of whatever is sampled (default 0)", -2},
-    {"max-memory", KEY_MAX_MEMORY, "SIZE", 0, "Stop with exit code 75 rather than use more; 500M, 2G", -2},
+    {"progress", KEY_PROGRESS, NULL, 0, "Show progress on standard error, even if it is not a terminal", -2},
+    {"quiet", 'q', NULL, 0, "Print only errors", -2},
+    {"threads", KEY_THREADS, "N", 0,
+     "Use N threads, 1 to 256 (default: all cores); the result does not depend on N", -2},
+    {"seed", KEY_SEED, "N", 0, "Seed of random samples (default 0)", -2},
+    {"max-memory", KEY_MAX_MEMORY, "SIZE", 0,
+     "Stop with exit code 75 if more memory than SIZE is needed, such as 500M or 2G (default: no limit)", -2},
     {"help", 'h', NULL, 0, "Print this help", -1},
     {"usage", KEY_USAGE, NULL, OPTION_HIDDEN, NULL, -1},
     {"man", KEY_MAN, NULL, OPTION_HIDDEN, NULL, -1},
@@ -29,7 +34,7 @@ typedef struct arguments {
     const tool_command *command;
     void *options;
     int action; /* 'h', KEY_USAGE, KEY_MAN, or 0 to run */
-    int next;   /* the word after the one that could not be parsed */
+    int next;   /* index of the word after the one that argp could not parse */
 } arguments;
 
 static bool takes_output(const tool_command *command) {
@@ -38,7 +43,7 @@ static bool takes_output(const tool_command *command) {
 
 static error_t parse_positional(arguments *a, char *text, struct argp_state *state) {
     if (a->tool->input_count >= a->command->inputs_max)
-        return tool_usage(state, "'%s' is one argument too many", text);
+        return tool_usage(state, "unexpected argument '%s'", text);
     a->tool->inputs[a->tool->input_count++] = text;
     return 0;
 }
@@ -52,7 +57,7 @@ static error_t check_arguments(const arguments *a, struct argp_state *state) {
     if (a->command->output == TOOL_OUTPUT_REQUIRED && !t->output)
         return tool_usage(state, "expected -o FILE, found none");
     if (t->json && t->output && !strcmp(t->output, "-"))
-        return tool_usage(state, "--json and -o - both want standard output");
+        return tool_usage(state, "--json and -o - cannot both write to standard output");
     return 0;
 }
 
@@ -103,15 +108,17 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* --- What argp could not parse --- */
+/* --- Messages for words that argp could not parse --- */
 
+/* Options whose long name begins with a word: the exact match, and the last prefix match. */
 typedef struct lookup {
     const struct argp_option *exact;
     int prefixes;
     const struct argp_option *prefix;
 } lookup;
 
-static void look_up(lookup *found, const struct argp_option *options, const char *name, size_t length) {
+static void look_up_option(lookup *found, const struct argp_option *options, const char *name,
+                           size_t length) {
     for (; options && (options->name || options->key || options->doc); ++options) {
         if (!options->name || strncmp(options->name, name, length) != 0) continue;
         if (!options->name[length]) found->exact = options;
@@ -119,8 +126,8 @@ static void look_up(lookup *found, const struct argp_option *options, const char
     }
 }
 
-/* Adds the visible long names to names; returns how many there are then. */
-static int long_names(const struct argp_option *options, const char **names, int count, int most) {
+/* Adds the visible long names to `names`, which ends with NULL. Returns the new count. */
+static int add_long_names(const struct argp_option *options, const char **names, int count, int most) {
     for (; options && (options->name || options->key || options->doc); ++options)
         if (options->name && !(options->flags & OPTION_HIDDEN) && count + 1 < most)
             names[count++] = options->name;
@@ -132,8 +139,8 @@ static void say_bad_long(const tool_command *command, const char *token) {
     const char *name = token + 2, *equals = strchr(name, '=');
     size_t length = equals ? (size_t)(equals - name) : strlen(name);
     lookup found = {0};
-    look_up(&found, command->options, name, length);
-    look_up(&found, common_options, name, length);
+    look_up_option(&found, command->options, name, length);
+    look_up_option(&found, common_options, name, length);
     const struct argp_option *option = found.exact ? found.exact : found.prefixes == 1 ? found.prefix : NULL;
     if (option && equals) {
         fprintf(stderr, "facetree %s: --%s takes no value\n", command->name, option->name);
@@ -141,13 +148,13 @@ static void say_bad_long(const tool_command *command, const char *token) {
         fprintf(stderr, "facetree %s: --%s: expected a value (%s), found none\n", command->name, option->name,
                 option->arg ? option->arg : "");
     } else if (found.prefixes > 1) {
-        fprintf(stderr, "facetree %s: '%.*s' could be several options\n", command->name, (int)length + 2,
-                token);
+        fprintf(stderr, "facetree %s: '%.*s' is the beginning of several options\n", command->name,
+                (int)length + 2, token);
     } else {
         const char *names[64];
         char word[64];
         snprintf(word, sizeof word, "%.*s", (int)length, name);
-        long_names(common_options, names, long_names(command->options, names, 0, 64), 64);
+        add_long_names(common_options, names, add_long_names(command->options, names, 0, 64), 64);
         const char *nearest = tool_nearest(word, names);
         fprintf(stderr, "facetree %s: unknown option '%.*s'%s%s%s\n", command->name, (int)length + 2, token,
                 nearest ? "; did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "");
@@ -161,7 +168,7 @@ static bool has_letter(const struct argp_option *options, int letter) {
 }
 
 static void say_bad_option(const tool_command *command, int next, int argc, char **argv) {
-    /* getopt has passed a long option, or a letter at its word's end; else it stands on the word. */
+    /* getopt is behind the word if that is a long option or ends with the letter, else on it. */
     const char *token = next > 1 && next <= argc ? argv[next - 1] : "";
     if (token[0] == '-' && token[1] == '-') {
         say_bad_long(command, token);
@@ -179,8 +186,9 @@ static void say_bad_option(const tool_command *command, int next, int argc, char
 
 /* --- Help --- */
 
-/* Summary, then the options, then the text, as argp lays them out. Returns memory to free, or NULL. */
-static char *help_text(const tool_command *command) {
+/* argp prints the part before \v, then the options, then the rest. Returns memory that the caller frees, or
+ * NULL. */
+static char *make_help_text(const tool_command *command) {
     const char *text = command->text ? command->text : "";
     size_t size = strlen(command->summary) + strlen(text) + 4;
     char *doc = malloc(size);
@@ -189,12 +197,92 @@ static char *help_text(const tool_command *command) {
     return doc;
 }
 
-static int act(const tool_command *command, const struct argp *argp, int action) {
+/* --- Man page --- */
+
+/* Prints text with roff's special characters escaped. start: the text begins a line. */
+static void print_roff(const char *text, bool start) {
+    for (; *text; ++text) {
+        if (start && (*text == '.' || *text == '\'')) fputs("\\&", stdout);
+        start = *text == '\n';
+        if (*text == '\\')
+            fputs("\\e", stdout);
+        else if (*text == '-')
+            fputs("\\-", stdout);
+        else
+            putchar(*text);
+    }
+}
+
+/* An empty line in the text begins a paragraph; a line with leading spaces stays a line of its own. */
+static void print_roff_paragraphs(const char *text) {
+    while (*text) {
+        const char *end = strchr(text, '\n');
+        size_t length = end ? (size_t)(end - text) : strlen(text);
+        char line[512];
+        snprintf(line, sizeof line, "%.*s", (int)length, text);
+        if (!length) {
+            puts(".PP");
+        } else {
+            if (line[0] == ' ') puts(".br");
+            print_roff(line + strspn(line, " "), true);
+            putchar('\n');
+        }
+        text += length + (end != NULL);
+    }
+}
+
+static void print_roff_options(const struct argp_option *options) {
+    for (; options && (options->name || options->key || options->doc); ++options) {
+        if (options->flags & OPTION_HIDDEN) continue;
+        bool letter = options->key > 0 && options->key < 256 && isgraph(options->key);
+        if (!options->name && !letter) continue;
+        fputs(".TP\n\\fB", stdout);
+        if (letter) printf("\\-%c", options->key);
+        if (letter && options->name) fputs("\\fR, \\fB", stdout);
+        if (options->name) {
+            fputs("\\-\\-", stdout);
+            print_roff(options->name, false);
+        }
+        fputs("\\fR", stdout);
+        if (options->arg) {
+            fputs(options->name ? "=\\fI" : " \\fI", stdout);
+            print_roff(options->arg, false);
+            fputs("\\fR", stdout);
+        }
+        putchar('\n');
+        print_roff(options->doc ? options->doc : "", true);
+        putchar('\n');
+    }
+}
+
+static void print_man_page(const tool_command *command) {
+    printf(".TH FACETREE\\-");
+    for (const char *c = command->name; *c; ++c) putchar(toupper((unsigned char)*c));
+    printf(" 1 \"\" \"facetree %s\"\n.SH NAME\nfacetree\\-%s \\- ", fct_version(), command->name);
+    print_roff(command->summary, false);
+    printf("\n.SH SYNOPSIS\n\\fBfacetree %s\\fR [\\fIOPTION\\fR...] ", command->name);
+    print_roff(command->synopsis, false);
+    puts("\n.SH DESCRIPTION");
+    print_roff_paragraphs(command->text ? command->text : command->summary);
+    puts(".SH OPTIONS");
+    print_roff_options(command->options);
+    print_roff_options(common_options + (command->output == TOOL_OUTPUT_UNUSED));
+    puts(
+        ".SH EXIT STATUS\n0 done; 1 the answer is no; 64 usage; 65 bad data; 66 input missing or unreadable; "
+        "70 internal error; 73 output cannot be written; 75 out of memory or over --max-memory; 130 "
+        "interrupted.\n"
+        ".SH SEE ALSO\n.BR facetree (1)");
+}
+
+/* --- The command --- */
+
+/* Prints the help, the usage or the man page. */
+static int print_answer(const tool_command *command, const struct argp *argp, int action) {
     char name[64];
     snprintf(name, sizeof name, "facetree %s", command->name);
     setenv("ARGP_HELP_FMT", "no-dup-args-note", 0);
     if (action == KEY_MAN)
-        tool_print_man(command, common_options);
+        print_man_page(command);
     else
         argp_help(argp, stdout,
                   action == 'h' ? ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC : ARGP_HELP_USAGE,
@@ -202,7 +290,7 @@ static int act(const tool_command *command, const struct argp *argp, int action)
     return fflush(stdout) || ferror(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 
-static int run(tool *t, const tool_command *command, void *options) {
+static int run_command(tool *t, const tool_command *command, void *options) {
     tool_env_open(t);
     int code = TOOL_DONE;
     if (t->output && !command->output_folder) code = tool_check_output(t, t->output);
@@ -217,14 +305,14 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
     arguments a = {.tool = &t, .command = command, .options = options};
     const struct argp own = {.options = command->options, .parser = command->parse};
     const struct argp_child children[] = {{&own, 0, NULL, 0}, {0}};
-    char *doc = help_text(command);
+    char *doc = make_help_text(command);
     t.inputs = malloc(((size_t)argc + 1) * sizeof *t.inputs);
     int code = TOOL_MEMORY;
     if (!doc || !t.inputs) {
         fprintf(stderr, "facetree %s: out of memory\n", command->name);
         goto done;
     }
-    /* The option -o is shown where the command has it. */
+    /* The first common option is -o: hide it if the command has no output. */
     const struct argp argp = {.options = takes_output(command) ? common_options : common_options + 1,
                               .parser = parse_common,
                               .args_doc = command->synopsis,
@@ -232,7 +320,9 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
                               .children = children};
     error_t error = argp_parse(&argp, argc, argv, ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &a);
     if (error && error != ECANCELED) say_bad_option(command, a.next, argc, argv);
-    code = error ? TOOL_USAGE : a.action ? act(command, &argp, a.action) : run(&t, command, options);
+    code = error      ? TOOL_USAGE
+           : a.action ? print_answer(command, &argp, a.action)
+                      : run_command(&t, command, options);
 done:
     free(doc);
     free(t.inputs);

@@ -1,0 +1,82 @@
+/* tools/kit/env.h: the environment of a command: the options that all commands share, memory, progress,
+ * messages, and the outcome as an exit code with one line on stderr.
+ *
+ * Commands use only the public headers of the library. Every call into the library takes tool.env.
+ */
+#ifndef FCT_TOOLS_ENV_H
+#define FCT_TOOLS_ENV_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+#include "facetree/facetree.h"
+
+typedef enum tool_exit {
+    TOOL_DONE = 0,
+    TOOL_NO = 1, /* the answer is no: differences found, not converged */
+    TOOL_USAGE = 64,
+    TOOL_DATA = 65,
+    TOOL_INPUT = 66,
+    TOOL_INTERNAL = 70,
+    TOOL_OUTPUT = 73,
+    TOOL_MEMORY = 75,
+    TOOL_CANCELLED = 130
+} tool_exit;
+
+typedef struct tool {
+    const char *name; /* of the command */
+    char **inputs;    /* the arguments that are not options */
+    int input_count;
+    const char *output; /* the value of -o, or NULL */
+    bool json, quiet, progress;
+    uint32_t threads; /* 0: all cores */
+    uint64_t seed;
+    size_t max_memory; /* bytes; 0: no limit */
+    fct_env env;
+    double start;     /* tool_seconds() at the start of the command */
+    double items;     /* the work that 100 % of a progress bar stands for; 0: unknown */
+    const char *unit; /* of items */
+
+    /* Private to env.c. */
+    size_t memory_now, memory_peak;
+    bool memory_refused, cancelled;
+    char error[1536];
+    bool error_told; /* the error is printed already */
+    char phase[64];
+    double phase_start, drawn;
+    bool bar_visible, bar_off;
+} tool;
+
+void tool_env_open(tool *t);
+/* Prints the recorded error if `code` is one. Returns the code. */
+int tool_env_close(tool *t, int code);
+
+/* Records an error ("file: place: expected value, found value") and returns `code`. */
+int tool_fail(tool *t, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* Puts the path in front of the recorded error, unless the error names it already. Returns `code`. */
+int tool_context(tool *t, int code, const char *path);
+/* The exit code of a library call; TOOL_DONE for FCT_OK. The message hook has recorded the library's message.
+ */
+int tool_result(tool *t, fct_result result);
+/* Prints a line for people: to stdout, or to stderr if the output of the command goes to stdout. Prints
+ * nothing with
+ * --quiet or --json. */
+void tool_say(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void tool_warn(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* Seconds of a monotonic clock. */
+double tool_seconds(void);
+/* The largest resident memory of the process so far, in bytes. */
+size_t tool_peak_bytes(void);
+
+/* Prints the one object of --json. Frees the object in any case. Returns an exit code. */
+int tool_json(tool *t, json_t *object);
+/* For commands whose answer is the object: like tool_json, but without --json prints lines "key value". */
+int tool_print(tool *t, json_t *object);
+json_t *tool_json_floats(const float *values, int count);
+
+/* Memory under --max-memory; NULL after a recorded error. */
+void *tool_allocate(tool *t, size_t count, size_t size);
+void tool_release(tool *t, void *memory);
+
+#endif

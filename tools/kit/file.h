@@ -1,0 +1,35 @@
+/* tools/kit/file.h: file names, checks of outputs before long work, and text files that appear only when
+ * complete. */
+#ifndef FCT_TOOLS_FILE_H
+#define FCT_TOOLS_FILE_H
+
+#include "tools/kit/env.h"
+
+/* Whether `path` ends in `.ending`, in any case. */
+bool tool_ends(const char *path, const char *ending);
+bool tool_is_mesh_name(const char *path);
+/* Whether the name is that of a scene: .json or .gltf. */
+bool tool_is_scene_name(const char *path);
+bool tool_is_folder(const char *path);
+/* The last part of a path without its ending. */
+void tool_stem(const char *path, char *stem, size_t size);
+
+/* Whether a file can be created at `path`, which may be "-". Returns an exit code. */
+int tool_check_output(tool *t, const char *path);
+/* Creates the folder if it is missing, and checks that files can be created in it. Returns an exit code. */
+int tool_check_folder(tool *t, const char *path);
+
+/* A text file that appears at `path` when it is complete; "-" is stdout. */
+typedef struct tool_writer {
+    FILE *stream;
+    const char *path;
+    char *temporary; /* NULL for stdout and devices */
+} tool_writer;
+int tool_writer_open(tool *t, const char *path, tool_writer *writer);
+/* code: the outcome so far. Keeps the file for TOOL_DONE and TOOL_NO. Returns the outcome. */
+int tool_writer_close(tool *t, tool_writer *writer, int code);
+
+/* The xxh3 hash of a file's bytes. Returns an exit code. */
+int tool_hash_file(tool *t, const char *path, uint64_t *hash);
+
+#endif

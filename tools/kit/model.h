@@ -1,0 +1,20 @@
+/* tools/kit/model.h: opens a mesh file or a hierarchy file, as a tree or as a mesh. All return exit codes. */
+#ifndef FCT_TOOLS_MODEL_H
+#define FCT_TOOLS_MODEL_H
+
+#include "tools/kit/env.h"
+#include "tools/kit/options.h"
+
+/* The hierarchy of a .fct file, or one built from a mesh file with `def` (NULL: the default). */
+int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
+/* The mesh of a mesh file or of a .fct file. */
+int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
+/* Saves a mesh. exposure: a factor on its colours for display. */
+int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure);
+
+/* The diagonal of the bounds of the tree's mesh. */
+double tool_diagonal(const fct_tree *tree);
+/* A length option in the unit of the mesh. */
+double tool_length_of(const fct_tree *tree, tool_length length);
+
+#endif
