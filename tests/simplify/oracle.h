@@ -123,7 +123,7 @@ static inline fct_mesh make_sheet(const fct_env *env, unsigned arrays, uint64_t 
                 uint32_t f = (uint32_t)(corner / 3);
                 *t++ = two[k];
                 if (mesh.texcoords) {
-                    mesh.texcoords[2 * corner] = mesh.positions[3 * two[k]] / 4;
+                    mesh.texcoords[2 * corner] = mesh.positions[3 * two[k]] / 2;
                     mesh.texcoords[2 * corner + 1] = mesh.positions[3 * two[k] + 1] / 3 + (j >= 2 ? .3f : 0);
                 }
                 if (mesh.materials) mesh.materials[f] = i == 3;

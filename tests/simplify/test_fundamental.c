@@ -131,6 +131,19 @@ static void quadrics_are_direct_sums(void **state) {
         }
 }
 
+/* A seam from black to white differs by more than 1 in sum, and is held like a boundary. */
+static void strong_seams_are_held_like_boundaries(void **state) {
+    (void)state;
+    fct_mesh mesh = make_sheet(&env, FCT_MESH_COLORS, 13);
+    for (uint32_t v = 25; v < 30; ++v)
+        for (uint32_t k = 0; k < 3; ++k)
+            mesh.colors[3 * v + k] = 1, mesh.colors[3 * ((v - 25) * 5 + 2) + k] = 0;
+    fct_simplify_def def = fct_simplify_def_default();
+    def.boundary_weight = .5;
+    check_wedges(&mesh, &def);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* A duplicate of a boundary face leaves its open sides open; a face without area adds nothing. */
 static void duplicates_and_slivers(void **state) {
     (void)state;
@@ -150,6 +163,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(quadrics_are_direct_sums),
+        cmocka_unit_test(strong_seams_are_held_like_boundaries),
         cmocka_unit_test(duplicates_and_slivers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -129,19 +129,22 @@ static double direct_loss(const fct_simplifier *s, uint32_t a, uint32_t b, const
     return cost;
 }
 
-/* A rod of three sides with a tip, a fin of one triangle on a plate, and a lone triangle. */
+/* A rod of three sides with a tip; a fin of one triangle on a plate, with a flap at a corner of the plate; a
+ * lone triangle; a triangle with both sides. */
 static fct_mesh make_spikes(unsigned arrays) {
-    const float p[][3] = {{0, 0, 0},        {.3f, .05f, 0},    {.1f, .3f, 0}, {0, 0, 2},   {.3f, 0, 2},
-                          {.1f, .3f, 2.1f}, {.13f, .1f, 2.9f}, {3, 0, 0},     {4, 0, .1f}, {3, 1, 0},
-                          {4, 1.1f, .2f},   {3.5f, .4f, 1},    {5, 0, 0},     {6, .2f, 0}, {5, .4f, .3f}};
-    const uint32_t t[][3] = {{0, 1, 4},  {0, 4, 3},   {1, 2, 5},   {1, 5, 4}, {2, 0, 3},
-                             {2, 3, 5},  {3, 4, 6},   {4, 5, 6},   {5, 3, 6}, {7, 8, 10},
-                             {7, 10, 9}, {7, 10, 11}, {12, 13, 14}};
+    const float p[][3] = {{0, 0, 0},       {.3f, .05f, 0},   {.1f, .3f, 0},     {0, 0, 2},
+                          {.3f, 0, 2},     {.1f, .3f, 2.1f}, {.13f, .1f, 2.9f}, {3, 0, 0},
+                          {4, 0, .1f},     {3, 1, 0},        {4, 1.1f, .2f},    {3.5f, .4f, 1},
+                          {5, 0, 0},       {6, .2f, 0},      {5, .4f, .3f},     {4.8f, 1.5f, .8f},
+                          {4.4f, 1.9f, 1}, {6, 2, 0},        {6.5f, 2.2f, .1f}, {6.1f, 2.9f, 0}};
+    const uint32_t t[][3] = {{0, 1, 4},    {0, 4, 3},    {1, 2, 5},    {1, 5, 4},   {2, 0, 3},  {2, 3, 5},
+                             {3, 4, 6},    {4, 5, 6},    {5, 3, 6},    {7, 8, 10},  {7, 10, 9}, {7, 10, 11},
+                             {12, 13, 14}, {10, 15, 16}, {17, 18, 19}, {17, 19, 18}};
     fct_mesh mesh;
-    assert_int_equal(fct_mesh_create(&env, 15, 13, arrays, &mesh), FCT_OK);
+    assert_int_equal(fct_mesh_create(&env, 20, 16, arrays, &mesh), FCT_OK);
     memcpy(mesh.positions, p, sizeof p);
     memcpy(mesh.triangles, t, sizeof t);
-    for (uint32_t i = 0; i < 45 && mesh.colors; ++i) mesh.colors[i] = (float)(i % 7) / 7;
+    for (uint32_t i = 0; i < 60 && mesh.colors; ++i) mesh.colors[i] = (float)(i % 7) / 7;
     return mesh;
 }
 

@@ -1,13 +1,14 @@
-/* tools/make/cornell.c: the Cornell box as measured at Cornell's Program of Computer Graphics: its corners in
- * millimetres, here in metres, seen along +z from the measured place of the camera. Reflectances and emission
- * are the measured spectra in linear RGB, as they are commonly given; the light is scaled to a mean radiosity
- * fit for exposure 1. Every flat patch is cut into n x n pieces to meet a number of triangles.
+/* tools/make/cornell.c: the Cornell box as measured at Cornell's Program of Computer Graphics. The corners
+ * are measured in millimetres and written in metres; the camera is at its measured position and looks along
+ * +z. Reflectance and emission are the measured spectra in their usual linear RGB form. The light is scaled
+ * so that the mean radiosity suits exposure 1. Each flat patch is cut into pieces, to reach the number of
+ * triangles.
  */
 #include "tools/make/make.h"
 
 #include <math.h>
 
-/* a, b, c, d counterclockwise, seen from inside the room or from outside the blocks */
+/* Corners counter-clockwise, seen from inside the room or from outside the blocks; millimetres. */
 typedef struct patch {
     int material;
     double corner[4][3];
@@ -28,7 +29,7 @@ static const struct {
 };
 
 static const patch patches[] = {
-    /* floor; the ceiling in four strips about the light; back wall */
+    /* floor; ceiling in four strips around the light; back wall */
     {WHITE, {{552.8, 0, 0}, {0, 0, 0}, {0, 0, 559.2}, {549.6, 0, 559.2}}},
     {WHITE, {{556, 548.8, 0}, {556, 548.8, 559.2}, {343, 548.8, 332}, {343, 548.8, 227}}},
     {WHITE, {{556, 548.8, 559.2}, {0, 548.8, 559.2}, {213, 548.8, 332}, {343, 548.8, 332}}},
@@ -51,23 +52,23 @@ static const patch patches[] = {
 };
 enum { PATCHES = sizeof patches / sizeof *patches };
 
-static double side_length(const patch *p, int a, int b) {
+static double measure_side(const patch *p, int a, int b) {
     double sum = 0;
     for (int c = 0; c < 3; ++c) sum += pow(p->corner[a][c] - p->corner[b][c], 2);
     return sqrt(sum);
 }
 
-/* How often the sides are cut for pieces of at most `edge` millimetres. */
-static void patch_cuts(const patch *p, double edge, uint32_t cuts[2]) {
-    cuts[0] = (uint32_t)fmax(1, ceil(fmax(side_length(p, 0, 1), side_length(p, 3, 2)) / edge));
-    cuts[1] = (uint32_t)fmax(1, ceil(fmax(side_length(p, 1, 2), side_length(p, 0, 3)) / edge));
+/* The number of pieces along both sides, for pieces of at most `edge` millimetres. */
+static void find_cuts(const patch *p, double edge, uint32_t cuts[2]) {
+    cuts[0] = (uint32_t)fmax(1, ceil(fmax(measure_side(p, 0, 1), measure_side(p, 3, 2)) / edge));
+    cuts[1] = (uint32_t)fmax(1, ceil(fmax(measure_side(p, 1, 2), measure_side(p, 0, 3)) / edge));
 }
 
-static uint64_t count_at(double edge) {
+static uint64_t count_triangles(double edge) {
     uint64_t count = 0;
     for (int k = 0; k < PATCHES; ++k) {
         uint32_t cuts[2];
-        patch_cuts(patches + k, edge, cuts);
+        find_cuts(patches + k, edge, cuts);
         count += 2 * (uint64_t)cuts[0] * cuts[1];
     }
     return count;
@@ -75,7 +76,7 @@ static uint64_t count_at(double edge) {
 
 static void add_patch(make_mesh *m, const patch *p, double edge) {
     uint32_t cuts[2], first = (uint32_t)m->vertex_count;
-    patch_cuts(p, edge, cuts);
+    find_cuts(p, edge, cuts);
     for (uint32_t j = 0; j <= cuts[1]; ++j)
         for (uint32_t i = 0; i <= cuts[0]; ++i) {
             double u = (double)i / cuts[0], v = (double)j / cuts[1], at[3];
@@ -92,10 +93,11 @@ static void add_patch(make_mesh *m, const patch *p, double edge) {
 }
 
 int make_cornell(tool *t, const char *folder, uint32_t triangles, make_result *result) {
-    double low = .05, high = 1000; /* longest edge: the largest that gives enough triangles */
+    double low = .05, high = 1000; /* bounds of the longest edge, millimetres: the largest edge that gives
+                                      enough triangles */
     while (high - low > 1e-4 * low) {
         double middle = .5 * (low + high);
-        *(count_at(middle) >= triangles ? &low : &high) = middle;
+        *(count_triangles(middle) >= triangles ? &low : &high) = middle;
     }
     json_t *models = json_object(), *instances = json_array(), *materials = json_object();
     int code = TOOL_DONE;

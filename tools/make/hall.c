@@ -1,8 +1,9 @@
 /* tools/make/hall.c: the shell of the museum: a nave under a barrel vault with skylights, two aisles behind
- * columns, pilasters along the walls.
+ * columns, and pilasters along the walls.
  *
- * Every surface is a sheet of rectangles between break lines, so that neighbours share their edges and no
- * wall or floor runs on behind what stands against it. All lengths are multiples of 1/64 where things meet.
+ * Every surface is a sheet of rectangles between break lines. So neighbours share their edges, and no wall or
+ * floor continues behind an object that touches it. Where parts meet, all lengths are multiples of 1/64,
+ * which floats store exactly.
  */
 #include "tools/make/make.h"
 
@@ -27,7 +28,7 @@ typedef struct breaks {
     int count;
 } breaks;
 
-static void cut(breaks *b, double at) {
+static void add_break(breaks *b, double at) {
     int k = b->count;
     for (int i = 0; i < b->count; ++i)
         if (b->at[i] == at) return;
@@ -36,16 +37,16 @@ static void cut(breaks *b, double at) {
     ++b->count;
 }
 
-static void cut_all(breaks *b, const double *at, int count) {
-    for (int i = 0; i < count; ++i) cut(b, at[i]);
+static void add_breaks(breaks *b, const double *at, int count) {
+    for (int i = 0; i < count; ++i) add_break(b, at[i]);
 }
 
-static void cut_columns(breaks *b) {
+static void add_column_breaks(breaks *b) {
     for (int k = 0; k < MAKE_BAYS; ++k)
-        cut(b, make_column_z[k] - MAKE_COLUMN_HALF), cut(b, make_column_z[k] + MAKE_COLUMN_HALF);
+        add_break(b, make_column_z[k] - MAKE_COLUMN_HALF), add_break(b, make_column_z[k] + MAKE_COLUMN_HALF);
 }
 
-static bool at_column(double z) {
+static bool is_at_column(double z) {
     for (int k = 0; k < MAKE_BAYS; ++k)
         if (fabs(z - make_column_z[k]) < MAKE_COLUMN_HALF) return true;
     return false;
@@ -53,13 +54,14 @@ static bool at_column(double z) {
 
 typedef struct sheet {
     breaks u, v;
-    make_point (*place)(double u, double v, double w); /* w: of the whole sheet */
+    make_point (*place)(double u, double v, double w); /* w: constant over the sheet */
     double w;
-    int (*part)(double u, double v, const void *user); /* of the rectangle around its middle, or NONE */
+    int (*part)(double u, double v,
+                const void *user); /* the part of the rectangle with this middle, or NONE */
     const void *user;
 } sheet;
 
-/* Rectangles with u x v as their normal; those of one part share their vertices. */
+/* Adds the rectangles of a sheet, with the normal u x v. Rectangles of one part share their vertices. */
 static void add_sheet(make_mesh *parts, const sheet *s) {
     static uint32_t ids[MAX_BREAKS][MAX_BREAKS];
     for (int part = 0; part < MAKE_HALL_PARTS; ++part) {
@@ -80,16 +82,16 @@ static void add_sheet(make_mesh *parts, const sheet *s) {
     }
 }
 
-/* ---- Floor ---- */
+/* --- Floor --- */
 
 typedef struct feet {
     const make_footprint *list;
     uint32_t count;
 } feet;
 
-static int floor_part(double z, double x, const void *user) {
+static int pick_floor(double z, double x, const void *user) {
     const feet *f = user;
-    if (fabs(x) > WIDTH - RIB && at_column(z)) return NONE;
+    if (fabs(x) > WIDTH - RIB && is_at_column(z)) return NONE;
     for (uint32_t k = 0; k < f->count; ++k)
         if (fabs(x - f->list[k].x) < f->list[k].half && fabs(z - f->list[k].z) < f->list[k].half) return NONE;
     return fabs(x) < 1 && fabs(z) < 8 ? MAKE_CARPET : MAKE_FLOOR;
@@ -115,32 +117,32 @@ static make_point place_yx(double y, double x, double z) {
 }
 
 static void add_floor(make_mesh *parts, const feet *f) {
-    sheet s = {.place = place_zx, .part = floor_part, .user = f};
-    cut_all(&s.u, (double[]){-LENGTH, -8, 8, LENGTH}, 4);
-    cut_all(&s.v, (double[]){-WIDTH, RIB - WIDTH, -1, 1, WIDTH - RIB, WIDTH}, 6);
-    cut_columns(&s.u);
+    sheet s = {.place = place_zx, .part = pick_floor, .user = f};
+    add_breaks(&s.u, (double[]){-LENGTH, -8, 8, LENGTH}, 4);
+    add_breaks(&s.v, (double[]){-WIDTH, RIB - WIDTH, -1, 1, WIDTH - RIB, WIDTH}, 6);
+    add_column_breaks(&s.u);
     for (uint32_t k = 0; k < f->count; ++k) {
-        cut(&s.u, f->list[k].z - f->list[k].half), cut(&s.u, f->list[k].z + f->list[k].half);
-        cut(&s.v, f->list[k].x - f->list[k].half), cut(&s.v, f->list[k].x + f->list[k].half);
+        add_break(&s.u, f->list[k].z - f->list[k].half), add_break(&s.u, f->list[k].z + f->list[k].half);
+        add_break(&s.v, f->list[k].x - f->list[k].half), add_break(&s.v, f->list[k].x + f->list[k].half);
     }
     add_sheet(parts, &s);
 }
 
-/* ---- Aisles ---- */
+/* --- Aisles --- */
 
-static int right_wall(double z, double y, const void *user) {
+static int pick_right_wall(double z, double y, const void *user) {
     (void)y, (void)user;
-    return at_column(z) ? NONE : MAKE_WALL_RIGHT;
+    return is_at_column(z) ? NONE : MAKE_WALL_RIGHT;
 }
-static int left_wall(double y, double z, const void *user) {
+static int pick_left_wall(double y, double z, const void *user) {
     (void)y, (void)user;
-    return at_column(z) ? NONE : MAKE_WALL_LEFT;
+    return is_at_column(z) ? NONE : MAKE_WALL_LEFT;
 }
-static int aisle_ceiling(double x, double z, const void *user) {
+static int pick_aisle_ceiling(double x, double z, const void *user) {
     (void)user;
-    return fabs(x) > WIDTH - RIB && at_column(z) ? NONE : MAKE_CEILING;
+    return fabs(x) > WIDTH - RIB && is_at_column(z) ? NONE : MAKE_CEILING;
 }
-static int stone(double u, double v, const void *user) {
+static int pick_stone(double u, double v, const void *user) {
     (void)u, (void)v, (void)user;
     return MAKE_STONE;
 }
@@ -149,7 +151,7 @@ static void add_pilasters(make_mesh *parts, int side) {
     for (int k = 0; k < MAKE_BAYS; ++k) {
         double l = make_column_z[k] - MAKE_COLUMN_HALF, u = make_column_z[k] + MAKE_COLUMN_HALF;
         double wall = side * WIDTH, front = side * (WIDTH - RIB), h = MAKE_AISLE_HEIGHT;
-        double a = side > 0 ? l : u, b = side > 0 ? u : l; /* a to b runs to the viewer's left */
+        double a = side > 0 ? l : u, b = side > 0 ? u : l; /* from a to b is leftwards for the viewer */
         make_mesh *m = parts + MAKE_STONE;
         make_patch(m, make_p(front, 0, a), make_p(front, 0, b), make_p(front, h, b), make_p(front, h, a));
         make_patch(m, make_p(front, 0, b), make_p(wall, 0, b), make_p(wall, h, b), make_p(front, h, b));
@@ -157,72 +159,73 @@ static void add_pilasters(make_mesh *parts, int side) {
     }
 }
 
-static int under_architrave(double x, double z, const void *user) {
+static int pick_architrave(double x, double z, const void *user) {
     (void)x, (void)user;
-    return at_column(z) ? NONE : MAKE_STONE;
+    return is_at_column(z) ? NONE : MAKE_STONE;
 }
 
 static void add_aisle(make_mesh *parts, int side) {
     bool right = side > 0;
-    sheet wall = {
-        .place = right ? place_zy : place_yz, .part = right ? right_wall : left_wall, .w = side * WIDTH};
+    sheet wall = {.place = right ? place_zy : place_yz,
+                  .part = right ? pick_right_wall : pick_left_wall,
+                  .w = side * WIDTH};
     breaks *z = right ? &wall.u : &wall.v, *y = right ? &wall.v : &wall.u;
-    cut_all(z, (double[]){-LENGTH, LENGTH}, 2);
-    cut_columns(z);
-    cut_all(y, (double[]){0, MAKE_AISLE_HEIGHT}, 2);
+    add_breaks(z, (double[]){-LENGTH, LENGTH}, 2);
+    add_column_breaks(z);
+    add_breaks(y, (double[]){0, MAKE_AISLE_HEIGHT}, 2);
     add_sheet(parts, &wall);
     add_pilasters(parts, side);
 
-    sheet ceiling = {.place = place_xz, .part = aisle_ceiling, .w = MAKE_AISLE_HEIGHT, .v = *z};
-    cut_all(&ceiling.u, (double[]){side * AISLE, side * (WIDTH - RIB), side * WIDTH}, 3);
+    sheet ceiling = {.place = place_xz, .part = pick_aisle_ceiling, .w = MAKE_AISLE_HEIGHT, .v = *z};
+    add_breaks(&ceiling.u, (double[]){side * AISLE, side * (WIDTH - RIB), side * WIDTH}, 3);
     add_sheet(parts, &ceiling);
 
-    sheet under = {.place = place_xz, .part = under_architrave, .w = MAKE_COLUMN_HEIGHT, .v = *z};
-    cut_all(&under.u, (double[]){side * NAVE, side * AISLE}, 2);
+    sheet under = {.place = place_xz, .part = pick_architrave, .w = MAKE_COLUMN_HEIGHT, .v = *z};
+    add_breaks(&under.u, (double[]){side * NAVE, side * AISLE}, 2);
     add_sheet(parts, &under);
-    /* its outer face looks to the wall, its inner face into the nave */
-    sheet outer = {.place = right ? place_yz : place_zy, .part = stone, .w = side * AISLE};
+    /* The outer face looks to the wall, the inner face into the nave. */
+    sheet outer = {.place = right ? place_yz : place_zy, .part = pick_stone, .w = side * AISLE};
     *(right ? &outer.v : &outer.u) = *z;
-    cut_all(right ? &outer.u : &outer.v, (double[]){MAKE_COLUMN_HEIGHT, MAKE_AISLE_HEIGHT}, 2);
+    add_breaks(right ? &outer.u : &outer.v, (double[]){MAKE_COLUMN_HEIGHT, MAKE_AISLE_HEIGHT}, 2);
     add_sheet(parts, &outer);
-    sheet inner = {.place = right ? place_zy : place_yz, .part = stone, .w = side * NAVE};
+    sheet inner = {.place = right ? place_zy : place_yz, .part = pick_stone, .w = side * NAVE};
     *(right ? &inner.u : &inner.v) = *z;
-    cut_all(right ? &inner.v : &inner.u, (double[]){MAKE_COLUMN_HEIGHT, SPRING}, 2);
+    add_breaks(right ? &inner.v : &inner.u, (double[]){MAKE_COLUMN_HEIGHT, SPRING}, 2);
     add_sheet(parts, &inner);
 }
 
-/* ---- Vault ---- */
+/* --- Vault --- */
 
-/* Point k of ARC on the ellipse that the vault (inset 0) or its ribs follow; exact at both ends. */
-static double arc_x(int k, double inset) {
+/* Point k of ARC on the ellipse of the vault (inset 0) or of its ribs. Both ends are exact. */
+static double find_arc_x(int k, double inset) {
     return k == 0 ? NAVE - inset : k == ARC ? inset - NAVE : (NAVE - inset) * cos(PI * k / ARC);
 }
-static double arc_y(int k, double inset) {
+static double find_arc_y(int k, double inset) {
     return k == 0 || k == ARC ? SPRING : SPRING + (RISE - inset) * sin(PI * k / ARC);
 }
 static make_point place_arc(double z, double k, double inset) {
-    return make_p(arc_x((int)k, inset), arc_y((int)k, inset), z);
+    return make_p(find_arc_x((int)k, inset), find_arc_y((int)k, inset), z);
 }
 
-static int vault_part(double z, double k, const void *user) {
+static int pick_vault(double z, double k, const void *user) {
     (void)user;
-    if (at_column(z)) return NONE;
+    if (is_at_column(z)) return NONE;
     double bay = z - 3 * round(z / 3);
     bool light = fabs(bay) < .75 && fabs(z) < 7 && fabs(k - ARC / 2) < 2.5;
     return light ? MAKE_SKYLIGHT : MAKE_CEILING;
 }
 
 static void add_vault(make_mesh *parts) {
-    sheet s = {.place = place_arc, .part = vault_part};
-    cut_all(&s.u, (double[]){-LENGTH, LENGTH}, 2);
-    cut_columns(&s.u);
-    for (int bay = -2; bay <= 2; ++bay) cut(&s.u, 3 * bay - .75), cut(&s.u, 3 * bay + .75);
-    for (int k = 0; k <= ARC; ++k) cut(&s.v, k);
+    sheet s = {.place = place_arc, .part = pick_vault};
+    add_breaks(&s.u, (double[]){-LENGTH, LENGTH}, 2);
+    add_column_breaks(&s.u);
+    for (int bay = -2; bay <= 2; ++bay) add_break(&s.u, 3 * bay - .75), add_break(&s.u, 3 * bay + .75);
+    for (int k = 0; k <= ARC; ++k) add_break(&s.v, k);
     add_sheet(parts, &s);
     for (int r = 0; r < MAKE_BAYS; ++r) {
         double l = make_column_z[r] - MAKE_COLUMN_HALF, u = make_column_z[r] + MAKE_COLUMN_HALF;
-        sheet rib = {.place = place_arc, .part = stone, .w = RIB, .v = s.v};
-        cut_all(&rib.u, (double[]){l, u}, 2);
+        sheet rib = {.place = place_arc, .part = pick_stone, .w = RIB, .v = s.v};
+        add_breaks(&rib.u, (double[]){l, u}, 2);
         add_sheet(parts, &rib);
         make_mesh *m = parts + MAKE_STONE;
         for (int k = 0; k < ARC; ++k) {
@@ -239,35 +242,35 @@ static void add_vault(make_mesh *parts) {
     }
 }
 
-/* ---- Ends ---- */
+/* --- Ends --- */
 
-static int end_part(double x, double y, const void *user) {
+static int pick_end(double x, double y, const void *user) {
     const int *side = user;
     double height = fabs(x) > AISLE ? MAKE_AISLE_HEIGHT : fabs(x) > NAVE ? MAKE_COLUMN_HEIGHT : SPRING;
     if (y > height) return NONE;
     bool panel = *side < 0 && fabs(fabs(x) - 5.25) < .5 && y > .75 && y < 3.25;
     return panel ? (x < 0 ? MAKE_PANEL_WARM : MAKE_PANEL_COOL) : MAKE_WALL_ENDS;
 }
-static int front_part(double y, double x, const void *user) {
-    return end_part(x, y, user);
+static int pick_front(double y, double x, const void *user) {
+    return pick_end(x, y, user);
 }
 
 static void add_end(make_mesh *parts, const int *side) {
     bool back = *side < 0;
     sheet s = {.place = back ? place_xy : place_yx,
-               .part = back ? end_part : front_part,
+               .part = back ? pick_end : pick_front,
                .w = *side * LENGTH,
                .user = side};
     breaks *x = back ? &s.u : &s.v, *y = back ? &s.v : &s.u;
     for (int k = -1; k <= 1; k += 2)
-        cut_all(x, (double[]){k * WIDTH, k * AISLE, k * NAVE, k * 4.75, k * 5.75}, 5);
-    for (int k = 0; k <= ARC; ++k) cut(x, arc_x(k, 0));
-    cut_all(y, (double[]){0, .75, 3.25, MAKE_COLUMN_HEIGHT, MAKE_AISLE_HEIGHT, SPRING}, 6);
+        add_breaks(x, (double[]){k * WIDTH, k * AISLE, k * NAVE, k * 4.75, k * 5.75}, 5);
+    for (int k = 0; k <= ARC; ++k) add_break(x, find_arc_x(k, 0));
+    add_breaks(y, (double[]){0, .75, 3.25, MAKE_COLUMN_HEIGHT, MAKE_AISLE_HEIGHT, SPRING}, 6);
     add_sheet(parts, &s);
     make_mesh *m = parts + MAKE_WALL_ENDS;
-    for (int k = 0; k < ARC; ++k) { /* the field under the vault, in strips */
+    for (int k = 0; k < ARC; ++k) { /* the wall under the vault, in strips */
         double z = s.w;
-        make_point strip[4] = {make_p(arc_x(k + 1, 0), SPRING, z), make_p(arc_x(k, 0), SPRING, z),
+        make_point strip[4] = {make_p(find_arc_x(k + 1, 0), SPRING, z), make_p(find_arc_x(k, 0), SPRING, z),
                                place_arc(z, k, 0), place_arc(z, k + 1, 0)};
         uint32_t ids[4], count = 0;
         for (int i = 0; i < 4; ++i) /* the first and the last strip are triangles */

@@ -11,18 +11,18 @@
 #include "tools/kit/options.h"
 
 typedef struct make_options {
-    uint32_t triangles; /* 0: the default of what is made */
+    uint32_t triangles; /* 0: the default of the thing */
     bool inside;
 } make_options;
 
 enum { KEY_TRIANGLES = TOOL_KEY, KEY_INSIDE };
 
-static const struct argp_option options_table[] = {
-    {"triangles", KEY_TRIANGLES, "N", 0, "About this many triangles", 0},
-    {"inside", KEY_INSIDE, NULL, 0, "Turn closed meshes inside out", 0},
+static const struct argp_option make_options_table[] = {
+    {"triangles", KEY_TRIANGLES, "N", 0, "Make about N triangles (default: depends on NAME)", 0},
+    {"inside", KEY_INSIDE, NULL, 0, "Turn a mesh inside out", 0},
     {0}};
 
-static error_t parse(int key, char *text, struct argp_state *state) {
+static error_t parse_make(int key, char *text, struct argp_state *state) {
     make_options *o = state->input;
     switch (key) {
     case KEY_TRIANGLES:
@@ -37,69 +37,70 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     }
 }
 
-/* ---- Single meshes ---- */
+/* --- Single meshes --- */
 
-static uint32_t root(double value) {
+static uint32_t round_root(double value) {
     return (uint32_t)fmax(1, lround(sqrt(value)));
 }
 
-static int sphere(make_mesh *m, uint32_t n) {
-    make_sphere(m, make_p(0, 0, 0), 1, root(n / 20.));
+static int build_sphere(make_mesh *m, uint32_t n) {
+    make_sphere(m, make_p(0, 0, 0), 1, round_root(n / 20.));
     return TOOL_DONE;
 }
-static int box(make_mesh *m, uint32_t n) {
+static int build_box(make_mesh *m, uint32_t n) {
     make_cube(m, n);
     return TOOL_DONE;
 }
-static int cylinder(make_mesh *m, uint32_t n) {
+static int build_cylinder(make_mesh *m, uint32_t n) {
     make_cylinder(m, n);
     return TOOL_DONE;
 }
-static int grid(make_mesh *m, uint32_t n) {
-    make_sheet(m, root(n / 2.), NULL, 0);
+static int build_grid(make_mesh *m, uint32_t n) {
+    make_sheet(m, round_root(n / 2.), NULL, 0);
     return TOOL_DONE;
 }
-static int terrain(make_mesh *m, uint32_t n) {
-    make_sheet(m, root(n / 2.), make_terrain_height, m->t->seed);
+static int build_terrain(make_mesh *m, uint32_t n) {
+    make_sheet(m, round_root(n / 2.), make_terrain_height, m->t->seed);
     return TOOL_DONE;
 }
-static int crates(make_mesh *m, uint32_t n) {
+static int build_crates(make_mesh *m, uint32_t n) {
     make_crates(m, (uint32_t)fmax(1, lround(n / 12.)), m->t->seed);
     return TOOL_DONE;
 }
-static int vase(make_mesh *m, uint32_t n) {
+static int build_vase(make_mesh *m, uint32_t n) {
     make_vase(m, n);
     return TOOL_DONE;
 }
-static int torso(make_mesh *m, uint32_t n) {
+static int build_torso(make_mesh *m, uint32_t n) {
     return make_statue_mesh(m, MAKE_TORSO, n, m->t->seed + MAKE_TORSO);
 }
-static int knot(make_mesh *m, uint32_t n) {
+static int build_knot(make_mesh *m, uint32_t n) {
     return make_statue_mesh(m, MAKE_KNOT, n, m->t->seed + MAKE_KNOT);
 }
-static int gyroid(make_mesh *m, uint32_t n) {
+static int build_gyroid(make_mesh *m, uint32_t n) {
     return make_statue_mesh(m, MAKE_GYROID, n, m->t->seed + MAKE_GYROID);
 }
-static int shell(make_mesh *m, uint32_t n) {
+static int build_shell(make_mesh *m, uint32_t n) {
     return make_statue_mesh(m, MAKE_SHELL, n, m->t->seed + MAKE_SHELL);
 }
-static int bust(make_mesh *m, uint32_t n) {
+static int build_bust(make_mesh *m, uint32_t n) {
     return make_statue_mesh(m, MAKE_BUST, n, m->t->seed + MAKE_BUST);
 }
 
+/* `triangles` is the default, `least` the smallest possible count. A thing is either a scene or a mesh. */
 static const struct {
     const char *name;
     uint32_t triangles, least;
     int (*scene)(tool *t, const char *folder, uint32_t triangles, make_result *result);
     int (*mesh)(make_mesh *m, uint32_t triangles);
 } things[] = {
-    {"cornell", 1000, 38, make_cornell, NULL}, {"museum", 300000, 30000, make_museum, NULL},
-    {"sphere", 20000, 20, NULL, sphere},       {"box", 12, 12, NULL, box},
-    {"cylinder", 2000, 12, NULL, cylinder},    {"grid", 20000, 2, NULL, grid},
-    {"terrain", 200000, 2, NULL, terrain},     {"crate-field", 120000, 12, NULL, crates},
-    {"torso", 100000, 1000, NULL, torso},      {"knot", 100000, 1000, NULL, knot},
-    {"gyroid", 100000, 1000, NULL, gyroid},    {"shell", 100000, 1000, NULL, shell},
-    {"bust", 100000, 1000, NULL, bust},        {"vase", 50000, 1000, NULL, vase},
+    {"cornell", 1000, 38, make_cornell, NULL},    {"museum", 300000, 30000, make_museum, NULL},
+    {"sphere", 20000, 20, NULL, build_sphere},    {"box", 12, 12, NULL, build_box},
+    {"cylinder", 2000, 12, NULL, build_cylinder}, {"grid", 20000, 2, NULL, build_grid},
+    {"terrain", 200000, 2, NULL, build_terrain},  {"crate-field", 120000, 12, NULL, build_crates},
+    {"torso", 100000, 1000, NULL, build_torso},   {"knot", 100000, 1000, NULL, build_knot},
+    {"gyroid", 100000, 1000, NULL, build_gyroid}, {"shell", 100000, 1000, NULL, build_shell},
+    {"bust", 100000, 1000, NULL, build_bust},     {"vase", 50000, 1000, NULL, build_vase},
 };
 enum { THINGS = sizeof things / sizeof *things };
 
@@ -111,22 +112,22 @@ static int find_thing(tool *t, const char *name, int *index) {
     }
     const char *nearest = tool_nearest(name, names);
     if (nearest) return tool_fail(t, TOOL_USAGE, "cannot make '%s'; did you mean '%s'?", name, nearest);
-    return tool_fail(t, TOOL_USAGE, "cannot make '%s'; 'facetree help make' lists what can be made", name);
+    return tool_fail(t, TOOL_USAGE, "cannot make '%s'; 'facetree help make' lists the names", name);
 }
 
-/* Sheets need no mesh in memory where the file is a PLY. */
-static bool goes_by_rows(int (*mesh)(make_mesh *m, uint32_t triangles), const char *path) {
-    return (mesh == grid || mesh == terrain) && tool_ends(path, "ply");
+/* A sheet that goes to a PLY file is written row by row, without a mesh in memory. */
+static bool is_written_by_rows(int (*mesh)(make_mesh *m, uint32_t triangles), const char *path) {
+    return (mesh == build_grid || mesh == build_terrain) && tool_ends(path, "ply");
 }
 
 static int make_one(tool *t, int index, uint32_t triangles, bool inside, make_result *result) {
     make_mesh m = {.t = t};
     int code = tool_check_output(t, t->output);
-    if (code == TOOL_DONE && goes_by_rows(things[index].mesh, t->output)) {
-        uint32_t n = root(triangles / 2.);
+    if (code == TOOL_DONE && is_written_by_rows(things[index].mesh, t->output)) {
+        uint32_t n = round_root(triangles / 2.);
         result->triangles = 2 * (uint64_t)n * n;
         json_array_append_new(result->files, json_string(t->output));
-        return make_sheet_file(t, t->output, n, things[index].mesh == grid ? NULL : make_terrain_height,
+        return make_sheet_file(t, t->output, n, things[index].mesh == build_grid ? NULL : make_terrain_height,
                                inside);
     }
     if (code == TOOL_DONE) code = things[index].mesh(&m, triangles);
@@ -140,7 +141,7 @@ static int make_one(tool *t, int index, uint32_t triangles, bool inside, make_re
     return make_save(&m, t->output);
 }
 
-/* -o names the folder, or its scene.json. */
+/* -o names the folder, or the scene.json in it. */
 static int make_folder(tool *t, int index, uint32_t triangles, make_result *result) {
     static const char file[] = "scene.json";
     char folder[PATH_MAX];
@@ -152,13 +153,14 @@ static int make_folder(tool *t, int index, uint32_t triangles, make_result *resu
         (length == tail || folder[length - tail - 1] == '/'))
         snprintf(folder + length - tail, 2, length == tail ? "." : "");
     else if (tool_ends(folder, "json"))
-        return tool_fail(t, TOOL_USAGE, "%s: a scene is a folder with its %s: name either", t->output, file);
+        return tool_fail(t, TOOL_USAGE, "%s: expected the name of a folder, or of the %s in it", t->output,
+                         file);
     int code = tool_check_folder(t, folder);
     for (length = strlen(folder); length > 1 && folder[length - 1] == '/';) folder[--length] = 0;
     return code == TOOL_DONE ? things[index].scene(t, folder, triangles, result) : code;
 }
 
-static int run(tool *t, void *options) {
+static int run_make(tool *t, void *options) {
     const make_options *o = options;
     make_result result = {.files = json_array()};
     int index, code = find_thing(t, t->inputs[0], &index);
@@ -167,7 +169,7 @@ static int run(tool *t, void *options) {
         code = tool_fail(t, TOOL_USAGE, "--triangles: %s needs at least %u, found %u", things[index].name,
                          things[index].least, triangles);
     if (code == TOOL_DONE && o->inside && things[index].scene)
-        code = tool_fail(t, TOOL_USAGE, "--inside is for single meshes");
+        code = tool_fail(t, TOOL_USAGE, "--inside: expected a mesh, found a scene");
     if (code == TOOL_DONE)
         code = things[index].scene ? make_folder(t, index, triangles, &result)
                                    : make_one(t, index, triangles, o->inside, &result);
@@ -188,17 +190,20 @@ int tool_make(int argc, char **argv) {
         .name = "make",
         .synopsis = "NAME -o OUT",
         .summary = "make an example scene or mesh",
-        .text =
-            "Scenes, for which OUT is a folder that receives scene.json and its meshes:\n\n"
-            "museum: a hall with columns, plinths, lamps and dense statues; --triangles from 30000 on, over "
-            "all instances, met within 2 %. cornell: the Cornell box.\n\n"
-            "Meshes, for which OUT is a mesh file: sphere, box, cylinder, grid, terrain, crate-field "
-            "(slender boxes at random angles), and the statues torso, knot, gyroid, shell, bust, vase.\n\n"
-            "The same name, count and --seed make the same bytes.\n\n"
-            "JSON keys: name, triangles, files[], seconds.",
-        .options = options_table,
-        .parse = parse,
-        .run = run,
+        .text = "NAME is one of these.\n\n"
+                "Scenes, for which OUT is a folder that receives scene.json and its meshes: museum, a hall "
+                "with columns, plinths, "
+                "lamps and dense statues (default 300000 triangles over all instances, at least 30000, exact "
+                "to 2 %); cornell, the "
+                "Cornell box (default 1000 triangles).\n\n"
+                "Meshes, for which OUT is a mesh file: sphere, box, cylinder, grid, terrain, crate-field "
+                "(slender boxes at random "
+                "angles), and the statues torso, knot, gyroid, shell, bust and vase.\n\n"
+                "The same name, count and --seed make the same bytes.\n\n"
+                "JSON keys: name, triangles, files[], seconds.",
+        .options = make_options_table,
+        .parse = parse_make,
+        .run = run_make,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

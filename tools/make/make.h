@@ -1,5 +1,5 @@
-/* tools/make/make.h: example scenes and meshes: a growing mesh, its shapes, smooth surfaces, and the scenes
- * built from them. Lengths are metres, y is up. Everything is a function of its arguments and the seed alone.
+/* tools/make/make.h: example scenes and meshes: a growing mesh, shapes, smooth surfaces, and scenes. Lengths
+ * are in metres, y is up. Every result depends only on the arguments and the seed.
  */
 #ifndef FCT_TOOLS_MAKE_H
 #define FCT_TOOLS_MAKE_H
@@ -14,7 +14,7 @@ static inline make_point make_p(double x, double y, double z) {
     return (make_point){x, y, z};
 }
 
-/* --- a mesh that grows (make_mesh.c). After a failed allocation `failed` is set and adding does nothing. */
+/* --- A mesh that grows (mesh.c). After a failed allocation `failed` is set, and additions do nothing. --- */
 typedef struct make_mesh {
     tool *t;
     float *positions;
@@ -23,62 +23,63 @@ typedef struct make_mesh {
     bool failed;
 } make_mesh;
 
-/* Room for so many elements more, if it is known. */
+/* Makes room for more elements, if their number is known. */
 void make_reserve(make_mesh *m, size_t vertices, size_t faces);
 uint32_t make_vertex(make_mesh *m, make_point p);
 void make_triangle(make_mesh *m, uint32_t a, uint32_t b, uint32_t c);
 void make_quad(make_mesh *m, uint32_t a, uint32_t b, uint32_t c, uint32_t d);
-/* A quad of four new vertices. */
+/* A quad with four new vertices. */
 void make_patch(make_mesh *m, make_point a, make_point b, make_point c, make_point d);
-/* Turns every triangle over. */
+/* Reverses every triangle. */
 void make_turn(make_mesh *m);
-/* Writes the mesh and frees it. A failed mesh is a failure here. */
+/* Writes the mesh and frees it. Fails if the mesh has failed. Returns an exit code. */
 int make_save(make_mesh *m, const char *path);
 void make_clear(make_mesh *m);
 
-/* --- closed and open shapes (make_shapes.c) --- */
-/* An icosahedron's faces cut into frequency^2 triangles each, on the sphere. */
+/* --- Closed and open shapes (shapes.c) --- */
+/* An icosahedron with each face cut into frequency^2 triangles, projected to the sphere. */
 void make_sphere(make_mesh *m, make_point center, double radius, uint32_t frequency);
-/* Six sides; with `bottom` and `top` false those are left out. */
+/* A box of six sides. bottom, top: whether to include these sides. */
 void make_box(make_mesh *m, make_point lower, make_point upper, bool bottom, bool top);
-/* A profile (radius, height), turned about the y axis through `center` in `segments` steps; radius 0 at an
- * end closes it. The outside is on the right of the profile's direction... upwards is outwards. */
+/* Turns a profile (radius, height) about the y axis through `center` in `segments` steps. Radius 0 at an end
+ * closes the shape. A profile that goes upwards has its outside on the outer side. */
 void make_lathe(make_mesh *m, make_point center, const double (*profile)[2], uint32_t count,
                 uint32_t segments);
-/* Height over a place of the unit square. */
+/* The height at a point of the unit square. */
 typedef double make_height(double x, double z, uint64_t seed);
-/* Hills and valleys by noise. */
+/* Hills and valleys from noise. */
 make_height make_terrain_height;
-/* n x n squares over the unit square, facing up; height NULL: the plane y = 0. */
+/* n x n squares over the unit square, facing up. height NULL: the plane y = 0. */
 void make_sheet(make_mesh *m, uint32_t n, make_height *height, uint64_t seed);
-/* Its vertex in column i and row j. */
+/* The vertex of the sheet in column i and row j. */
 make_point make_sheet_vertex(uint32_t n, uint32_t i, uint32_t j, make_height *height, uint64_t seed);
-/* Slender boxes at random places and angles in the unit cube. */
+/* Slender boxes at random positions and angles in the unit cube. */
 void make_crates(make_mesh *m, uint32_t count, uint64_t seed);
 void make_cylinder(make_mesh *m, uint32_t triangles);
 void make_cube(make_mesh *m, uint32_t triangles);
 
-/* --- a sheet of any size into a PLY file (make_sheet.c); returns an exit code --- */
+/* --- A sheet of any size as a PLY file (sheet.c). Returns an exit code. --- */
 int make_sheet_file(tool *t, const char *path, uint32_t n, make_height *height, bool inside);
 
-/* --- noise (make_noise.c) --- */
-/* A hash of three integers and the seed, uniform in [0, 1). */
+/* --- Noise (noise.c) --- */
+/* A hash of three integers and the seed; uniform in [0, 1). */
 double make_hash(int64_t x, int64_t y, int64_t z, uint64_t seed);
-/* Smooth, in [-1, 1], with features of size 1; its slope stays below 3. */
+/* Smooth noise in [-1, 1] with features of size 1. Its value at integer points is uniform; along each axis
+ * the slope is at most 3. */
 double make_noise(make_point p, uint64_t seed);
 
-/* --- smooth surfaces (make_surface.c) --- */
+/* --- Smooth surfaces (surface.c) --- */
 /* Negative inside. |f(p) - f(q)| <= slope |p - q|. */
 typedef struct make_field {
     double (*value)(const void *user, make_point p);
     const void *user;
     double slope;
-    make_point lower, upper; /* a box that holds the surface */
+    make_point lower, upper; /* a box that contains the surface */
 } make_field;
-/* A closed manifold of about `triangles` triangles on the zero level. Returns an exit code. */
+/* A closed manifold with about `triangles` triangles on the zero level. Returns an exit code. */
 int make_surface(make_mesh *m, const make_field *field, uint32_t triangles);
 
-/* --- statues (make_statues.c): about one unit high, standing on y = 0 --- */
+/* --- Statues (statues.c): about one unit high, standing on y = 0 --- */
 typedef enum make_statue {
     MAKE_TORSO,
     MAKE_KNOT,
@@ -89,22 +90,22 @@ typedef enum make_statue {
 } make_statue;
 extern const char *const make_statue_names[];
 int make_statue_mesh(make_mesh *m, make_statue statue, uint32_t triangles, uint64_t seed);
-/* A fluted vase with an inside; its count of triangles is met to 0.1 % from 2,000 on. */
+/* A fluted, hollow vase. From 2,000 triangles on the count is exact to 0.1 %. */
 void make_vase(make_mesh *m, uint32_t triangles);
 
-/* --- scenes: fill a folder, return an exit code --- */
+/* --- Scenes (museum.c, cornell.c): fill a folder and return an exit code --- */
 typedef struct make_result {
     uint64_t triangles; /* over all instances */
-    json_t *files;      /* array of names written */
+    json_t *files;      /* array of the names of written files */
 } make_result;
 int make_museum(tool *t, const char *folder, uint32_t triangles, make_result *result);
 int make_cornell(tool *t, const char *folder, uint32_t triangles, make_result *result);
-/* Writes folder/name and notes it; frees the mesh. */
+/* Writes folder/name, adds it to result->files, and frees the mesh. */
 int make_scene_part(make_mesh *m, const char *folder, const char *name, make_result *result);
-/* Writes folder/scene.json; takes the document. */
+/* Writes folder/scene.json and frees the document. */
 int make_scene_file(tool *t, const char *folder, json_t *document, make_result *result);
 
-/* --- the hall of the museum (make_hall.c) --- */
+/* --- The hall of the museum (hall.c) --- */
 typedef enum make_hall_part {
     MAKE_FLOOR,
     MAKE_CARPET,
@@ -118,13 +119,13 @@ typedef enum make_hall_part {
     MAKE_PANEL_COOL,
     MAKE_HALL_PARTS
 } make_hall_part;
-/* Squares on the floor that something stands on: no floor is made below. */
+/* A square of the floor under an object: the floor has no faces there. */
 typedef struct make_footprint {
     double x, z, half;
 } make_footprint;
-/* The closed shell, cut by material. */
+/* The closed shell, one mesh per material. */
 void make_hall(make_mesh parts[MAKE_HALL_PARTS], const make_footprint *feet, uint32_t foot_count);
-/* Where the columns stand (x, z on the right side; the left one mirrors them), and their size. */
+/* The positions of the columns (x and z on the right side; the left side mirrors them), and their size. */
 enum { MAKE_BAYS = 6 };
 extern const double make_column_z[MAKE_BAYS];
 #define MAKE_COLUMN_X      3.75

@@ -1,4 +1,4 @@
-/* tools/make/mesh.c: a mesh that grows, and files of it. */
+/* tools/make/mesh.c: a mesh that grows, and the files of a scene. */
 #include "tools/make/make.h"
 
 #include <limits.h>
@@ -6,7 +6,7 @@
 
 #include "tools/kit/file.h"
 
-static bool grow(make_mesh *m, void **array, size_t *capacity, size_t needed, size_t size) {
+static bool grow_array(make_mesh *m, void **array, size_t *capacity, size_t needed, size_t size) {
     if (needed <= *capacity) return true;
     size_t larger = *capacity + *capacity / 2 + 1024;
     if (larger < needed) larger = needed;
@@ -23,12 +23,12 @@ static bool grow(make_mesh *m, void **array, size_t *capacity, size_t needed, si
 }
 
 void make_reserve(make_mesh *m, size_t vertices, size_t faces) {
-    grow(m, (void **)&m->positions, &m->vertex_capacity, m->vertex_count + vertices, 3 * sizeof(float));
-    grow(m, (void **)&m->triangles, &m->face_capacity, m->face_count + faces, 3 * sizeof(uint32_t));
+    grow_array(m, (void **)&m->positions, &m->vertex_capacity, m->vertex_count + vertices, 3 * sizeof(float));
+    grow_array(m, (void **)&m->triangles, &m->face_capacity, m->face_count + faces, 3 * sizeof(uint32_t));
 }
 
 uint32_t make_vertex(make_mesh *m, make_point p) {
-    if (!grow(m, (void **)&m->positions, &m->vertex_capacity, m->vertex_count + 1, 3 * sizeof(float)))
+    if (!grow_array(m, (void **)&m->positions, &m->vertex_capacity, m->vertex_count + 1, 3 * sizeof(float)))
         return 0;
     float *to = m->positions + 3 * m->vertex_count;
     to[0] = (float)p.x, to[1] = (float)p.y, to[2] = (float)p.z;
@@ -36,7 +36,8 @@ uint32_t make_vertex(make_mesh *m, make_point p) {
 }
 
 void make_triangle(make_mesh *m, uint32_t a, uint32_t b, uint32_t c) {
-    if (!grow(m, (void **)&m->triangles, &m->face_capacity, m->face_count + 1, 3 * sizeof(uint32_t))) return;
+    if (!grow_array(m, (void **)&m->triangles, &m->face_capacity, m->face_count + 1, 3 * sizeof(uint32_t)))
+        return;
     uint32_t *to = m->triangles + 3 * m->face_count++;
     to[0] = a, to[1] = b, to[2] = c;
 }

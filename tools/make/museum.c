@@ -1,5 +1,5 @@
-/* tools/make/museum.c: the museum: the hall, its columns, benches and lamps, and statues on plinths, which
- * share out the triangles that are asked for. The vase comes last and makes up for what the others missed.
+/* tools/make/museum.c: the museum: the hall, its columns, benches and lamps, and statues on plinths. The
+ * statues share the requested triangles. The vase comes last, so that its exact count corrects the total.
  */
 #include "tools/make/make.h"
 
@@ -12,7 +12,7 @@
 #define LARGE_HALF    .53125
 #define BENCH_LEG     .171875
 
-/* What stands in the hall; `share` is of each model's triangles, over all its places. */
+/* The statues. share: of the requested triangles, over all places of the model. */
 enum { VASE = MAKE_STATUES, MODELS };
 static const struct {
     const char *name;
@@ -85,7 +85,7 @@ typedef struct museum {
     uint32_t wanted;
     make_result *result;
     json_t *models, *instances;
-    uint64_t faces[64]; /* by model, in the order of `names` */
+    uint64_t faces[64]; /* per model, in the order of `names` */
     char names[64][32];
     int model_count, code;
 } museum;
@@ -103,13 +103,13 @@ static void add_model(museum *s, make_mesh *m, const char *name) {
     s->code = make_scene_part(m, s->folder, file, s->result);
 }
 
-static uint64_t model_faces(const museum *s, const char *name) {
+static uint64_t find_model_faces(const museum *s, const char *name) {
     for (int k = 0; k < s->model_count; ++k)
         if (strcmp(s->names[k], name) == 0) return s->faces[k];
     return 0;
 }
 
-/* An instance at a place, turned about y and scaled; in the scene's y-up frame. */
+/* An instance at a point, rotated about y, scaled and perhaps mirrored. */
 static void add_instance(museum *s, const char *name, const char *model, const char *material, make_point at,
                          double degrees, double scale, bool mirrored) {
     json_t *o = json_pack("{s:s, s:s, s:s}", "name", name, "model", model, "material", material);
@@ -124,19 +124,19 @@ static void add_instance(museum *s, const char *name, const char *model, const c
         json_object_set_new(o, "scale", json_real(scale));
     if (json_array_append_new(s->instances, o) && s->code == TOOL_DONE)
         s->code = tool_fail(s->t, TOOL_MEMORY, "out of memory for the scene file");
-    s->result->triangles += model_faces(s, model);
+    s->result->triangles += find_model_faces(s, model);
 }
 
-/* Triangles of round things grow slowly with the whole. */
-static uint32_t detail(const museum *s, uint32_t least, uint32_t most) {
+/* The detail of round parts grows with the logarithm of the requested triangles. */
+static uint32_t choose_detail(const museum *s, uint32_t least, uint32_t most) {
     double octaves = log2(fmax(1, s->wanted / 30e3));
     return (uint32_t)fmin(most, least + octaves * (most - least) / 7);
 }
 
-/* ---- Furniture ---- */
+/* --- Furniture --- */
 
-/* A square profile (half width, height) turned in four steps, with a flat top. */
-static void square_lathe(make_mesh *m, const double (*profile)[2], int count) {
+/* A square profile (half width, height), turned in four steps, with a flat top. */
+static void add_square_lathe(make_mesh *m, const double (*profile)[2], int count) {
     static const int corner[5][2] = {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}, {1, 1}};
     for (int k = 0; k + 1 < count; ++k) {
         double a = profile[k][0], b = profile[k + 1][0], low = profile[k][1], high = profile[k + 1][1];
@@ -155,14 +155,14 @@ static void add_plinth(museum *s, const char *name, double half) {
     double body = half - .0625;
     const double profile[][2] = {{half, 0},     {half, .125}, {body, .1875},
                                  {body, .8125}, {half, .875}, {half, PLINTH_HEIGHT}};
-    square_lathe(&m, profile, sizeof profile / sizeof *profile);
+    add_square_lathe(&m, profile, sizeof profile / sizeof *profile);
     add_model(s, &m, name);
 }
 
 static void add_column(museum *s) {
     make_mesh m = {.t = s->t};
-    uint32_t flutes = s->wanted < 100000 ? 12 : 20, steps = detail(s, 2, 6), segments = flutes * steps;
-    uint32_t drums = detail(s, 4, 16);
+    uint32_t flutes = s->wanted < 100000 ? 12 : 20, steps = choose_detail(s, 2, 6), segments = flutes * steps;
+    uint32_t drums = choose_detail(s, 4, 16);
     double h = MAKE_COLUMN_HALF;
     make_box(&m, make_p(-h, 0, -h), make_p(h, .25, h), false, true);
     make_box(&m, make_p(-h, 3.75, -h), make_p(h, MAKE_COLUMN_HEIGHT, h), true, false);
@@ -198,7 +198,7 @@ static void add_furniture(museum *s) {
     add_plinth(s, "plinth_large", LARGE_HALF);
     add_column(s);
     make_mesh lamp = {.t = s->t}, rod = {.t = s->t}, leg = {.t = s->t}, seat = {.t = s->t};
-    make_sphere(&lamp, make_p(0, 0, 0), .15, detail(s, 2, 8));
+    make_sphere(&lamp, make_p(0, 0, 0), .15, choose_detail(s, 2, 8));
     add_model(s, &lamp, "lamp");
     make_box(&rod, make_p(-.0078125, .14, -.0078125), make_p(.0078125, 1, .0078125), false, false);
     add_model(s, &rod, "rod");
@@ -244,7 +244,7 @@ static void place_furniture(museum *s) {
     }
 }
 
-/* ---- Hall and statues ---- */
+/* --- Hall and statues --- */
 
 static void add_hall(museum *s) {
     make_footprint feet[2 * MAKE_BAYS + EXHIBITS + 4];
@@ -267,7 +267,7 @@ static void add_hall(museum *s) {
     }
 }
 
-static int places_of(int model) {
+static int count_places(int model) {
     int count = 0;
     for (int k = 0; k < EXHIBITS; ++k) count += exhibits[k].model == model;
     return count;
@@ -277,7 +277,7 @@ static void add_statues(museum *s) {
     double left = fmax(0, (double)s->wanted - (double)s->result->triangles), for_statues = left;
     for (int k = 0; k < MODELS && s->code == TOOL_DONE; ++k) {
         make_mesh m = {.t = s->t};
-        int places = places_of(k);
+        int places = count_places(k);
         double share = k == VASE ? left : models[k].share * for_statues;
         uint32_t triangles = (uint32_t)fmax(400, share / places);
         if (!s->t->env.progress(s->t->env.progress_user, "statues", (double)k / MODELS))
@@ -293,9 +293,9 @@ static void add_statues(museum *s) {
         const exhibit *e = exhibits + k;
         char name[48];
         snprintf(name, sizeof name, "%s%s", models[e->model].name,
-                 places_of(e->model) == 1 ? ""
-                 : e->x < 0               ? " left"
-                                          : " right");
+                 count_places(e->model) == 1 ? ""
+                 : e->x < 0                  ? " left"
+                                             : " right");
         /* statues stand a little inside their plinths, so that no light passes below */
         add_instance(s, name, models[e->model].name, e->material,
                      make_p(e->x, PLINTH_HEIGHT - (e->model == VASE ? .003 : .01), e->z), e->degrees,

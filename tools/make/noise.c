@@ -1,9 +1,10 @@
-/* tools/make/noise.c: seeded noise without tables. */
+/* tools/make/noise.c: seeded value noise without tables: a hash at each integer point, and smooth
+ * interpolation. */
 #include "tools/make/make.h"
 
 #include <math.h>
 
-static uint64_t mix(uint64_t h) {
+static uint64_t mix_bits(uint64_t h) {
     h ^= h >> 31;
     h *= 0x9e3779b97f4a7c15u;
     h ^= h >> 29;
@@ -12,8 +13,8 @@ static uint64_t mix(uint64_t h) {
 }
 
 double make_hash(int64_t x, int64_t y, int64_t z, uint64_t seed) {
-    uint64_t h = mix((uint64_t)x * 0x8da6b343u + (uint64_t)y * 0xd8163841u * 0x10001u +
-                     (uint64_t)z * 0xcb1ab31fu * 0x100000001u + seed * 0x632be59bd9b4e019u);
+    uint64_t h = mix_bits((uint64_t)x * 0x8da6b343u + (uint64_t)y * 0xd8163841u * 0x10001u +
+                          (uint64_t)z * 0xcb1ab31fu * 0x100000001u + seed * 0x632be59bd9b4e019u);
     return (double)(h >> 11) * 0x1p-53;
 }
 

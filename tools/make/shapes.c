@@ -1,5 +1,5 @@
-/* tools/make/shapes.c: spheres, boxes, surfaces of revolution, and the meshes that `facetree make` names
- * after them. Every closed shape is a manifold with its outside outwards.
+/* tools/make/shapes.c: spheres, boxes, surfaces of revolution, sheets and crates. Every closed shape is a
+ * manifold whose faces look outwards.
  */
 #include "tools/make/make.h"
 
@@ -7,35 +7,37 @@
 
 #define TURN 6.28318530717958647692
 
-static make_point on_sphere(make_point center, double radius, make_point p) {
+static make_point project_to_sphere(make_point center, double radius, make_point p) {
     double s = radius / sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
     return make_p(center.x + s * p.x, center.y + s * p.y, center.z + s * p.z);
 }
 
-/* Numbers of the vertices of face (a, b, c), row by row: corners, then 30 sides of n - 1, then insides. */
+/* The vertex numbers of the face (a, b, c) of an icosahedron, row by row. Vertices are numbered: the 12
+ * corners, then n - 1 per side for 30 sides, then the insides. */
 typedef struct sphere_grid {
-    uint32_t first, n, corner[3], side[3]; /* number of side ab, bc, ca in the list of 30 */
+    uint32_t first, n, corner[3], side[3]; /* the sides ab, bc and ca in the list of 30 */
     bool backwards[3];
     uint32_t inside;
 } sphere_grid;
 
-static uint32_t side_vertex(const sphere_grid *g, int side, uint32_t step) {
+static uint32_t find_side_vertex(const sphere_grid *g, int side, uint32_t step) {
     if (g->backwards[side]) step = g->n - step;
     return g->first + 12 + g->side[side] * (g->n - 1) + step - 1;
 }
 
-/* Row i of n from a towards bc, place j of i. */
-static uint32_t grid_vertex(const sphere_grid *g, uint32_t i, uint32_t j) {
+/* Vertex j of i in row i of n, counted from a towards bc. */
+static uint32_t find_grid_vertex(const sphere_grid *g, uint32_t i, uint32_t j) {
     if (i == 0) return g->first + g->corner[0];
     if (i == g->n && j == 0) return g->first + g->corner[1];
     if (i == g->n && j == i) return g->first + g->corner[2];
-    if (j == 0) return side_vertex(g, 0, i);
-    if (i == g->n) return side_vertex(g, 1, j);
-    if (j == i) return side_vertex(g, 2, g->n - i);
+    if (j == 0) return find_side_vertex(g, 0, i);
+    if (i == g->n) return find_side_vertex(g, 1, j);
+    if (j == i) return find_side_vertex(g, 2, g->n - i);
     return g->inside + (i - 1) * (i - 2) / 2 + j - 1;
 }
 
-static make_point blend(const make_point *a, const make_point *b, const make_point *c, double u, double v) {
+static make_point blend_points(const make_point *a, const make_point *b, const make_point *c, double u,
+                               double v) {
     double w = 1 - u - v;
     return make_p(w * a->x + u * b->x + v * c->x, w * a->y + u * b->y + v * c->y,
                   w * a->z + u * b->z + v * c->z);
@@ -53,15 +55,16 @@ void make_sphere(make_mesh *m, make_point center, double radius, uint32_t n) {
     uint8_t sides[30][2], side_count = 0;
     sphere_grid grid = {.first = (uint32_t)m->vertex_count, .n = n};
     make_reserve(m, 10 * (size_t)n * n + 2, 20 * (size_t)n * n);
-    for (int k = 0; k < 12; ++k) make_vertex(m, on_sphere(center, radius, corners[k]));
+    for (int k = 0; k < 12; ++k) make_vertex(m, project_to_sphere(center, radius, corners[k]));
     for (int f = 0; f < 20; ++f)
         for (int k = 0; k < 3; ++k) {
             uint8_t a = faces[f][k], b = faces[f][(k + 1) % 3];
             if (a > b) continue;
             sides[side_count][0] = a, sides[side_count++][1] = b;
             for (uint32_t s = 1; s < n; ++s)
-                make_vertex(m, on_sphere(center, radius,
-                                         blend(corners + a, corners + b, corners + b, (double)s / n, 0)));
+                make_vertex(m, project_to_sphere(
+                                   center, radius,
+                                   blend_points(corners + a, corners + b, corners + b, (double)s / n, 0)));
         }
     for (int f = 0; f < 20; ++f) {
         const uint8_t *face = faces[f];
@@ -76,15 +79,16 @@ void make_sphere(make_mesh *m, make_point center, double radius, uint32_t n) {
         grid.inside = (uint32_t)m->vertex_count;
         for (uint32_t i = 2; i < n; ++i)
             for (uint32_t j = 1; j < i; ++j)
-                make_vertex(m, on_sphere(center, radius,
-                                         blend(corners + face[0], corners + face[1], corners + face[2],
-                                               (double)(i - j) / n, (double)j / n)));
+                make_vertex(
+                    m, project_to_sphere(center, radius,
+                                         blend_points(corners + face[0], corners + face[1], corners + face[2],
+                                                      (double)(i - j) / n, (double)j / n)));
         for (uint32_t i = 0; i < n; ++i)
             for (uint32_t j = 0; j <= i; ++j) {
-                uint32_t a = grid_vertex(&grid, i, j), b = grid_vertex(&grid, i + 1, j),
-                         c = grid_vertex(&grid, i + 1, j + 1);
+                uint32_t a = find_grid_vertex(&grid, i, j), b = find_grid_vertex(&grid, i + 1, j),
+                         c = find_grid_vertex(&grid, i + 1, j + 1);
                 make_triangle(m, a, b, c);
-                if (j < i) make_triangle(m, a, c, grid_vertex(&grid, i, j + 1));
+                if (j < i) make_triangle(m, a, c, find_grid_vertex(&grid, i, j + 1));
             }
     }
 }
@@ -131,7 +135,6 @@ make_point make_sheet_vertex(uint32_t n, uint32_t i, uint32_t j, make_height *he
     return make_p(x, height ? height(x, z, seed) : 0, z);
 }
 
-/* (n + 1)^2 vertices row by row. */
 void make_sheet(make_mesh *m, uint32_t n, make_height *height, uint64_t seed) {
     uint32_t first = (uint32_t)m->vertex_count;
     make_reserve(m, ((size_t)n + 1) * (n + 1), 2 * (size_t)n * n);
@@ -153,8 +156,8 @@ double make_terrain_height(double x, double z, uint64_t seed) {
     return sum;
 }
 
-/* A random rotation by a uniform unit quaternion. */
-static void random_rotation(uint64_t k, uint64_t seed, double r[9]) {
+/* A random rotation, from a uniform unit quaternion. */
+static void make_rotation(uint64_t k, uint64_t seed, double r[9]) {
     double u = make_hash((int64_t)k, 0, 0, seed), a = TURN * make_hash((int64_t)k, 1, 0, seed),
            b = TURN * make_hash((int64_t)k, 2, 0, seed);
     double x = sqrt(1 - u) * sin(a), y = sqrt(1 - u) * cos(a), z = sqrt(u) * sin(b), w = sqrt(u) * cos(b);
@@ -169,7 +172,7 @@ void make_crates(make_mesh *m, uint32_t count, uint64_t seed) {
     make_reserve(m, 8 * (size_t)count, 12 * (size_t)count);
     for (uint32_t k = 0; k < count && !m->failed; ++k) {
         double r[9], half[3], at[3];
-        random_rotation(k, seed, r);
+        make_rotation(k, seed, r);
         for (int c = 0; c < 3; ++c) {
             at[c] = make_hash(k, 3, c, seed);
             half[c] = spacing * (.08 + .1 * make_hash(k, 4, c, seed)) * (c == 0 ? 4 : 1);
@@ -185,7 +188,7 @@ void make_crates(make_mesh *m, uint32_t count, uint64_t seed) {
 }
 
 void make_cylinder(make_mesh *m, uint32_t triangles) {
-    /* radius 1/2, height 1; rings and caps with squares about as wide as high: 2 s r + 2 s c */
+    /* Radius 1/2 and height 1. Choose segments so that the quads are about square. */
     uint32_t segments = (uint32_t)fmax(3, lround(sqrt(triangles * TURN / 2 / 3)));
     double rows = fmax(1, triangles / (2. * segments) + 1);
     uint32_t side = (uint32_t)fmax(1, lround(rows / 2)), cap = (uint32_t)fmax(1, lround(rows / 4));
@@ -203,8 +206,8 @@ void make_cylinder(make_mesh *m, uint32_t triangles) {
     tool_release(m->t, line);
 }
 
-/* Vertex of the surface of an n^3 lattice: a number for each point, shared between the sides. */
-static uint32_t lattice(uint32_t n, uint32_t x, uint32_t y, uint32_t z) {
+/* The number of a point on the surface of an n^3 lattice. Sides share the numbers of their common edges. */
+static uint32_t find_lattice_vertex(uint32_t n, uint32_t x, uint32_t y, uint32_t z) {
     uint32_t layer = (n + 1) * (n + 1);
     if (z == 0) return y * (n + 1) + x;
     if (z == n) return layer + 4 * n * (n - 1) + y * (n + 1) + x;
@@ -232,13 +235,13 @@ void make_cube(make_mesh *m, uint32_t triangles) {
                         c[b][a][(axis + 1) % 3] = i + a, c[b][a][(axis + 2) % 3] = j + b;
                     }
                 const uint32_t *at = c[0][0];
-                float *p = m->positions + 3 * (size_t)lattice(n, at[0], at[1], at[2]);
+                float *p = m->positions + 3 * (size_t)find_lattice_vertex(n, at[0], at[1], at[2]);
                 for (int k = 0; k < 3; ++k) p[k] = (float)((double)at[k] / n);
                 if (i == n || j == n) continue;
-                uint32_t v[4] = {lattice(n, c[0][0][0], c[0][0][1], c[0][0][2]),
-                                 lattice(n, c[0][1][0], c[0][1][1], c[0][1][2]),
-                                 lattice(n, c[1][1][0], c[1][1][1], c[1][1][2]),
-                                 lattice(n, c[1][0][0], c[1][0][1], c[1][0][2])};
+                uint32_t v[4] = {find_lattice_vertex(n, c[0][0][0], c[0][0][1], c[0][0][2]),
+                                 find_lattice_vertex(n, c[0][1][0], c[0][1][1], c[0][1][2]),
+                                 find_lattice_vertex(n, c[1][1][0], c[1][1][1], c[1][1][2]),
+                                 find_lattice_vertex(n, c[1][0][0], c[1][0][1], c[1][0][2])};
                 if (side % 2)
                     make_quad(m, v[0], v[1], v[2], v[3]);
                 else

@@ -1,5 +1,5 @@
-/* tools/make/sheet.c: sheets straight into a PLY file, row by row, so that their size is bounded by the disk
- * and not by memory: the very bytes that saving the mesh would write. */
+/* tools/make/sheet.c: writes a sheet to a PLY file row by row, so that the disk limits its size and not the
+ * memory. The bytes are those that fct_mesh_save would write. */
 #include "tools/make/make.h"
 
 #include <string.h>
@@ -15,7 +15,7 @@ typedef struct sheet_writer {
     size_t used;
 } sheet_writer;
 
-static void put(sheet_writer *w, const void *data, size_t size) {
+static void put_bytes(sheet_writer *w, const void *data, size_t size) {
     if (w->used + size > BUFFER) {
         fwrite(w->buffer, 1, w->used, w->stream);
         w->used = 0;
@@ -24,7 +24,7 @@ static void put(sheet_writer *w, const void *data, size_t size) {
     w->used += size;
 }
 
-static void put_32(unsigned char *p, uint32_t x) {
+static void put_word(unsigned char *p, uint32_t x) {
     for (int i = 0; i < 4; ++i) p[i] = (unsigned char)(x >> 8 * i);
 }
 
@@ -34,20 +34,20 @@ static void put_vertex(sheet_writer *w, make_point p) {
     for (int i = 0; i < 3; ++i) {
         uint32_t bits;
         memcpy(&bits, values + i, sizeof bits);
-        put_32(bytes + 4 * i, bits);
+        put_word(bytes + 4 * i, bits);
     }
-    put(w, bytes, sizeof bytes);
+    put_bytes(w, bytes, sizeof bytes);
 }
 
 static void put_triangle(sheet_writer *w, uint32_t a, uint32_t b, uint32_t c, bool inside) {
     unsigned char bytes[RECORD] = {3};
-    put_32(bytes + 1, a);
-    put_32(bytes + 5, inside ? c : b);
-    put_32(bytes + 9, inside ? b : c);
-    put(w, bytes, sizeof bytes);
+    put_word(bytes + 1, a);
+    put_word(bytes + 5, inside ? c : b);
+    put_word(bytes + 9, inside ? b : c);
+    put_bytes(w, bytes, sizeof bytes);
 }
 
-/* False: cancelled. */
+/* False if the user cancelled. */
 static bool put_rows(sheet_writer *w, uint32_t n, make_height *height, bool inside) {
     const fct_env *env = &w->t->env;
     for (uint32_t j = 0; j <= n; ++j) {

@@ -1,6 +1,6 @@
-/* tools/make/statues.c: the statues of the museum as fields: smooth unions of ellipsoids, a rope-like
- * trefoil, a ball of gyroid, a spiral shell, a bust; and a fluted vase, turned. All stand on y = 0, about one
- * unit high, with fine seeded relief.
+/* tools/make/statues.c: the statues of the museum. Five are fields: a torso and a bust from smooth unions of
+ * ellipsoids, a trefoil knot of rope, a ball of gyroid and a spiral shell. The vase is a surface of
+ * revolution. All stand on y = 0, are about one unit high, and have fine seeded relief.
  */
 #include "tools/make/make.h"
 
@@ -15,7 +15,7 @@ typedef struct ellipsoid {
     double blend;
 } ellipsoid;
 
-/* The same, ready to be evaluated. */
+/* An ellipsoid, prepared for evaluation. */
 typedef struct blob {
     double center[3], inverse[3], cosine, sine, least, largest, blend;
 } blob;
@@ -28,14 +28,14 @@ typedef struct sculpture {
     int blob_count;
 } sculpture;
 
-/* Polynomial smooth minimum: within k of one another two surfaces flow together. */
-static double unite(double a, double b, double k) {
+/* The smooth union of two fields: a polynomial minimum, which blends values that differ by less than k. */
+static double unite_fields(double a, double b, double k) {
     double h = fmax(k - fabs(a - b), 0);
     return fmin(a, b) - h * h / (4 * k);
 }
 
-static double meet(double a, double b, double k) {
-    return -unite(-a, -b, k);
+static double intersect_fields(double a, double b, double k) {
+    return -unite_fields(-a, -b, k);
 }
 
 static void add_blobs(sculpture *s, const ellipsoid *list, int count) {
@@ -51,8 +51,8 @@ static void add_blobs(sculpture *s, const ellipsoid *list, int count) {
     }
 }
 
-/* (|p / r| - 1) min r; `far` where that is sure to be more. */
-static double blob_value(const blob *e, make_point p, double far) {
+/* (|p / r| - 1) min r, or `far` if the value is surely larger. */
+static double measure_blob(const blob *e, make_point p, double far) {
     double x = p.x - e->center[0], y = p.y - e->center[1], z = p.z - e->center[2];
     double reach = e->largest * (far + e->least);
     if (reach > 0 && (x * x + y * y + z * z) * e->least * e->least > reach * reach) return far;
@@ -61,25 +61,26 @@ static double blob_value(const blob *e, make_point p, double far) {
     return (sqrt(x * x + y * y + z * z) - 1) * e->least;
 }
 
-static double unite_blobs(const blob *list, int count, make_point p) {
-    double f = blob_value(list, p, INFINITY);
-    for (int k = 1; k < count; ++k) f = unite(f, blob_value(list + k, p, f + list[k].blend), list[k].blend);
+static double unite_all_blobs(const blob *list, int count, make_point p) {
+    double f = measure_blob(list, p, INFINITY);
+    for (int k = 1; k < count; ++k)
+        f = unite_fields(f, measure_blob(list + k, p, f + list[k].blend), list[k].blend);
     return f;
 }
 
-/* A drum with rounded rims from y = lower to y = upper. */
-static double drum(make_point p, double radius, double lower, double upper, double round) {
+/* A cylinder about the y axis with rounded rims, from y = lower to y = upper. */
+static double measure_drum(make_point p, double radius, double lower, double upper, double round) {
     double side = sqrt(p.x * p.x + p.z * p.z) - radius, end = fmax(lower - p.y, p.y - upper);
-    return meet(side, end, round);
+    return intersect_fields(side, end, round);
 }
 
-static make_point scaled(make_point p, double s) {
+static make_point scale_point(make_point p, double s) {
     return make_p(p.x * s, p.y * s, p.z * s);
 }
 
-/* Marks of the chisel over a broad unevenness. */
-static double stone(make_point p, uint64_t seed, double amount) {
-    return amount * (make_noise(scaled(p, 13), seed) + .4 * make_noise(scaled(p, 45), seed + 1) +
+/* Relief like chiselled stone: broad bumps with finer marks. */
+static double carve_stone(make_point p, uint64_t seed, double amount) {
+    return amount * (make_noise(scale_point(p, 13), seed) + .4 * make_noise(scale_point(p, 45), seed + 1) +
                      .16 * make_noise(make_p(p.x * 110, p.y * 40, p.z * 110), seed + 2));
 }
 
@@ -100,19 +101,19 @@ static const ellipsoid torso[] = {
     {.075, .345, -.07, .085, .085, .068, 0, .035},
 };
 
-static double torso_value(const void *user, make_point p) {
+static double evaluate_torso(const void *user, make_point p) {
     const sculpture *r = user;
     double twist = .7 * (p.y - .4), c = cos(twist), s = sin(twist);
     make_point q = make_p(c * p.x + s * p.z - .03 * sin(5 * p.y), p.y, c * p.z - s * p.x);
-    double f = unite_blobs(r->blobs, r->blob_count, q);
-    f = meet(f, p.y - .945, .015);
-    f = unite(f, drum(p, .25, -.06, .07, .03), .03);
-    if (fabs(f) < .02) f -= stone(p, r->seed, .0028);
-    return meet(f, -p.y, .01);
+    double f = unite_all_blobs(r->blobs, r->blob_count, q);
+    f = intersect_fields(f, p.y - .945, .015);
+    f = unite_fields(f, measure_drum(p, .25, -.06, .07, .03), .03);
+    if (fabs(f) < .02) f -= carve_stone(p, r->seed, .0028);
+    return intersect_fields(f, -p.y, .01);
 }
 
-/* Two strands in every half-plane about the axis: a trefoil. Each is a twisted rope. */
-static double knot_value(const void *user, make_point p) {
+/* A trefoil: two strands cross every half-plane about the axis. Each strand is a twisted rope. */
+static double evaluate_knot(const void *user, make_point p) {
     const sculpture *r = user;
     double x = p.x, y = p.y - .56, z = p.z, ring = .285, wind = .115, tube = .082;
     double rho = fmax(sqrt(x * x + y * y), .05), phi = atan2(y, x) + TURN / 4, best = 1;
@@ -122,29 +123,29 @@ static double knot_value(const void *user, make_point p) {
         double rope = .0075 * cos(7 * around + 15 * phi);
         double rings = .0013 * cos(108 * phi);
         double fade = distance < tube ? distance / tube : 1;
-        best = unite(best, distance - tube - fade * fade * (rope + rings), .012);
+        best = unite_fields(best, distance - tube - fade * fade * (rope + rings), .012);
     }
     best *= .8;
-    if (fabs(best) < .01) best -= .0012 * make_noise(scaled(p, 70), r->seed);
-    best = unite(best, drum(p, .17, -.06, .09, .03), .05);
-    return meet(best, -p.y, .01);
+    if (fabs(best) < .01) best -= .0012 * make_noise(scale_point(p, 70), r->seed);
+    best = unite_fields(best, measure_drum(p, .17, -.06, .09, .03), .05);
+    return intersect_fields(best, -p.y, .01);
 }
 
-static double gyroid_value(const void *user, make_point p) {
+static double evaluate_gyroid(const void *user, make_point p) {
     const sculpture *r = user;
     double k = TURN / .34, y = p.y - .52, radius = sqrt(p.x * p.x + y * y + p.z * p.z);
     double a = k * p.x + .4, b = k * y + .9, c = k * p.z;
     double g = sin(a) * cos(b) + sin(b) * cos(c) + sin(c) * cos(a);
-    double wall = sqrt(g * g + .01) / (1.5 * k) - (.022 + .012 * make_noise(scaled(p, 3), r->seed + 5));
-    double f = meet(wall, radius - .44, .02);
-    f = unite(f, radius - .16, .04);
-    if (fabs(f) < .01) f -= .0012 * make_noise(scaled(p, 60), r->seed);
-    f = unite(f, drum(p, .16, -.06, .13, .03), .05);
-    return meet(f, -p.y, .01);
+    double wall = sqrt(g * g + .01) / (1.5 * k) - (.022 + .012 * make_noise(scale_point(p, 3), r->seed + 5));
+    double f = intersect_fields(wall, radius - .44, .02);
+    f = unite_fields(f, radius - .16, .04);
+    if (fabs(f) < .01) f -= .0012 * make_noise(scale_point(p, 60), r->seed);
+    f = unite_fields(f, measure_drum(p, .16, -.06, .13, .03), .05);
+    return intersect_fields(f, -p.y, .01);
 }
 
-/* Whorls of a cone that grow by `growth` a turn, ribbed; the mouth is where the largest ends. */
-static double shell_value(const void *user, make_point p) {
+/* A ribbed spiral cone that grows by `growth` per turn. The mouth is at the end of the largest turn. */
+static double evaluate_shell(const void *user, make_point p) {
     const sculpture *r = user;
     const double growth = 1.32, rate = log(growth) / TURN, largest = .235, top = 1.03, slope = 2.85;
     double rho = sqrt(p.x * p.x + p.z * p.z), phi = atan2(p.z, p.x), f = 1;
@@ -157,16 +158,17 @@ static double shell_value(const void *user, make_point p) {
         if (first > end || s < .008) continue;
         double u = rho - s, v = p.y - (top - slope * s), around = atan2(v, u);
         double rib = 1 + .045 * cos(14 * first) + .02 * cos(9 * around);
-        f = unite(f, (sqrt(u * u + v * v) - .62 * s * rib), .06 * s);
+        f = unite_fields(f, (sqrt(u * u + v * v) - .62 * s * rib), .06 * s);
     }
     double dx = p.x - ends[0], dy = p.y - ends[1], dz = p.z - ends[2];
     double mouth = sqrt(dx * dx + dy * dy + dz * dz);
     f = fmin(f, mouth - .61 * largest);
-    f = meet(f, .47 * largest - sqrt(pow(dx + .05, 2) + dy * dy + pow(dz - .09, 2)), .03);
+    f = intersect_fields(f, .47 * largest - sqrt(pow(dx + .05, 2) + dy * dy + pow(dz - .09, 2)), .03);
     f *= .75;
-    if (fabs(f) < .01) f -= .0018 * make_noise(scaled(p, 55), r->seed);
-    f = unite(f, unite(drum(p, .21, -.06, .08, .03), drum(p, .075, 0, .34, .02), .08), .05);
-    return meet(f, -p.y, .01);
+    if (fabs(f) < .01) f -= .0018 * make_noise(scale_point(p, 55), r->seed);
+    f = unite_fields(
+        f, unite_fields(measure_drum(p, .21, -.06, .08, .03), measure_drum(p, .075, 0, .34, .02), .08), .05);
+    return intersect_fields(f, -p.y, .01);
 }
 
 enum { HEAD = 16 };
@@ -192,25 +194,26 @@ static const ellipsoid bust[] = {{0, .765, -.02, .118, .14, .15, 0, 0},        /
                                  {-.042, .735, .102, .022, .019, .02, 0, 0},
                                  {.042, .735, .102, .022, .019, .02, 0, 0}};
 
-static double bust_value(const void *user, make_point p) {
+static double evaluate_bust(const void *user, make_point p) {
     const sculpture *r = user;
     double turn = .35 * fmax(0, fmin(1, (p.y - .4) * 5)), c = cos(turn), s = sin(turn);
     make_point q = make_p(c * p.x - s * p.z, p.y, c * p.z + s * p.x);
-    double f = unite_blobs(r->blobs, HEAD, q);
-    for (int k = 0; k < 2; ++k) f = meet(f, -blob_value(r->blobs + HEAD + k, q, .022 - f), .022);
-    for (int k = 0; k < 2; ++k) f = unite(f, blob_value(r->blobs + HEAD + 2 + k, q, f + .006), .006);
-    /* hair where the skull is, away from the face */
+    double f = unite_all_blobs(r->blobs, HEAD, q);
+    for (int k = 0; k < 2; ++k)
+        f = intersect_fields(f, -measure_blob(r->blobs + HEAD + k, q, .022 - f), .022);
+    for (int k = 0; k < 2; ++k) f = unite_fields(f, measure_blob(r->blobs + HEAD + 2 + k, q, f + .006), .006);
+    /* Hair covers the skull, but not the face. */
     double hair = fmax(0, fmin(1, (q.y - .69 - .75 * fmax(0, q.z)) * 14)) * (q.z < .11 ? 1 : 0);
     if (hair > 0 && fabs(f) < .04) {
-        double curl = sin(58 * q.y + 6 * make_noise(scaled(q, 11), r->seed) + 26 * q.z) *
-                      cos(46 * q.x + 5 * make_noise(scaled(q, 9), r->seed + 3));
+        double curl = sin(58 * q.y + 6 * make_noise(scale_point(q, 11), r->seed) + 26 * q.z) *
+                      cos(46 * q.x + 5 * make_noise(scale_point(q, 9), r->seed + 3));
         f -= hair * (.011 + .0075 * curl);
     }
-    f = meet(f, .155 - p.y, .03);
-    f = unite(f, drum(p, .1, .03, .2, .02), .03);
-    f = unite(f, drum(p, .15, -.06, .05, .02), .03);
-    if (fabs(f) < .01) f -= stone(p, r->seed, .0012);
-    return meet(f, -p.y, .01);
+    f = intersect_fields(f, .155 - p.y, .03);
+    f = unite_fields(f, measure_drum(p, .1, .03, .2, .02), .03);
+    f = unite_fields(f, measure_drum(p, .15, -.06, .05, .02), .03);
+    if (fabs(f) < .01) f -= carve_stone(p, r->seed, .0012);
+    return intersect_fields(f, -p.y, .01);
 }
 
 int make_statue_mesh(make_mesh *m, make_statue statue, uint32_t triangles, uint64_t seed) {
@@ -218,19 +221,20 @@ int make_statue_mesh(make_mesh *m, make_statue statue, uint32_t triangles, uint6
     if (statue == MAKE_TORSO) add_blobs(&r, torso, sizeof torso / sizeof *torso);
     if (statue == MAKE_BUST) add_blobs(&r, bust, sizeof bust / sizeof *bust);
     const make_field fields[MAKE_STATUES] = {
-        {torso_value, &r, 1.6, {-.40, 0, -.32}, {.40, 1.0, .32}},
-        {knot_value, &r, 2.4, {-.52, 0, -.24}, {.52, 1.1, .24}},
-        {gyroid_value, &r, 1.7, {-.47, 0, -.47}, {.47, 1.0, .47}},
-        {shell_value, &r, 1.9, {-.48, 0, -.48}, {.48, 1.06, .48}},
-        {bust_value, &r, 2.2, {-.36, 0, -.22}, {.36, .96, .24}},
+        {evaluate_torso, &r, 1.6, {-.40, 0, -.32}, {.40, 1.0, .32}},
+        {evaluate_knot, &r, 2.4, {-.52, 0, -.24}, {.52, 1.1, .24}},
+        {evaluate_gyroid, &r, 1.7, {-.47, 0, -.47}, {.47, 1.0, .47}},
+        {evaluate_shell, &r, 1.9, {-.48, 0, -.48}, {.48, 1.06, .48}},
+        {evaluate_bust, &r, 2.2, {-.36, 0, -.22}, {.36, .96, .24}},
     };
     return make_surface(m, fields + statue, triangles);
 }
 
-/* ---- The vase ---- */
+/* --- The vase --- */
 
-/* Radius and height at s in [0, 1]: the foot's middle, up the outside, over the lip, down the inside. */
-static void vase_profile(double s, double *radius, double *height, double *flute) {
+/* Radius and height of the vase at s in [0, 1]: from the middle of the foot up the outside, over the lip,
+ * down the inside. */
+static void find_vase_profile(double s, double *radius, double *height, double *flute) {
     static const double knots[][2] = {
         {0, 0},       {.13, 0},    {.155, .012}, {.15, .035}, {.085, .07}, {.075, .1},  {.12, .17},
         {.21, .32},   {.245, .47}, {.225, .62},  {.15, .76},  {.095, .84}, {.09, .89},  {.13, .95},
@@ -253,7 +257,7 @@ static void vase_profile(double s, double *radius, double *height, double *flute
 }
 
 void make_vase(make_mesh *m, uint32_t triangles) {
-    /* 2 segments (rows - 1) triangles with both poles: the pair that comes nearest */
+    /* Choose segments and rows so that the number of triangles is as close as possible. */
     uint32_t best_segments = 24, best_rows = 8;
     double best = INFINITY, ideal = sqrt(.4 * triangles);
     for (uint32_t segments = (uint32_t)fmax(12, .75 * ideal); segments <= fmax(16, 1.3 * ideal); ++segments) {
@@ -265,7 +269,7 @@ void make_vase(make_mesh *m, uint32_t triangles) {
     make_reserve(m, (size_t)segments * rows, (size_t)2 * segments * rows);
     for (uint32_t j = 0; j <= rows; ++j) {
         double radius, height, flute;
-        vase_profile((double)j / rows, &radius, &height, &flute);
+        find_vase_profile((double)j / rows, &radius, &height, &flute);
         bool pole = j == 0 || j == rows;
         for (uint32_t i = 0; i < (pole ? 1 : segments); ++i) {
             double angle = TURN * i / segments, wave = cos(18 * angle + 7 * height);

@@ -12,8 +12,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "tools/render/point.h"
-
 enum {
     SUBPIXEL = 12, /* bits of a pixel's fraction */
     ONE = 1 << SUBPIXEL,
