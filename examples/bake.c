@@ -1,19 +1,19 @@
-/* Lights a small room made in memory, keeps the light as colours of vertices, and throws most triangles away.
+/* Computes the light in a small room, stores it as vertex colours, and simplifies the mesh.
  *
- * Writes room.ply, with sRGB colours for viewers and the light itself as radiosity_r, _g, _b. In a closed
- * room what the lamp gives is absorbed: the example checks the balance.
+ * Writes room.ply with sRGB colours for viewers and the light as radiosity_r, _g, _b. A closed room absorbs
+ * all light of the lamp: the example checks the balance.
  */
 #include <math.h>
 #include <stdio.h>
 
 #include <facetree/facetree.h>
 
-static void say(void *user, fct_severity severity, const char *text) {
+static void print_error(void *user, fct_severity severity, const char *text) {
     (void)user;
     if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
 }
 
-/* A box of the given half sizes about a center; inwards: a room, seen from inside. */
+/* Adds a box. inwards: the faces look inside, as the walls of a room. */
 static fct_result add_box(fct_scene *scene, const fct_env *env, const char *name, const float center[3],
                           const float half[3], bool inwards, uint32_t material) {
     static const uint32_t corners[36] = {0, 4, 6, 6, 2, 0, 1, 3, 7, 7, 5, 1, 0, 1, 5, 5, 4, 0,
@@ -56,7 +56,7 @@ static bool report(const fct_bake_stats *stats) {
 
 int main(void) {
     fct_env env = fct_env_default();
-    env.message = say;
+    env.message = print_error;
     fct_scene *scene = NULL;
     fct_bake *bake = NULL;
     fct_mesh lit = {0}, small = {0};

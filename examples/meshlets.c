@@ -1,7 +1,7 @@
-/* What a game engine takes from a mesh: meshlets for a mesh shader, culled for one eye as the shader would,
- * and charts for a lightmap with their neighbours.
+/* Prepares a mesh for a game engine: meshlets, culled for one eye as a mesh shader does, and charts for a
+ * lightmap with their neighbours.
  *
- * usage: meshlets [MESH]      without a mesh it makes a torus
+ * usage: meshlets [MESH]      default: a torus
  */
 #include <math.h>
 #include <stdio.h>
@@ -9,12 +9,12 @@
 
 #include <facetree/facetree.h>
 
-static void say(void *user, fct_severity severity, const char *text) {
+static void print_error(void *user, fct_severity severity, const char *text) {
     (void)user;
     if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
 }
 
-/* n by m quads around a torus, two triangles each. */
+/* A torus of n x m quads, with two triangles each. */
 static fct_result make_torus(const fct_env *env, uint32_t n, uint32_t m, fct_mesh *mesh) {
     fct_result result = fct_mesh_create(env, n * m, 2 * n * m, 0, mesh);
     if (result != FCT_OK) return result;
@@ -74,7 +74,7 @@ static fct_result show_charts(const fct_env *env, const fct_tree *tree, const fc
 
 int main(int argc, char **argv) {
     fct_env env = fct_env_default();
-    env.message = say;
+    env.message = print_error;
     fct_mesh mesh;
     if ((argc > 1 ? fct_mesh_load(&env, argv[1], &mesh) : make_torus(&env, 120, 60, &mesh)) != FCT_OK)
         return 1;

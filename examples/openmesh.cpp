@@ -1,9 +1,9 @@
-// Clusters a mesh of OpenMesh's, keeps the cluster of each face and its plane as properties, and writes the
-// mesh with a colour for each cluster through OpenMesh's writers.
+// Clusters an OpenMesh mesh, stores the cluster and the plane of each face as properties, and writes the mesh
+// with a colour per cluster.
 //
 // usage: openmesh [IN [OUT [CLUSTERS]]]
-// Without a mesh it makes a bumpy sphere; OUT is clusters.off, or what OpenMesh writes face colours to: .off,
-// .ply, .om.
+// Default: a bumpy sphere, clusters.off and 100 clusters. OUT needs a format for which OpenMesh writes face
+// colours: .off, .ply or .om.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -17,7 +17,7 @@
 
 typedef OpenMesh::TriMesh_ArrayKernelT<> Mesh;
 
-// n rings of 2n quads about the axis between two poles.
+// n rings of 2n quads between two poles.
 static Mesh make_sphere(int n) {
     Mesh mesh;
     auto add = [&](int ring, int place) {
@@ -41,7 +41,7 @@ static Mesh make_sphere(int n) {
     return mesh;
 }
 
-// The largest distance of a vertex to the plane of a cluster it belongs to, over the properties alone.
+// The largest distance from a vertex to the plane of one of its clusters, computed from the properties.
 static double largest_distance(const Mesh &mesh, const OpenMesh::FProp<OpenMesh::Vec4f> &plane) {
     double largest = 0;
     for (auto face : mesh.faces())

@@ -1,6 +1,6 @@
-/* Clusters a surface, writes the hierarchy to a file, opens it again and cuts it into 64 parts.
+/* Clusters a mesh, writes the hierarchy to a file, opens it again, and cuts the mesh into 64 clusters.
  *
- * usage: partition [MESH]      without a mesh it makes a torus
+ * usage: partition [MESH]      default: a torus
  */
 #include <math.h>
 #include <stdio.h>
@@ -8,12 +8,12 @@
 
 #include <facetree/facetree.h>
 
-static void say(void *user, fct_severity severity, const char *text) {
+static void print_error(void *user, fct_severity severity, const char *text) {
     (void)user;
     if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
 }
 
-/* n by m quads around a torus, two triangles each. */
+/* A torus of n x m quads, with two triangles each. */
 static fct_result make_torus(const fct_env *env, uint32_t n, uint32_t m, fct_mesh *mesh) {
     fct_result result = fct_mesh_create(env, n * m, 2 * n * m, 0, mesh);
     if (result != FCT_OK) return result;
@@ -45,7 +45,7 @@ static void print_clusters(const fct_tree *tree, const uint32_t *nodes, uint32_t
 int main(int argc, char **argv) {
     enum { PARTS = 64 };
     fct_env env = fct_env_default();
-    env.message = say;
+    env.message = print_error;
     fct_mesh mesh;
     if ((argc > 1 ? fct_mesh_load(&env, argv[1], &mesh) : make_torus(&env, 120, 60, &mesh)) != FCT_OK)
         return 1;

@@ -1,6 +1,6 @@
-/* Shoots rays at a bumpy sphere from inside and finds the nearest point of its surface.
+/* Shoots rays from the middle of a bumpy sphere and finds the nearest point of its surface.
  *
- * Every ray from the middle must hit: the surface is closed and the triangles are watertight.
+ * Every ray must hit, because the surface is closed and the intersection test is watertight.
  */
 #include <math.h>
 #include <stdio.h>
@@ -10,12 +10,12 @@
 
 enum { RINGS = 100, SPOKES = 200, RAYS = 100000 };
 
-static void say(void *user, fct_severity severity, const char *text) {
+static void print_error(void *user, fct_severity severity, const char *text) {
     (void)user;
     if (severity == FCT_MESSAGE_ERROR) fprintf(stderr, "%s\n", text);
 }
 
-/* A grid over latitude and longitude, closed by one vertex at each pole. */
+/* A grid over latitude and longitude, with one vertex at each pole. */
 static void fill_sphere(fct_mesh *mesh) {
     uint32_t north = RINGS * SPOKES, south = north + 1, *t = mesh->triangles;
     for (uint32_t i = 0; i < RINGS + 2; ++i)
@@ -57,7 +57,7 @@ static uint32_t shoot(const fct_bvh *bvh) {
 
 int main(void) {
     fct_env env = fct_env_default();
-    env.message = say;
+    env.message = print_error;
     fct_mesh mesh;
     if (fct_mesh_create(&env, RINGS * SPOKES + 2, 2 * RINGS * SPOKES, 0, &mesh) != FCT_OK) return 1;
     fill_sphere(&mesh);

@@ -2,7 +2,7 @@
  *
  * 1. Compute the cost of every edge (in parallel) and queue the edges by it.
  * 2. Pop the cheapest edge and compute its cost again. Quadrics only grow, so the queued cost is a lower
- * bound: an edge whose cost has grown returns to the queue.
+ *    bound: an edge whose cost has grown returns to the queue.
  * 3. Refuse edges that fail a check or cost more than max_error. They return when a contraction changes their
  *    surroundings.
  * 4. Contract, and merge edges that became twins.

@@ -1,11 +1,11 @@
 /* simplify/refit.c: see refit.h. Each pass:
  *
- * 1. Samples are the corners (weight 1/12 of the face's area) and centroids (weight 3/4) of the input's
- * faces. Each finds the nearest point of the faces around the points that its corners were contracted to.
- * 2. Each point takes one damped least-squares step along the directions to its samples, each attribute a
- * step towards their values. Steps that would fold a face over are left out. The search is parallel; the sums
- * run in the order of the samples, so the result does not depend on the threads. Cost of a pass: O(samples *
- * valence).
+ * 1. Samples are the corners (1/12 of the face's area) and centroids (3/4) of the input's faces. Each finds
+ *    the nearest point of the faces around the points that its corners were contracted to.
+ * 2. Each point takes one damped least-squares step along the directions to its samples. Each attribute takes
+ *    a step towards their values. Steps that would fold a face over are left out.
+ * The search is parallel. The sums run in the order of the samples, so the result does not depend on the
+ * threads. Cost of a pass: O(samples * valence).
  */
 #include "simplify/refit.h"
 

@@ -1,14 +1,14 @@
 /* simplify/state.h: the data of one run: points, wedges, corners, edges and their quadrics.
  *
- *          corner 3f+2                A point is a place. Input vertices at one place share a point (weld.c).
- *              /\                     A wedge is one attribute value at a point. A smooth point has one
- * wedge; /  \   side c goes      a point on a crease or texture seam has several. Wedges of a point move /  f
- * \  from corner c    together, so seams cannot crack. A mesh without attributes has exactly corner
- * /______\ to the next      one wedge per point, with the same number. c = 3f           corner c+1
+ *          corner 3f+2          Point: a place. Input vertices at one place share a point (weld.c).
+ *              /\               Wedge: an attribute value at a point. A smooth point has one wedge, a point
+ *             /  \              on a crease or a texture seam has several. The wedges of a point move
+ *            /  f \             together, so seams cannot crack. A mesh without attributes has exactly one
+ *           /______\            wedge per point, with the same number.
+ *    corner 3f   corner 3f+1    Side c: from corner c to the next corner of the face.
  *
  * A contraction moves the corners of one point to another. A removed face has triangles[3f] == FCT_NONE; its
- * corners stay in the rings until fct_simplify_gather drops them. Positions lie in the unit cube that is
- * centred at the origin.
+ * corners stay in the rings until fct_simplify_gather drops them. The longest side of the bounds is 1.
  */
 #ifndef FCT_SIMPLIFY_STATE_H
 #define FCT_SIMPLIFY_STATE_H

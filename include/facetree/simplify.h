@@ -1,7 +1,8 @@
-/* facetree/simplify.h: quadric simplification with attributes.
+/* facetree/simplify.h: simplifies a mesh by edge contractions, and keeps its shape and attributes.
  *
- * Source: Garland, "Quadric-Based Polygonal Surface Simplification", CMU 1999, chapters 3 and 5: iterative
- * edge contraction by n-dimensional quadrics over position and vertex colours.
+ * Quadrics measure the error of position and attributes together: vertex colours, texture coordinates and
+ * vertex normals. Source: Garland, "Quadric-Based Polygonal Surface Simplification", CMU 1999, chapters 3
+ * and 5.
  */
 #ifndef FACETREE_SIMPLIFY_H
 #define FACETREE_SIMPLIFY_H
@@ -12,60 +13,70 @@
 extern "C" {
 #endif
 
+/* The position of the point that replaces an edge (Garland 1999, section 3.5). */
 typedef enum fct_placement {
-    FCT_PLACE_OPTIMAL, /* the minimiser, else the best on the segment, else the better of ends and middle
-                          (3.5) */
-    FCT_PLACE_SEGMENT,
-    FCT_PLACE_ENDS,  /* better of both ends and the middle */
-    FCT_PLACE_SUBSET /* better of both ends */
+    FCT_PLACE_OPTIMAL, /* the minimum of the quadric; if it is more than two edge lengths away, as SEGMENT */
+    FCT_PLACE_SEGMENT, /* the minimum on the edge */
+    FCT_PLACE_ENDS,    /* the best of both ends and the midpoint */
+    FCT_PLACE_SUBSET   /* the better of both ends, with its attributes */
 } fct_placement;
 
 typedef enum fct_stop {
-    FCT_STOP_FACES,    /* the face count was reached */
-    FCT_STOP_ERROR,    /* the next contraction would cost more than max_error */
-    FCT_STOP_EXHAUSTED /* no contraction is allowed any more */
+    FCT_STOP_FACES,    /* the face count is at most target_faces */
+    FCT_STOP_ERROR,    /* every possible contraction has a larger error than max_error */
+    FCT_STOP_EXHAUSTED /* no contraction is allowed */
 } fct_stop;
 
+/* Attributes. The simplifier knows three attributes, each with a weight: vertex colours, texture coordinates
+ * and vertex normals. Positions are scaled so that the longest side of the bounds is 1. An attribute is
+ * scaled so that its range is about 1, and then multiplied by its weight. For colours this is the range from
+ * the 2nd to the 98th percentile, but at least 1/20 of the full range. A weight above 0 makes the attribute a
+ * part of the error. With weight 0 it does not count in the error and is interpolated, but its seams are
+ * still held in place. A weight has no effect if the mesh does not have the attribute. */
 typedef struct fct_simplify_def {
     uint32_t size;
-    uint32_t target_faces; /* stop at or below; default 0 */
-    double
-        max_error; /* bound on the square root of a contraction's quadric error over its area, in the mesh's
-                      unit (a root mean squared distance when no attributes are used); default infinity */
-    fct_placement placement;
-    double color_weight; /* of vertex colours against positions in the unit cube; 0: colours are interpolated
-                            but do not steer; default .1 where the mesh has colours */
-    double texcoord_weight; /* texture coordinates likewise; seams are kept; default .1 where the mesh has
-                               them */
-    double normal_weight;   /* vertex normals likewise, renormalised in the output; default .01 where the mesh
-                               has them */
-    double
-        boundary_weight; /* of the planes that hold boundary edges and colour borders (3.6); default 1000 */
-    double feature_threshold; /* face colours that differ by more in |dr| + |dg| + |db| make a border; default
-                                 .1; infinity: none */
-    double regularization;    /* gamma of the squared distance to the edge's midpoint, relative to the trace;
-                                 default 1e-9 */
-    uint32_t refit_passes;    /* passes of the vertex refit after the contractions; default 2; 0: the plain
-                                 quadric result; none with FCT_PLACE_SUBSET, whose vertices are the input's */
-    bool keep_topology;       /* refuse contractions that fail the link condition; default false */
-    bool check_foldover;      /* refuse contractions that turn a face over; default true */
+    uint32_t target_faces; /* stop at this count or below; default 0 */
+    /* Make no contraction whose error is larger; in the mesh's unit; default infinity. The error is sqrt(Q /
+     * area), where Q is the quadric at the new point and area the area of the faces in Q. Q includes
+     * attributes and constraint planes, so the error is a distance (root mean square) only if both are
+     * absent. */
+    double max_error;
+    fct_placement placement; /* default OPTIMAL */
+    double color_weight;     /* default .1 */
+    double texcoord_weight;  /* default .1 */
+    double normal_weight;    /* default .01 */
+    double boundary_weight;  /* of the constraint planes through boundaries, borders and seams (3.6); default
+                                1000 */
+    /* Two faces whose colours differ by more in |dr| + |dg| + |db| make a border; default .1; infinity: no
+     * borders. Two faces of different materials always make one. */
+    double feature_threshold;
+    /* Gamma: the weight of the squared distance to the edge's midpoint, relative to the trace of the quadric;
+     * default 1e-9. */
+    double regularization;
+    uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions; default 2.
+                              None are made with SUBSET, whose vertices are those of the input */
+    bool keep_topology;    /* refuse contractions that fail the link condition; default false */
+    bool check_foldover;   /* refuse contractions that fold a face over; default true */
 } fct_simplify_def;
 FCT_API fct_simplify_def fct_simplify_def_default(void);
 
 typedef struct fct_simplify_stats {
     uint32_t faces_before, faces_after;
     fct_stop stopped_because;
-    double max_cost; /* the largest cost of a contraction made, as max_error is measured */
+    double max_cost; /* the largest error of a contraction that was made, as max_error measures it */
     double seconds_init, seconds_contract, seconds_refit;
 } fct_simplify_stats;
 
-/* Simplifies; the result's arrays are those of the input, its faces in the input's order. Vertices with equal
- * coordinates move together whatever their attributes where open sides of their faces coincide, so doubled
- * creases and seams do not crack; doubles with equal attributes become one vertex. Bodies that only touch are
- * simplified on their own. Vertices that no face uses, and faces with two corners at one place, are dropped.
- * Colours stay within the range of the input's. A point of more than 512 faces keeps its place. Same bits on
- * every run and for every thread count. stats may be NULL. Any valid mesh, with no faces too. Errors: DATA
- * (invalid mesh; a negative or NaN option), MEMORY, CANCELLED. */
+/* Simplifies any valid mesh, also one without faces. *out has the arrays of the input, and its faces are in
+ * the order of the input.
+ *
+ * Vertices: if open sides of faces coincide, their vertices move together, also with different attributes. So
+ * doubled creases and texture seams do not crack. Doubled vertices with equal attributes become one vertex.
+ * Bodies that only touch stay apart. A point of more than 512 faces does not move. Attributes: colours,
+ * texture coordinates and normals stay within the range of each component in the input; normals then get unit
+ * length. Dropped: vertices that no face uses, and faces with two corners at one point. Every run and every
+ * thread count give the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is negative
+ * or NaN), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 

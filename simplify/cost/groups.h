@@ -1,9 +1,9 @@
-/* simplify/cost/groups.h: which wedges become one when an edge is contracted.
+/* simplify/cost/groups.h: the groups of wedges that become one when an edge is contracted.
  *
- *      a1 | a2         The faces between a and b vanish. Each of them joins a wedge of a with a wedge of b:
- *         a            here the left one joins a1 with b1, the right one a2 with b2. That makes two groups,
- * and f1 | f2         each group becomes one wedge of the new point. A wedge that no such face touches is a
- *         b            group of its own.
+ *      a1 | a2      The faces f1 and f2 between a and b vanish. Each of them joins a wedge of a with a wedge
+ *         a         of b: f1 joins a1 with b1, f2 joins a2 with b2. So there are two groups, and each group
+ *      f1 | f2      becomes one wedge of the new point. A wedge that no such face touches is a group by
+ *         b         itself.
  *      b1 | b2
  */
 #ifndef FCT_SIMPLIFY_GROUPS_H

@@ -1,7 +1,7 @@
 /* simplify/cost/loss.c: see loss.h.
  *
  * 1. List the lost points: both ends; apexes that lose their last face; middles of sides that lose theirs.
- * Each weighs a third of the area that the quadrics gathered there.
+ *    Each weighs a third of the area that the quadrics gathered there.
  * 2. Find the nearest point of the remaining faces for each.
  * 3. The quadric resists a move in this direction with n^T A n. Only the rest of the weight counts:
  *    weight * (1 - n^T A n / area), times the squared distance.

@@ -2,7 +2,7 @@
  *
  * 1. Points: vertices with equal coordinates share a place; weld.c decides which of them share a point.
  * 2. Rings: the faces in terms of points. Faces with two corners at one point are removed. Faces without area
- * but with three distinct points stay, because they connect their neighbours.
+ *    but with three distinct points stay, because they connect their neighbours.
  * 3. Wedges: the distinct (point, attributes).
  * 4. Edges, with flags for boundaries and borders.
  * Cost: linear in the corners (expected, because of hash tables). Numbers follow the order of the input.

@@ -1,5 +1,5 @@
-# `facetree render` from outside: every kind of input makes a PNG of the size asked for, the same on every run; what is wrong is
-# told with the right exit code and leaves no file.
+# tests/render/test_command.sh: `facetree render` from outside. Every kind of input makes a PNG of the requested size, with the
+# same bytes on every run. Errors give the right exit code and leave no file.
 # usage: test_command.sh PROGRAM [SANITIZERS]
 facetree=$1 sanitizers=${2:-}
 folder=$(mktemp -d)
@@ -7,9 +7,9 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder" || exit 2
 bad=0
 fail() { echo "FAILED: $*"; bad=1; }
-# Width, height and kind of colours as the header of a PNG has them.
+# Width, height and colour type from the header of a PNG.
 header() { od -An -tu1 -j16 -N10 "$1" | awk '{ print ($1 * 16777216 + $2 * 65536 + $3 * 256 + $4) "x" ($5 * 16777216 + $6 * 65536 + $7 * 256 + $8), $10 }'; }
-# How many different bytes the file has: a blank picture compresses to few.
+# The size of a file in bytes: a blank picture compresses to few.
 bytes() { wc -c <"$1"; }
 # draws NAME LEAST-BYTES ARGUMENT...: a picture of 120x90 that is not blank
 draws() {
@@ -83,7 +83,7 @@ refuses 64 sphere.ply other.ply
 refuses 66 missing.ply
 refuses 66 sphere.ply --scene missing.json
 refuses 65 empty.off --clusters 3
-# A sanitizer's own memory would not fit under the limit.
+# The memory of a sanitizer does not fit into the limit.
 [ -n "$sanitizers" ] || refuses 75 sphere.ply --max-memory 1M
 "$facetree" render sphere.ply -o no-such-folder/out.png 2>errors
 [ $? -eq 73 ] || fail "an unwritable output"

@@ -16,8 +16,7 @@ enum { WIDTH = 61, HEIGHT = 43, SAMPLES = 16, PIXELS = WIDTH * HEIGHT };
 
 static tool test_tool;
 
-/* At the origin, looking down -z, y up: a square of 2 by 2 at distance 1 would fill a picture `focal` pixels
- * wide. */
+/* At the origin, looking along -z, with y up. A square of 1 x 1 at distance 1 is `focal` pixels wide. */
 static raster_camera make_camera(void) {
     return (raster_camera){.axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}},
                            .focal = 40,
@@ -32,7 +31,7 @@ static double uniform(uint64_t *state) {
     return (double)(*state >> 11) / 9007199254740992.;
 }
 
-/* A random triangle in front of the camera, some of it out of the picture. */
+/* A random triangle in front of the camera, perhaps partly outside the picture. */
 static void random_triangle(uint64_t *state, float *positions) {
     for (int i = 0; i < 3; ++i) {
         double z = 1 + 3 * uniform(state);
@@ -76,7 +75,7 @@ static void samples_on_a_shared_side_belong_to_one_face(void **state) {
                 for (int k = 0; k < 2; ++k)
                     p[3 * i + k] = (float)(floor(p[3 * i + k] * 64) / 64 + 1. / 32) / 40 * 40;
             }
-        /* One plane, so that neither hides the other: the fourth corner is the mirror of the first. */
+        /* Both triangles lie in one plane, so neither hides the other: a parallelogram. */
         for (int k = 0; k < 3; ++k) p[9 + k] = p[3 + k] + p[6 + k] - p[k];
         if (p[11] > -.5F) continue;
         uint32_t t[6] = {0, 1, 2, 3, 2, 1};
@@ -118,7 +117,8 @@ static void coverage_is_the_area_of_the_triangle(void **state) {
     }
 }
 
-/* Along the ray through the picture's (x, y): the distance in z, or infinity; weights of the corners. */
+/* The depth where the ray through the picture's (x, y) hits a triangle, or infinity; w: the weights of the
+ * corners. */
 static double hit(const float *p, double x, double y, double w[3]) {
     double d[3] = {(x - .5 * WIDTH) / 40, (.5 * HEIGHT - y) / 40, -1}, n[3][3], sum = 0, volume = 0;
     for (int i = 0; i < 3; ++i) {
@@ -156,7 +156,8 @@ static void the_nearest_face_wins_as_a_ray_finds_it(void **state) {
         wrong += (int)lrintf(image[4 * i]) != face + 1;
         seen += face >= 0;
     }
-    /* Corners are snapped to 1/4096 pixel: a sample that close to a side may go either way. */
+    /* Corners are snapped to 1/4096 pixel: a sample within that distance of a side may belong to either face.
+     */
     assert_true(wrong <= 2 && seen > PIXELS / 2);
 }
 
@@ -165,7 +166,8 @@ static void check_point(void *user, const raster_point *point, float rgb[3]) {
     double at[3] = {0, 0, 0}, w[3];
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k) at[k] += point->weight[i] * p[3 * i + k];
-    /* The point lies in the picture where its own weights put it, and each side is as far as its line. */
+    /* Project the point that the weights give: its weights and its distances to the sides must be the same.
+     */
     double x = .5 * WIDTH - 40 * at[0] / at[2], y = .5 * HEIGHT + 40 * at[1] / at[2];
     hit(p, x, y, w);
     double screen[3][2], here[2] = {x, y};

@@ -85,11 +85,11 @@ static inline void v3_to_array(v3 p, double out[3]) {
 
 /* A bumpy sheet of 4 x 4 squares with two triangles each, 3 units wide and away from the origin.
  *
- *   row 4  equal colours    . . . . .       Column 2 has two vertices per row, one for the faces on each
- * side. row 3  equal colours    . . | . .       Texture coordinates jump along row 2. The last column of
- * squares has row 2  faint crease     . . | . .       another material, the first one clearly other face
- * colours, the top row row 1  crease           . . | . .       slightly other ones. row 0  crease           .
- * . | . .
+ *   row 4  equal colours    . . . . .    Column 2 has two vertices per row, one for the faces on each side.
+ *   row 3  equal colours    . . | . .    Texture coordinates jump along row 2. The last column of squares
+ *   row 2  faint crease     . . | . .    has another material, the first one clearly other face colours,
+ *   row 1  crease           . . | . .    and the top row slightly other ones.
+ *   row 0  crease           . . | . .
  */
 static inline fct_mesh make_sheet(const fct_env *env, unsigned arrays, uint64_t seed) {
     enum { N = 4, M = N + 1 };

@@ -1,4 +1,4 @@
-/* tests/simplify/shapes.h: meshes and measures that the tests of the simplifier share. */
+/* tests/simplify/shapes.h: meshes and measures for the tests of the simplifier. */
 #ifndef FCT_TESTS_SIMPLIFY_SHAPES_H
 #define FCT_TESTS_SIMPLIFY_SHAPES_H
 
@@ -6,7 +6,7 @@
 #include "facetree/simplify.h"
 #include "support.h"
 
-/* Simplifies to a face count and checks what must hold of every result. */
+/* Simplifies, and checks properties that every result has. */
 static inline fct_mesh simplified(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                   fct_simplify_stats *stats) {
     fct_mesh out;
@@ -53,7 +53,7 @@ static inline bool same_place(const fct_mesh *mesh, uint32_t a, uint32_t b) {
     return !memcmp(mesh->positions + 3 * (size_t)a, mesh->positions + 3 * (size_t)b, 3 * sizeof(float));
 }
 
-/* Sides whose two ends, compared by place, belong to no other face. Quadratic. */
+/* The number of sides that no other face has, compared by places. Quadratic. */
 static inline uint32_t open_sides(const fct_mesh *mesh, bool (*counts)(v3 a, v3 b)) {
     uint32_t open = 0, corners = 3 * mesh->face_count;
     for (uint32_t c = 0; c < corners; ++c) {
@@ -103,7 +103,7 @@ static inline fct_mesh make_cube(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
-/* A copy of a mesh's arrays with room for the given optional ones, zeroed. */
+/* Moves a mesh to one with the given optional arrays, which are zero. */
 static inline fct_mesh with_arrays(const fct_env *env, fct_mesh *mesh, unsigned arrays) {
     fct_mesh out;
     assert_int_equal(fct_mesh_create(env, mesh->vertex_count, mesh->face_count, arrays, &out), FCT_OK);

@@ -1,5 +1,4 @@
-/* What the surface carries: colours smooth and with borders, wedges on creases and seams, materials, normals.
- */
+/* Attributes: smooth colours and colour borders, wedges on creases and seams, materials, normals. */
 #include "shapes.h"
 
 static fct_env env;
@@ -23,7 +22,7 @@ static fct_mesh colored_grid(uint32_t n, color_of *color) {
     return grid;
 }
 
-/* Colour of a flat mesh over the unit square at (x, y), by the first face that holds the point. */
+/* The colour of a flat mesh over the unit square at (x, y), from the first face that contains the point. */
 static bool color_at(const fct_mesh *mesh, double x, double y, double rgb[3]) {
     for (uint32_t f = 0; f < mesh->face_count; ++f) {
         const uint32_t *t = mesh->triangles + 3 * (size_t)f;
@@ -40,7 +39,7 @@ static bool color_at(const fct_mesh *mesh, double x, double y, double rgb[3]) {
     return false;
 }
 
-/* Root mean square difference from the colours of the full grid. */
+/* The root mean square difference from the colours of the full grid. */
 static double color_rms(const fct_mesh *mesh, const fct_mesh *full) {
     double sum = 0;
     uint32_t count = 0;
@@ -86,7 +85,7 @@ static void disc_color(double x, double y, float rgb[3]) {
     for (int k = 0; k < 3; ++k) rgb[k] = lit ? .9f : .1f;
 }
 
-/* Vertices within .04 of the disc's rim, which is 15 % of the square. */
+/* The share of vertices within .04 of the rim of the disc. This ring is 15 % of the square. */
 static double share_at_rim(const fct_mesh *mesh) {
     uint32_t near = 0;
     for (uint32_t v = 0; v < mesh->vertex_count; ++v)
@@ -151,8 +150,8 @@ static void weight_zero_lets_colors_ride_along(void **state) {
     fct_mesh_release(&env, &colored);
 }
 
-/* A roof: two slopes that meet at the ridge x = .5, whose vertices are doubled with another colour a slope.
- */
+/* A roof: two slopes meet at the ridge x = .5. The vertices of the ridge are doubled, with one colour per
+ * slope. */
 static fct_mesh make_roof(uint32_t n) {
     fct_mesh grid = make_grid(&env, n), roof;
     uint32_t extra = n + 1, old = grid.vertex_count;
@@ -195,7 +194,7 @@ static void doubled_creases_do_not_crack(void **state) {
             if (fabs(out.positions[3 * v] - .5) < 1e-4) ++ridge[out.colors[3 * v] > .65f];
             double z = .4 - fabs(out.positions[3 * v] - .5);
             assert_float_equal(out.positions[3 * v + 2], z, 1e-4);
-            /* Each slope keeps colours of its own. */
+            /* Each slope keeps its own colours. */
             double y = out.positions[3 * v + 1], r = out.colors[3 * v];
             assert_true(fabs(r - .8) < 1e-3 || fabs(r - (.2 + .3 * y)) < 2e-3);
         }
@@ -207,7 +206,7 @@ static void doubled_creases_do_not_crack(void **state) {
 
 static void equal_doubles_become_one_vertex(void **state) {
     (void)state;
-    /* A soup: every face of a sphere has corners of its own. */
+    /* A soup: each face of a sphere has its own vertices. */
     fct_mesh sphere = make_sphere(&env, 20), soup;
     uint32_t corners = 3 * sphere.face_count;
     assert_int_equal(fct_mesh_create(&env, corners, sphere.face_count, 0, &soup), FCT_OK);
@@ -225,7 +224,7 @@ static void equal_doubles_become_one_vertex(void **state) {
 
 static void texture_seams_are_kept(void **state) {
     (void)state;
-    /* A cylinder, u runs once around with a seam where it jumps from 1 to 0. */
+    /* A cylinder: u runs once around it, with a seam where u jumps from 1 to 0. */
     enum { N = 48, M = 16 };
     fct_mesh tube;
     assert_int_equal(fct_mesh_create(&env, N * (M + 1), 2 * N * M, FCT_MESH_TEXCOORDS, &tube), FCT_OK);
@@ -259,7 +258,7 @@ static void texture_seams_are_kept(void **state) {
             low = fmin(low, out.texcoords[6 * f + 2 * k]), high = fmax(high, out.texcoords[6 * f + 2 * k]);
             seam += out.texcoords[6 * f + 2 * k] > .999f;
         }
-        assert_true(high - low < .5); /* no face runs back through the whole texture */
+        assert_true(high - low < .5); /* no face spans the whole texture */
     }
     assert_true(seam >= 2);
     /* The seam doubles no vertex. */
@@ -321,7 +320,7 @@ static void names_and_polygons_come_along(void **state) {
     grid = with_arrays(&env, &grid, FCT_MESH_MATERIALS | FCT_MESH_SOURCE_FACES);
     char *names[2] = {"stone", "glass"};
     for (uint32_t f = 0; f < grid.face_count; ++f) grid.materials[f] = f & 1, grid.source_faces[f] = 7 * f;
-    grid.material_count = 2; /* the names are not the mesh's to free */
+    grid.material_count = 2; /* the mesh does not own the names */
     fct_mesh view = grid;
     view.material_names = names;
     fct_mesh out = to_faces(&view, .5);

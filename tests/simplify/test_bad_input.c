@@ -1,4 +1,5 @@
-/* What scans and files really hold, failures of memory, cancelling, and the same bits from every run. */
+/* Degenerate and non-manifold input, hubs, bad options, failing allocations, cancelling, and equal bits from
+ * every run. */
 #include "shapes.h"
 
 static fct_env env;
@@ -42,7 +43,7 @@ static void one_triangle(void **state) {
     memcpy(mesh.positions, p, sizeof p);
     set_face(&mesh, 0, 1, 2, 3);
     fct_mesh out = to_count(&mesh, 1, NULL);
-    assert_int_equal(out.vertex_count, 3); /* unreferenced vertices go */
+    assert_int_equal(out.vertex_count, 3); /* unreferenced vertices are dropped */
     assert_memory_equal(out.positions, mesh.positions + 3, 36);
     fct_mesh_release(&env, &out);
     out = to_count(&mesh, 0, NULL);
@@ -53,7 +54,7 @@ static void one_triangle(void **state) {
 
 static void degenerate_faces(void **state) {
     (void)state;
-    /* All corners at one place, repeated ids, and all on a line. */
+    /* Faces with all corners at one place, with repeated ids, and with corners in line. */
     fct_mesh mesh = make(300, 200);
     for (uint32_t v = 0; v < 300; ++v) mesh.positions[3 * v] = v < 100 ? 0 : (float)v;
     for (uint32_t f = 0; f < 200; ++f) {
@@ -127,7 +128,7 @@ static void many_disconnected_triangles(void **state) {
     }
     fct_mesh out = to_count(&mesh, N / 10, NULL);
     assert_int_equal(out.face_count, N / 10);
-    /* The largest are left. */
+    /* The largest faces remain. */
     for (uint32_t f = 0; f < out.face_count; ++f) assert_true(v3_norm(face_cross(&out, f)) > .5);
     fct_mesh_release(&env, &out);
     fct_mesh_release(&env, &mesh);
@@ -168,7 +169,7 @@ static void duplicated_and_non_manifold_faces(void **state) {
     fct_mesh_release(&env, &out);
     fct_mesh_release(&env, &mesh);
 
-    /* Faces between any three of many points. */
+    /* Faces between random points. */
     mesh = make(60, 4000);
     uint64_t seed = 1;
     for (uint32_t i = 0; i < 180; ++i) {
@@ -193,7 +194,7 @@ static void duplicated_and_non_manifold_faces(void **state) {
     fct_mesh_release(&env, &sphere);
 }
 
-/* Every face of a fine grid has colours of its own: six wedges at every point, and a hub of many. */
+/* Each face of a fan has its own colours, so the hub has one wedge per face. */
 static void more_wedges_than_an_edge_takes(void **state) {
     (void)state;
     fct_mesh mesh = make(3 * 400, 400);

@@ -50,6 +50,7 @@ static uint32_t wedge_of(fct_simplifier *s, uint32_t c) {
 static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
     fct_simplify_def def = fct_simplify_def_default();
     def.boundary_weight = 1, def.color_weight = 1;
+    def.placement = e % 3 ? FCT_PLACE_OPTIMAL : FCT_PLACE_SUBSET;
     fct_simplifier *s = open_simplifier(&env, mesh, &def), *old = open_simplifier(&env, mesh, &def);
     uint32_t ends[2] = {s->edges[e].ends[swap], s->edges[e].ends[!swap]}, corners = 3 * mesh->face_count;
     uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]], a = ends[keep], b = ends[!keep];

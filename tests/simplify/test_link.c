@@ -56,12 +56,16 @@ static int count_open(const complex *k, uint32_t a) {
     return count;
 }
 
-/* Faces from a closed surface, a part of it, or drawn at random. */
+/* Random faces, a closed surface, a part of one, or a tetrahedron. */
 static complex make_complex(uint64_t *seed, int kind) {
     static const uint32_t octahedron[8][3] = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                                               {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+    static const uint32_t tetrahedron[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
     complex k = {0};
-    if (kind == 0) {
+    if (kind == 3) {
+        k.count = 4;
+        memcpy(k.faces, tetrahedron, sizeof tetrahedron);
+    } else if (kind == 0) {
         uint32_t reach = 5 + (uint32_t)(uniform(seed) * 6), wanted = 3 + (uint32_t)(uniform(seed) * 12);
         for (uint32_t i = 0; i < wanted; ++i) {
             uint32_t t[3];
@@ -94,8 +98,8 @@ static void contractions_keep_the_topology_by_the_link_condition(void **state) {
     (void)state;
     uint64_t seed = 51;
     uint32_t yes = 0, no = 0;
-    for (int round = 0; round < 600; ++round) {
-        complex k = make_complex(&seed, round % 3);
+    for (int round = 0; round < 800; ++round) {
+        complex k = make_complex(&seed, round % 4);
         if (k.count == 0) continue;
         fct_mesh mesh;
         assert_int_equal(fct_mesh_create(&env, POINTS, k.count, 0, &mesh), FCT_OK);

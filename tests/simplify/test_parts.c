@@ -1,11 +1,10 @@
-/* Scenes of several bodies: small and thin ones stay, those that touch stay apart, doubled creases do not
- * open.
- */
+/* Scenes with several bodies: small and thin bodies remain, touching bodies stay apart, doubled creases do
+ * not crack. */
 #include "shapes.h"
 
 static fct_env env;
 
-/* Takes both. Their vertices are not shared. */
+/* Joins two meshes and releases them. They share no vertices. */
 static fct_mesh join_meshes(fct_mesh *a, fct_mesh *b) {
     fct_mesh out;
     uint32_t vertices = a->vertex_count, faces = a->face_count;
@@ -52,7 +51,7 @@ static fct_mesh make_rod(uint32_t rings, float radius) {
     return mesh;
 }
 
-/* Extent along z of what lies right of x = 5. */
+/* The range of z of the vertices with x > 5. */
 static void right_extent(const fct_mesh *mesh, float *lower, float *upper) {
     *lower = INFINITY, *upper = -INFINITY;
     for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
@@ -85,7 +84,7 @@ static void thin_rods_keep_their_length(void **state) {
     fct_mesh_release(&env, &both);
 }
 
-/* Volume of the faces whose first vertex has this red. */
+/* The volume of the faces whose first vertex has this red. */
 static double volume_of(const fct_mesh *mesh, float red) {
     double volume = 0;
     for (uint32_t f = 0; f < mesh->face_count; ++f) {
@@ -100,7 +99,7 @@ static void colour(fct_mesh *mesh, uint32_t first, float red) {
     for (uint32_t v = first; v < mesh->vertex_count; ++v) mesh->colors[3 * (size_t)v] = red;
 }
 
-/* Each face of a mesh gets corners of its own where the normal's main axis differs. */
+/* Doubles vertices, so that only faces whose normals have the same main axis share them. */
 static fct_mesh double_creases(fct_mesh *mesh) {
     fct_mesh out;
     assert_int_equal(fct_mesh_create(&env, 6 * mesh->vertex_count, mesh->face_count, 0, &out), FCT_OK);
@@ -117,7 +116,7 @@ static fct_mesh double_creases(fct_mesh *mesh) {
     return out;
 }
 
-/* Two cubes that share the places of a side or an edge: red 0 and red 1. */
+/* Two cubes with a common side or edge, without common vertices. One has red 0, the other red 1. */
 static fct_mesh make_pair(bool edge, bool doubled) {
     fct_mesh a = make_cube(&env, 6), b = make_cube(&env, 6);
     const float one[3] = {1, 1, 1}, beside[3] = {1, 0, 0}, across[3] = {1, 1, 0};
@@ -160,7 +159,8 @@ static void touching_sides_do_not_hold_each_other(void **state) {
     fct_mesh out = simplified(&env, &both, &def, NULL);
     fct_mesh_report report;
     assert_int_equal(fct_mesh_inspect(&env, &out, &report), FCT_OK);
-    /* Were the touching sides one, the edges around them would have four faces and could not go. */
+    /* If the touching sides were joined, the edges around them would have four faces and could not be
+     * contracted. */
     assert_int_equal(out.face_count, 24);
     assert_int_equal(report.nonmanifold_edges, 0);
     fct_mesh_release(&env, &out);

@@ -1,5 +1,4 @@
-/* Real meshes: the dissertation's table 6.4, and a scan with open edges. Left out where the data is absent.
- */
+/* Real meshes: table 6.4 of the dissertation, and a scan with open edges. Skipped without the data. */
 #include "facetree/bvh.h"
 #include "shapes.h"
 

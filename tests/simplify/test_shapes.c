@@ -1,4 +1,4 @@
-/* Closed forms: shapes that go back to their fewest triangles without error, and the law of the sphere. */
+/* Closed forms: shapes that reduce to their fewest triangles without error, and the error of a sphere. */
 #include "shapes.h"
 
 static fct_env env;
@@ -21,7 +21,7 @@ static void a_cube_goes_back_to_twelve_triangles(void **state) {
     for (uint32_t i = 0; i < 24; ++i) assert_float_equal(fabs(out.positions[i] - .5), .5, 1e-5);
     fct_mesh_release(&env, &out);
 
-    /* An error bound finds the same without being told the count. */
+    /* An error bound finds the same mesh without a face count. */
     def.target_faces = 0;
     def.max_error = 1e-4;
     out = simplified(&env, &cube, &def, &stats);
@@ -48,7 +48,7 @@ static void a_flat_grid_goes_back_to_two_triangles(void **state) {
     }
     fct_mesh_release(&env, &out);
 
-    /* Without boundary planes the sheet may shrink within the bound. */
+    /* Without boundary planes the sheet may shrink within the error bound. */
     def.boundary_weight = 0;
     def.max_error = .05;
     out = simplified(&env, &grid, &def, &stats);
@@ -57,7 +57,7 @@ static void a_flat_grid_goes_back_to_two_triangles(void **state) {
     fct_mesh_release(&env, &grid);
 }
 
-/* Mean squared distance from the unit sphere, over 36 points of each face. */
+/* The mean squared distance from the unit sphere, over 36 points per face. */
 static double sphere_error(const fct_mesh *mesh) {
     enum { N = 8 };
     double sum = 0, weight = 0;
@@ -92,7 +92,8 @@ static void error_on_a_sphere_falls_with_the_square_of_the_faces(void **state) {
         double power = log(error[i] / error[i + 1]) / log(4);
         assert_true(power > 1.7 && power < 2.3);
     }
-    /* Equilateral triangles of area pi / 100, half in and half out of the sphere: about 6e-6. */
+    /* Equilateral triangles of area pi / 100, half inside and half outside the sphere, have an error of about
+     * 6e-6. */
     assert_true(error[1] < 1.5e-5);
     fct_mesh_release(&env, &sphere);
 }

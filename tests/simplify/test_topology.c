@@ -162,6 +162,27 @@ static void vertices_weld_by_the_rules(void **state) {
     assert_true(joined > 1000 && apart > 1000);
 }
 
+/* Two doubled triangles at one side: pairs of sides connect the copies to two bodies, which stay apart. */
+static void doubled_triangles_at_one_side_stay_apart(void **state) {
+    (void)state;
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 12, 4, 0, &mesh), FCT_OK);
+    const float places[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (uint32_t v = 0; v < 12; ++v) {
+        uint32_t place = v % 3 < 2 ? v % 3 : v < 6 ? 2 : 3;
+        memcpy(mesh.positions + 3 * v, places[place], 12);
+        mesh.triangles[v] = v;
+    }
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+    rules r;
+    apply_rules(&r, &mesh);
+    assert_same_partition(s->point_of, r.points, 12);
+    assert_int_equal(s->point_count, 6);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* --- A soup whose points are its places --- */
 
 static void a_large_soup_finds_its_places(void **state) {
@@ -321,6 +342,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(vertices_weld_by_the_rules),
+        cmocka_unit_test(doubled_triangles_at_one_side_stay_apart),
         cmocka_unit_test(a_large_soup_finds_its_places),
         cmocka_unit_test(wedges_are_distinct_attributes_at_points),
         cmocka_unit_test(rings_and_edges_hold_every_live_corner),

@@ -1,5 +1,5 @@
-# tests/tools/support.sh: what the scripts here share. A script gets the program as $1 and a folder of real meshes as $2, works
-# in a folder of its own, and ends with `finish`.
+# tests/tools/support.sh: functions for the scripts of this folder. A script gets the program as $1, a folder of real meshes as
+# $2 and a scale as $3. It works in a temporary folder and ends with `finish`.
 set -u
 program=$1
 data=${2:-}
@@ -17,13 +17,13 @@ fail() {
     sed 's/^/    stderr: /' err 2>/dev/null | head -n 5 >&2
 }
 
-# run ARGUMENTS...: leaves stdout in out, stderr in err, the exit code in $code (124: it hangs).
+# run ARGUMENTS...: runs the program; out holds stdout, err holds stderr, $code is the exit code (124: timeout).
 run() {
     timeout 180 "$program" "$@" >out 2>err
     code=$?
 }
 
-# expect CODE ARGUMENTS...: the exit code, and for an error one line on stderr that names the program.
+# expect CODE ARGUMENTS...: checks the exit code. An error must print one line on stderr that begins with facetree.
 expect() {
     local wanted=$1
     shift
@@ -36,13 +36,13 @@ expect() {
     fi
 }
 
-# says TEXT: the last error holds TEXT.
+# says TEXT: checks that stderr of the last run contains TEXT.
 says() {
     checks=$((checks + 1))
     grep -qF -- "$1" err || fail "expected '$1' on stderr"
 }
 
-# check DESCRIPTION COMMAND...: the command succeeds.
+# check DESCRIPTION COMMAND...: checks that the command succeeds.
 check() {
     local what=$1
     shift
@@ -50,12 +50,12 @@ check() {
     "$@" || fail "$what"
 }
 
-# value KEY [FILE]: the number or word behind the first "KEY": of a JSON file (out).
+# value KEY [FILE]: prints the number or word after the first "KEY": of a JSON file (default: out).
 value() {
     sed -n 's/^.*"'"$1"'": *"\{0,1\}\([^",}]*\).*$/\1/p' "${2:-out}" | head -n 1
 }
 
-# keys NAME...: stdout is one JSON object with these keys.
+# keys NAME...: checks that stdout is one JSON object with these keys.
 keys() {
     local key
     checks=$((checks + 1))
@@ -64,7 +64,7 @@ keys() {
     for key; do grep -q "\"$key\":" out || fail "expected the JSON key $key"; done
 }
 
-# holds EXPRESSION: awk finds it true.
+# holds EXPRESSION: checks that the awk expression is true.
 holds() {
     checks=$((checks + 1))
     awk "BEGIN { exit !($1) }" || fail "expected $1"
@@ -110,7 +110,7 @@ sphere() {
     }'
 }
 
-# cube SIZE: an OFF cube about the origin, looking outwards.
+# cube SIZE: an OFF cube about the origin, with outward faces.
 cube() {
     awk -v s="$1" 'BEGIN {
         print "OFF"; print "8 12 0"

@@ -1,10 +1,10 @@
-# tests/tools/test_bad_mesh.sh: broken mesh files give one line and exit code 65 or 66 from every command that reads meshes, and
-# no output; odd but valid meshes go through all commands.
+# tests/tools/test_bad_mesh.sh: for a broken mesh file, every command that reads meshes prints one line, returns 65 or 66, and
+# writes no output. All commands accept odd but valid meshes.
 source "$(dirname "$0")/support.sh"
 printf '0 0 9 0 0 -1\n0 0 -9 .1 .1 1\n' >rays.txt
 printf '0 0 0\n1e3 1 1\n' >points.txt
 
-# refused CODE FILE: by every command.
+# refused CODE FILE: checks that every command refuses the file.
 refused() {
     local wanted=$1 file=$2
     expect "$wanted" info "$file"
@@ -69,7 +69,7 @@ says "text.obj:1"
 expect 65 info range.obj
 says "range.obj:4"
 
-# A hierarchy file: cut, changed, foreign.
+# Hierarchy files: truncated, changed, of another format.
 expect 0 cluster cube.off -o cube.fct
 size=$(stat -c %s cube.fct)
 for keep in 0 7 64 $((size / 2)) $((size - 1)); do
@@ -91,8 +91,8 @@ for place in 200 $((size / 3)) $((size / 2)) $((size - 20)); do
     esac
 done
 
-# accepted FILE [COMMAND-NOT]: every command takes it.
-accepted() { # FILE [exit code of bake]
+# accepted FILE [CODE]: checks that every command accepts the file; bake returns CODE (default 0).
+accepted() {
     local file=$1 faces
     expect 0 info "$file" --json
     faces=$(value faces)

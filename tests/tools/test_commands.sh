@@ -1,4 +1,4 @@
-# tests/tools/test_commands.sh: what each command answers: files, JSON keys, standard input and output.
+# tests/tools/test_commands.sh: the answers of each command: files, JSON keys, standard input and output.
 source "$(dirname "$0")/support.sh"
 cube 2 >cube.off
 sphere 16 >sphere.off # 2 * 32 * 15 = 960 faces
@@ -32,7 +32,7 @@ check "--quiet says nothing" test ! -s out -a ! -s err
 expect 0 cluster sphere.off -o progress.fct --progress
 check "--progress shows a bar" grep -q '\[#' err
 
-# Several files and folders go to a folder.
+# The outputs of several files and folders go to a folder.
 mkdir in
 cp cube.off grid.off in
 cp sphere.off in/ball.off
@@ -105,7 +105,7 @@ holds "$(value faces) == 72 && $(value vertices) == 48 && $(value boundary_edges
 
 # --- raycast, closest ---
 cat >rays.txt <<'END'
-# from outside, from inside, past, too short, beginning behind
+# from outside, from inside, beside, too short, beginning behind
 .1 .2 5  0 0 -1
 0 .1 .2  1 0 0 # a comment
 5 5 5  0 0 1

@@ -98,7 +98,7 @@ says "expected a name"
 expect 64 meshlets sphere.fct
 expect 66 meshlets missing.fct -o x.json
 
-# --- odd meshes: all that is asked comes out, for every face ---
+# --- odd meshes: every face gets an answer ---
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >one.off
 printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 0\n3 0 1 2\n3 0 1 2\n3 0 1 1\n3 0 3 1\n' >odd.off
 awk 'BEGIN { print "OFF"; print 202, 200, 0; print "0 0 0"; print "0 0 1"; for (i = 0; i < 200; ++i) print cos(i / 31.83), sin(i / 31.83), .5

@@ -1,4 +1,4 @@
-# tests/tools/test_large.sh: inputs that make quadratic algorithms hang: each command must end, and right.
+# tests/tools/test_large.sh: inputs on which quadratic algorithms hang. Each command must end with the right answer.
 source "$(dirname "$0")/support.sh"
 [ "$scale" = 1 ] && many=1000000 fan=100000 || { many=$((1000000 / scale)); fan=$((100000 / scale)); }
 printf '0 0 9 0 0 -1\n' >rays.txt
@@ -31,13 +31,13 @@ through fan.off $fan 300
 awk -v n=$fan 'BEGIN { print "OFF"; print n + 2, n, 0; for (i = 0; i < n + 2; ++i) print int(i / 2), i % 2, 0
     for (i = 0; i < n; ++i) print 3, i, i + 1, i + 2 }' >strip.off
 through strip.off $fan 20000
-# Triangles that touch nothing.
+# Triangles without neighbours.
 awk -v n=$many 'BEGIN { print "OFF"; print 3 * n, n, 0; side = int(n ^ (1 / 3)) + 1
     for (i = 0; i < n; ++i) { x = i % side; y = int(i / side) % side; z = int(i / side / side)
         print x, y, z; print x + .5, y, z; print x, y + .5, z }
     for (i = 0; i < n; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }' >soup.off
 through soup.off $many 20000
-# A mesh that does not fit is clustered in parts, and the tree is as good; the limit holds for the whole process.
+# A mesh that does not fit is clustered in parts, with an equally good tree. The whole process obeys the limit.
 parts() {
     expect 0 make terrain --triangles 1000000 -o sheet.ply --max-memory 40M
     expect 0 cluster sheet.ply -o whole.fct --json
@@ -71,7 +71,7 @@ parts() {
     rm -f sheet.ply whole.fct parts.fct again.fct book.off
 }
 [ "$scale" != 1 ] || parts
-# A limit on memory is an answer, not a crash.
+# A memory limit gives an exit code, not a crash.
 expect 75 cluster soup.off -o limited.fct --max-memory 20M
 check "no output" test ! -e limited.fct
 expect 75 simplify soup.off --ratio .5 -o limited.ply --max-memory 20M

@@ -1,5 +1,5 @@
-# tests/tools/test_meshes.sh: the real meshes, where they are at hand: rays without an unexplained difference, depth, connected
-# partitions.
+# tests/tools/test_meshes.sh: the real meshes, if they are available: no unexplained difference between rays, bounded depth,
+# connected partitions.
 source "$(dirname "$0")/support.sh"
 [ -d "$data" ] || { echo "no real meshes at hand"; exit 0; }
 [ "$scale" = 1 ] && rays=1000000 || rays=$((1000000 / scale))

@@ -1,4 +1,4 @@
-# tests/tools/test_outputs.sh: outputs that cannot be written: exit code 73, before long work, and the old file stays.
+# tests/tools/test_outputs.sh: outputs that cannot be written give exit code 73 before long work, and the old file remains.
 source "$(dirname "$0")/support.sh"
 cube 1 >cube.off
 "$program" cluster cube.off -o cube.fct --quiet
@@ -36,7 +36,7 @@ cp cube.off other.off
 expect 73 cluster cube.off other.off -o plain
 check "a file is no folder" test "$(cat plain)" = old
 
-# A full disk. /dev/full accepts no byte.
+# A full disk: /dev/full accepts no bytes.
 if [ -w /dev/full ]; then
     for ending in fct txt json; do ln -s /dev/full "full.$ending"; done
     expect 73 partition cube.off -k 2 -o full.txt
@@ -47,7 +47,7 @@ if [ -w /dev/full ]; then
     code=$?
     check "standard output is full" test "$code" = 73
 fi
-# A file size limit: the write fails half-way, and the old file stays.
+# A limit on file sizes: the write fails half-way, and the old file remains.
 sphere 60 >sphere.off
 for line in 'cluster sphere.off -o old.fct' 'simplify sphere.off --ratio .9 -o old.ply' 'partition sphere.off -k 9 -o old.glb' \
     'partition sphere.off -k 3000 -o old.txt'; do
@@ -58,7 +58,7 @@ for line in 'cluster sphere.off -o old.fct' 'simplify sphere.off --ratio .9 -o o
     check "a limit on files: 73, not $code: $line" test "$code" = 73
     check "the old $file stays" test "$(cat "$file")" = old
 done
-# What is there already stays when the input is bad, and is replaced when it is good.
+# An old file remains if the input is bad, and is replaced if it is good.
 echo old >keep.ply
 expect 66 simplify missing.off --faces 6 -o keep.ply
 check "the old file stays" test "$(cat keep.ply)" = old

@@ -1,4 +1,4 @@
-# tests/tools/test_scenes.sh: bake, probes, rays and counts on scenes; and every mistake a scene file can hold.
+# tests/tools/test_scenes.sh: bake, probes, rays and counts of scenes, and mistakes in scene files.
 source "$(dirname "$0")/support.sh"
 sphere 12 | awk 'NF == 4 { print $1, $2, $4, $3; next } { print }' >inside.off # looks inwards
 cube 1 >cube.off
@@ -47,7 +47,7 @@ for bad in '0 0 0 1 0' '0 0 0 0 0 x' '0 0 0 0 0 0' '0 0 nan 0 0 1'; do
 done
 expect 66 bake furnace.json --probe missing.txt
 
-# A folder: a file an object.
+# A folder receives one file per object.
 cat >two.json <<'END'
 {"models": {"room": "inside.off", "box": "cube.off"},
  "materials": {"wall": {"reflectance": [0.5, 0.5, 0.5], "emission": [1, 1, 1]}, "grey": {"reflectance": [0.3, 0.3, 0.3]}},

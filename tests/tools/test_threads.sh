@@ -1,4 +1,4 @@
-# tests/tools/test_threads.sh: the same bytes for every number of threads, and from run to run.
+# tests/tools/test_threads.sh: every number of threads and every run give the same bytes.
 source "$(dirname "$0")/support.sh"
 [ "$scale" = 1 ] && rings=24 error=1e-4 || rings=8 error=1e-3 # instrumented code is slow
 sphere $rings | awk 'NF == 3 && NR > 2 { r = 1 + .05 * sin(40 * $1) * sin(31 * $2) * cos(23 * $3); print r * $1, r * $2, r * $3; next } { print }' >bumpy.off

@@ -1,4 +1,4 @@
-# tests/tools/test_usage.sh: help, versions, and every kind of wrong command line.
+# tests/tools/test_usage.sh: help, version, and every kind of wrong command line.
 source "$(dirname "$0")/support.sh"
 commands="bake boxes closest cluster compare info make partition raycast render simplify"
 

@@ -1,8 +1,8 @@
 /* tools/make/surface.c: the zero level of a field as a closed manifold of well-shaped triangles.
  *
  * 1. lattice.c takes the signs of the field on a lattice without ambiguous faces.
- * 2. Each sheet of the surface in a cell gets one vertex; each lattice edge that crosses the surface gets one
- * quad of the four sheets around it (dual marching cubes, Nielson 2004).
+ * 2. Each sheet of the surface in a cell gets one vertex. Each lattice edge that crosses the surface gets one
+ *    quad of the four sheets around it (dual marching cubes, Nielson 2004).
  * 3. Newton steps move the vertices to the surface; three rounds of averaging spread them evenly.
  * 4. Each quad is cut along its shorter diagonal.
  */

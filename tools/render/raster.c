@@ -2,8 +2,8 @@
  *
  * 1. Project the vertices, snap them to 1/4096 pixel, and clip faces against the near plane and a guard band.
  * 2. Edge functions are 64-bit integers, so each sample belongs to exactly one of two faces that share a
- * side. A pixel has one sample per sub-row, shifted by the van der Corput sequence: sides of any slope get as
- * many grey levels as there are samples, and a face still covers one span per sub-row.
+ *    side. A pixel has one sample per sub-row, shifted by the van der Corput sequence: sides of any slope get
+ *    as many grey levels as there are samples, and a face still covers one span per sub-row.
  * 3. A sample keeps 1/z and its face. Light is computed afterwards, once per face that a pixel sees.
  * Cost: O(V + F + covered samples). Memory: 29 bytes per vertex and face, and one band of samples.
  */

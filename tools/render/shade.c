@@ -186,8 +186,8 @@ static void light_studio(const drawing *d, const float n[3], const float to_eye[
     static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.20F, .175F, .155F},
                        key[3] = {.92F, .85F, .75F}, fill[3] = {.07F, .09F, .13F};
     float up = .5F + .5F * dot_floats(n, d->light[2]), f = fmaxf(dot_floats(n, d->light[1]), 0);
-    float k = fmaxf(dot_floats(n, d->light[0]) + .12F, 0) /
-              1.12F; /* a light with some extent reaches beyond its horizon */
+    /* The key light has some extent, so it reaches beyond the horizon of the normal. */
+    float k = fmaxf(dot_floats(n, d->light[0]) + .12F, 0) / 1.12F;
     float rim = 1 - fmaxf(dot_floats(n, to_eye), 0);
     rim = .12F * rim * rim * rim * up;
     for (int i = 0; i < 3; ++i)

@@ -1,0 +1,181 @@
+/* Tone curves, the palette, light and lines of `facetree render`, against their formulas. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tools/render/palette.h"
+#include "tools/render/shade.h"
+
+static tool test_tool;
+
+static void assert_rgb(const float got[3], double r, double g, double b, double tolerance) {
+    assert_float_equal(got[0], r, tolerance);
+    assert_float_equal(got[1], g, tolerance);
+    assert_float_equal(got[2], b, tolerance);
+}
+
+static void the_soft_curve_bends_above_the_knee(void **state) {
+    (void)state;
+    for (double x = 0; x < 30; x += .37) {
+        float grey[3] = {(float)x, (float)x, (float)x};
+        picture_apply_tone(PICTURE_TONE_SOFT, grey);
+        double want = x <= .7 ? x : 1 - .09 / (x - .4); /* continuous, with slope 1 at the knee */
+        assert_rgb(grey, want, want, want, 2e-6);
+        /* A colour keeps its peak, and its other channels fade towards it. */
+        float rgb[3] = {(float)x, (float)(.5 * x), 0};
+        picture_apply_tone(PICTURE_TONE_SOFT, rgb);
+        double white = x <= .7 ? 0 : 1 - 1 / (1 + .12 * (x - want));
+        assert_rgb(rgb, want, want * (.5 * (1 - white) + white), want * white, 2e-6);
+    }
+}
+
+static void the_filmic_curve_is_narkowiczs(void **state) {
+    (void)state;
+    for (double x = 0; x < 5; x += .1) {
+        float rgb[3] = {(float)x, 0, (float)x};
+        double want = (2.51 * x * x + .03 * x) / (2.43 * x * x + .59 * x + .14);
+        picture_apply_tone(PICTURE_TONE_FILMIC, rgb);
+        assert_rgb(rgb, fmin(want, 1), 0, fmin(want, 1), 1e-6);
+    }
+    float rgb[3] = {-1, .4F, 7};
+    picture_apply_tone(PICTURE_TONE_CLAMP, rgb);
+    assert_rgb(rgb, 0, .4, 1, 1e-7);
+}
+
+/* Linear sRGB to OKLab (Ottosson 2020). */
+static void to_oklab(const float rgb[3], double lab[3]) {
+    static const double cones[3][3] = {{.4122214708, .5363325363, .0514459929},
+                                       {.2119034982, .6806995451, .1073969566},
+                                       {.0883024619, .2817188376, .6299787005}};
+    static const double rows[3][3] = {{.2104542553, .7936177850, -.0040720468},
+                                      {1.9779984951, -2.4285922050, .4505937099},
+                                      {.0259040371, .7827717662, -.8086757660}};
+    double root[3];
+    for (int i = 0; i < 3; ++i)
+        root[i] = cbrt(cones[i][0] * rgb[0] + cones[i][1] * rgb[1] + cones[i][2] * rgb[2]);
+    for (int i = 0; i < 3; ++i) lab[i] = rows[i][0] * root[0] + rows[i][1] * root[1] + rows[i][2] * root[2];
+}
+
+static void the_palette_has_twelve_even_hues(void **state) {
+    (void)state;
+    bool seen[PALETTE] = {false};
+    for (uint32_t i = 0; i < PALETTE; ++i) {
+        float rgb[3], again[3];
+        double lab[3];
+        drawing_color(i, rgb);
+        drawing_color(i + PALETTE, again);
+        assert_memory_equal(rgb, again, sizeof rgb);
+        to_oklab(rgb, lab);
+        double chroma = hypot(lab[1], lab[2]), hue = atan2(lab[2], lab[1]) / 6.283185307179586;
+        double step = (hue - floor(hue)) * PALETTE - .4;
+        uint32_t number = (uint32_t)lrint(step);
+        assert_true(number < PALETTE && !seen[number]);
+        seen[number] = true;
+        assert_float_equal(step, number, .02);
+        assert_float_equal(lab[0], (number % 2 ? .68 : .80), 2e-3);
+        assert_float_equal(chroma, (number % 2 ? .12 : .10), 2e-3);
+    }
+}
+
+/* Two squares that meet along the y axis; the right one is turned up by `degrees`. */
+static drawing make_roof(double degrees, float *positions, uint32_t *triangles) {
+    double turn = degrees * 3.14159265358979323846 / 180, c = cos(turn), s = sin(turn);
+    const float p[18] = {-1, 0, 0, 0, 0, 0, 0, 1, 0, -1, 1, 0, (float)c, 0, (float)s, (float)c, 1, (float)s};
+    const uint32_t t[12] = {0, 1, 2, 0, 2, 3, 1, 4, 5, 1, 5, 2};
+    memcpy(positions, p, sizeof p);
+    memcpy(triangles, t, sizeof t);
+    return (drawing){
+        .mesh = {.vertex_count = 6, .face_count = 4, .positions = positions, .triangles = triangles},
+        .shading = DRAWING_SMOOTH,
+        .exposure = 1};
+}
+
+static void normals_are_smooth_below_the_crease_angle(void **state) {
+    (void)state;
+    for (int sharp = 0; sharp < 2; ++sharp) {
+        float positions[18];
+        uint32_t triangles[12];
+        double degrees = sharp ? 42 : 38, turn = degrees * 3.14159265358979323846 / 180;
+        drawing d = make_roof(degrees, positions, triangles);
+        assert_int_equal(drawing_prepare(&test_tool, &d, cos(40 * 3.14159265358979323846 / 180), false),
+                         TOOL_DONE);
+        const float *at_ridge = d.normals + 9 * 0 + 3 * 1; /* face 0, vertex 1 */
+        /* Around vertex 1: faces 0, 2 and 3, of equal area. */
+        double x = sharp ? 0 : -2 * sin(turn), z = sharp ? 1 : 1 + 2 * cos(turn), length = hypot(x, z);
+        assert_rgb(at_ridge, x / length, 0, z / length, 1e-6);
+        assert_rgb(d.normals, 0, 0, 1, 1e-6);
+        d.mesh = (fct_mesh){0};
+        tool_release(&test_tool, d.normals);
+    }
+}
+
+static void baked_colors_are_shown_as_light(void **state) {
+    (void)state;
+    float positions[18], colors[18] = {0}, glow[12] = {0}, rgb[3];
+    uint32_t triangles[12];
+    uint8_t lines[4] = {0, 0, 2, 0};
+    drawing d = make_roof(0, positions, triangles);
+    d.mesh.colors = colors, d.shading = DRAWING_LIGHT, d.tone = PICTURE_TONE_CLAMP, d.exposure = .5F;
+    for (int k = 0; k < 3; ++k) colors[3 + k] = .2F * (float)k, colors[12 + k] = .6F, colors[15 + k] = .1F;
+    raster_point point = {.face = 2, .weight = {.5, .3, .2}, .side = {9, 9, 9}};
+    drawing_shade(&d, &point, rgb);
+    for (int k = 0; k < 3; ++k) assert_float_equal(rgb[k], .5 * (.5 * .2 * k + .3 * .6 + .2 * .1), 1e-6);
+    d.glow = glow, glow[6] = .4F;
+    drawing_shade(&d, &point, rgb);
+    assert_float_equal(rgb[0], .5 * (.2 + .4), 1e-6);
+    /* A line darkens by 80 %, and ends half a pixel beyond its width. */
+    d.lines = lines, d.line_width = .6F;
+    const double sides[4] = {0, .6, .85, 1.2}, covers[4] = {1, .5, .25, 0};
+    for (int i = 0; i < 4; ++i) {
+        point.side[1] = sides[i];
+        drawing_shade(&d, &point, rgb);
+        assert_float_equal(rgb[0], .3 * (1 - .8 * covers[i]), 1e-6);
+    }
+}
+
+/* The studio's light on a flat face with the normal (0, 0, 1), from its parts. */
+static void studio_light_is_a_sum_of_lamps(void **state) {
+    (void)state;
+    const double sky[3] = {.30, .335, .40}, ground[3] = {.20, .175, .155}, key[3] = {.92, .85, .75},
+                 fill[3] = {.07, .09, .13}, plaster[3] = {.62, .59, .55}, inside[3] = {.62, .52, .46};
+    float positions[18], rgb[3];
+    uint32_t triangles[12];
+    const double eye[3] = {0, 0, 4};
+    drawing d = make_roof(0, positions, triangles);
+    d.shading = DRAWING_FLAT, d.tone = PICTURE_TONE_CLAMP, d.eye = eye;
+    const float lights[3][3] = {{0, .6F, .8F}, {.96F, 0, .28F}, {0, .8F, .6F}};
+    memcpy(d.light, lights, sizeof lights);
+    raster_point point = {
+        .face = 0, .weight = {0, 1, 0}, .side = {9, 9, 9}}; /* at the origin, below the eye */
+    for (int back = 0; back < 2; ++back) {
+        double z = back ? -1 : 1, up = .5 + .5 * .6 * z, f = fmax(.28 * z, 0),
+               k = fmax(.8 * z + .12, 0) / 1.12;
+        double rim = back ? .12 * up : 0; /* 1 - n . eye is 1 from behind, where n . eye < 0 */
+        double gloss = back ? 0 : .06 * pow(1.8 / sqrt(.36 + 1.8 * 1.8), 30);
+        point.back = back;
+        drawing_shade(&d, &point, rgb);
+        for (int i = 0; i < 3; ++i) {
+            double light = ground[i] + (sky[i] - ground[i]) * up + key[i] * k + fill[i] * f + rim;
+            assert_float_equal(rgb[i], plaster[i] * light * (back ? inside[i] : 1) + gloss, 1e-5);
+        }
+    }
+}
+
+int main(void) {
+    test_tool = (tool){.name = "test", .quiet = true};
+    tool_env_open(&test_tool);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_soft_curve_bends_above_the_knee),
+        cmocka_unit_test(the_filmic_curve_is_narkowiczs),
+        cmocka_unit_test(the_palette_has_twelve_even_hues),
+        cmocka_unit_test(normals_are_smooth_below_the_crease_angle),
+        cmocka_unit_test(baked_colors_are_shown_as_light),
+        cmocka_unit_test(studio_light_is_a_sum_of_lamps),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
