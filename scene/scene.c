@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/math/round.h"
 #include "scene/transform.h"
 
 fct_result fct_scene_create(const fct_env *env, fct_backend backend, fct_scene **out) {
@@ -363,7 +364,8 @@ static void view_the_whole(fct_scene *scene) {
     v3 toward = v3_unit(v3_make(.45, .35, .85));
     for (int c = 0; c < 3; ++c) {
         double size = (double)scene->bounds.upper[c] - scene->bounds.lower[c];
-        scene->camera.target[c] = (float)(.5 * ((double)scene->bounds.upper[c] + scene->bounds.lower[c]));
+        scene->camera.target[c] =
+            (float)fct_round(.5 * ((double)scene->bounds.upper[c] + scene->bounds.lower[c]));
         square += size * size;
     }
     double radius = fmax(.5 * sqrt(square), 1e-30);

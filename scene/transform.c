@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/env.h"
+#include "base/math/round.h"
 
 const float fct_transform_identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
@@ -107,7 +108,7 @@ fct_result fct_transform_bounds(const fct_env *env, const fct_tree *tree, const 
            tight_upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     fct_box whole = {.axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     for (int i = 0; i < 3; ++i) {
-        whole.center[i] = (float)(.5 * ((double)model->lower[i] + model->upper[i]));
+        whole.center[i] = (float)fct_round(.5 * ((double)model->lower[i] + model->upper[i]));
         float below = whole.center[i] - model->lower[i], above = model->upper[i] - whole.center[i];
         whole.half[i] = below > above ? below : above;
     }

@@ -2,6 +2,7 @@
 #ifndef FCT_BASE_SIMD_D8_H
 #define FCT_BASE_SIMD_D8_H
 
+#include "base/math/round.h"
 #include "base/math/simd.h"
 
 /* Eight doubles as two fours, whose waits overlap. */
@@ -23,6 +24,13 @@ static inline void d8_store(double *p, d8 a) {
 }
 static inline void d8_store_floats(float *p, d8 a) {
     d4_store_floats(p, a.low), d4_store_floats(p + 4, a.high);
+}
+/* Each as the nearest float. */
+static inline d8 d8_round(d8 a) {
+    float rounded[8];
+    d8_store_floats(rounded, a);
+    FCT_KEEP_STORED(rounded);
+    return d8_load_floats(rounded);
 }
 static inline d8 d8_add(d8 a, d8 b) {
     return (d8){d4_add(a.low, b.low), d4_add(a.high, b.high)};

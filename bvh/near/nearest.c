@@ -6,6 +6,7 @@
 #include "bvh/near/nearest.h"
 
 #include "base/key.h"
+#include "base/math/round.h"
 #include "base/math/simd.h"
 #include "bvh/near/triangle.h"
 
@@ -176,8 +177,9 @@ static void place_point(search *s) {
     s->rounding = 0;
     for (int k = 0; k < 3; ++k) {
         double c = (double)s->bvh->center[k], clamped = fmin(fmax(p[k], c - 1e9), c + 1e9);
-        s->at[k] = (float)clamped;
-        s->rounding += fabs((double)s->at[k] - clamped);
+        double rounded = fct_round(clamped);
+        s->at[k] = (float)rounded;
+        s->rounding += fabs(rounded - clamped);
     }
 }
 

@@ -8,6 +8,7 @@
 #include <float.h>
 
 #include "base/key.h"
+#include "base/math/round.h"
 
 /* fmax is a call, because it handles NaN. */
 static inline double greater(double a, double b) {
@@ -43,8 +44,8 @@ bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_clu
         center = v3_mad(center, 0.5 * (e->low[k] + e->high[k]) - v3_dot(point, a[k]), a[k]);
         size = greater(size, greater(fabs(e->low[k]), fabs(e->high[k])));
     }
+    center = v3_round(center);
     v3_store(cluster->box_center, center);
-    center = v3_load(cluster->box_center);
     for (int k = 0; k < 3; ++k) {
         double middle = v3_dot(center, a[k]), half = greater(e->high[k] - middle, middle - e->low[k]);
         half += 16 * DBL_EPSILON * size; /* whatever order of operations checks it */

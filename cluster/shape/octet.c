@@ -270,11 +270,7 @@ static inline void expand_axes(const fct_octet *o, d8 axes[3][3]) {
                   d8_mul(s, d8_add(xz, wy)),
                   d8_mul(s, d8_sub(yz, wx)),
                   d8_sub(one, d8_mul(s, d8_add(xx, yy)))};
-    for (int i = 0; i < 9; ++i) {
-        float rounded[8];
-        d8_store_floats(rounded, full[i]);
-        axes[i / 3][i % 3] = d8_load_floats(rounded);
-    }
+    for (int i = 0; i < 9; ++i) axes[i / 3][i % 3] = d8_round(full[i]);
 }
 
 static inline void load_row(const fct_octet_row *row, d8 p[3]) {
@@ -302,8 +298,8 @@ static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
         size = d8_max(size, d8_max(d8_abs(low[k]), d8_abs(high[k])));
     }
     for (int i = 0; i < 3; ++i) {
+        center[i] = d8_round(center[i]);
         d8_store_floats(o->words[CENTER + i], center[i]);
-        center[i] = d8_load_floats(o->words[CENTER + i]);
     }
     d8 slack = d8_mul(d8_set(16 * DBL_EPSILON), size); /* whatever order of operations checks it */
     for (int k = 0; k < 3; ++k) {

@@ -8,6 +8,7 @@
 #include <float.h>
 
 #include "base/math/eigen.h"
+#include "base/math/round.h"
 #include "partition/meshlet/ball.h"
 #include "partition/meshlet/meshlet.h"
 
@@ -47,8 +48,8 @@ static void bound_sphere(const patch *p, fct_meshlet_bounds *out) {
     v3 center;
     double radius = 0;
     fct_smallest_ball(p->points, p->vertex_count, &center, &radius);
+    center = v3_round(center), radius = 0;
     v3_store(out->center, center);
-    center = v3_load(out->center), radius = 0;
     for (uint32_t v = 0; v < p->vertex_count; ++v)
         radius = fmax(radius, v3_norm(v3_sub(p->points[v], center)));
     out->radius = radius > 0 ? round_up(radius) : 0;
@@ -68,8 +69,8 @@ static bool place_apex(const patch *p, v3 axis, double cosine, fct_meshlet_bound
         back = fmax(back, v3_dot(p->normals[i], v3_sub(center, p->corners[i])) / v3_dot(p->normals[i], axis));
     for (int attempt = 0; attempt < 16; ++attempt) {
         double front = -INFINITY;
-        v3_store(out->cone_apex, v3_mad(center, -back, axis));
-        v3 apex = v3_load(out->cone_apex);
+        v3 apex = v3_round(v3_mad(center, -back, axis));
+        v3_store(out->cone_apex, apex);
         if (!isfinite(apex.x) || !isfinite(apex.y) || !isfinite(apex.z)) return false;
         for (uint32_t i = 0; i < p->normal_count; ++i)
             front = fmax(front, v3_dot(p->normals[i], v3_sub(apex, p->corners[i])));
@@ -89,15 +90,13 @@ static void bound_cone(const patch *p, fct_meshlet_bounds *out) {
     middle = v3_unit(middle);
     if (least_dot(p, mean) > least_dot(p, middle)) middle = mean;
     if (!(least_dot(p, middle) > least_cosine)) return;
-    float axis[3];
-    v3_store(axis, middle);
-    middle = v3_load(axis);
+    middle = v3_round(middle);
     double length = v3_norm(middle), cosine = fmin(least_dot(p, middle) / length, 1);
     if (!place_apex(p, middle, cosine, out)) {
         for (int i = 0; i < 3; ++i) out->cone_apex[i] = out->center[i];
         return;
     }
-    for (int i = 0; i < 3; ++i) out->cone_axis[i] = axis[i];
+    v3_store(out->cone_axis, middle);
     out->cone_cutoff = round_up(length * sqrt(1 - cosine * cosine) + slack);
 }
 
@@ -152,14 +151,14 @@ static void bound_box(const patch *p, fct_box *out) {
     try_frames(p, axes[0], &least, frame);
     try_frames(p, v3_unit(p->vector), &least, frame);
     for (int k = 0; k < 3; ++k) {
+        frame[k] = v3_round(frame[k]);
         v3_store(out->axes[k], frame[k]);
-        frame[k] = v3_load(out->axes[k]);
     }
     measure_frame(p, frame, middle, half);
     v3 center = p->points[0];
     for (int k = 0; k < 3; ++k) center = v3_mad(center, middle[k], frame[k]);
+    center = v3_round(center);
     v3_store(out->center, center);
-    center = v3_load(out->center);
     for (int k = 0; k < 3; ++k) {
         double reach = 0, size = 0;
         for (uint32_t v = 0; v < p->vertex_count; ++v) {

@@ -11,6 +11,7 @@
 #include "radiosity/light/lamp.h"
 
 #include "base/env.h"
+#include "base/math/round.h"
 #include "cluster/tree/node.h"
 #include "radiosity/light/lamp_cut.h"
 #include "radiosity/sample.h"
@@ -193,7 +194,7 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
                .seed = item_seed,
                .base_rays = base_rays & ~FCT_LAMPS_FIXED,
                .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
-    for (int k = 0; k < 3; ++k) q.origin[k] = (float)(point[k] + offset * normal[k]);
+    for (int k = 0; k < 3; ++k) q.origin[k] = (float)fct_round(point[k] + offset * normal[k]);
     double open = add_lamps(&q, irradiance);
     if (rays) *rays += q.rays;
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;

@@ -7,6 +7,7 @@
  */
 #include "radiosity/surface/tessellate.h"
 
+#include "base/math/round.h"
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
 #include "radiosity/surface/creases.h"
@@ -114,10 +115,7 @@ static bool edge_is_too_long(const patch *c, uint32_t va, uint32_t vb) {
     double length = v3_norm(v3_sub(b, a));
     if (!(length > c->shortest)) return false;
     v3 middle = v3_scale(v3_add(a, b), .5);
-    float m[3];
-    v3_store(m, middle);
-    /* A midpoint that rounds to an end cannot split the edge. */
-    v3 rounded = v3_load(m);
+    v3 rounded = v3_round(middle); /* a midpoint that rounds to an end cannot split the edge */
     if (v3_norm2(v3_sub(rounded, a)) == 0 || v3_norm2(v3_sub(rounded, b)) == 0) return false;
     return length > c->longest || others_are_near(c, middle, length);
 }
