@@ -1,7 +1,8 @@
-/* bvh/build/leaves.c: the face clusters of at most 16 faces and 16 vertices that become leaves, packed.
+/* bvh/build/leaves.c: chooses the face clusters that become leaves, and packs them.
  *
- * Input: the cluster tree. Output: leaves in order of place, which cover every face once. A leaf holds its
- * vertices once and its corners as bytes: 256 bytes at most, about 22 a triangle on a scan. O(F).
+ * Input: the cluster tree. Output: leaves in order of place; each face is in one leaf. A leaf is the largest
+ * cluster of at most 16 faces and 16 vertices. It stores each vertex once and its corners as bytes: at most
+ * 256 bytes, about 22 bytes per triangle on a scan. O(F).
  */
 #include "bvh/build/leaves.h"
 
@@ -10,8 +11,8 @@
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
 
-/* Vertices of a leaf in order of first use; returns how many, or more than the limit as soon as that is
- * known. corners receives 3 count indices. */
+/* Lists the vertices of a leaf in order of first use and returns their number, or FCT_LEAF_VERTICES + 1 if
+ * there are too many. `corners` receives 3 * count indices into `vertices`. */
 static uint32_t gather_vertices(const fct_tree_view *view, uint32_t first, uint32_t count,
                                 uint32_t vertices[FCT_LEAF_VERTICES], uint8_t *corners) {
     uint32_t vertex_count = 0;
@@ -27,7 +28,8 @@ static uint32_t gather_vertices(const fct_tree_view *view, uint32_t first, uint3
     return vertex_count;
 }
 
-static uint32_t leaf_octets(const fct_tree *tree, uint32_t node) {
+/* Groups of eight vertices in the leaf of a cluster, or 0 if the cluster does not fit a leaf. */
+static uint32_t count_vertex_octets(const fct_tree *tree, uint32_t node) {
     uint32_t vertices[FCT_LEAF_VERTICES], count = fct_node_faces(tree, node);
     uint8_t corners[3 * FCT_LEAF_FACES];
     if (count > FCT_LEAF_FACES) return 0;
@@ -36,15 +38,16 @@ static uint32_t leaf_octets(const fct_tree *tree, uint32_t node) {
     return vertex_count > FCT_LEAF_VERTICES ? 0 : (vertex_count + 7) / 8;
 }
 
-/* Descends from the roots, left child first, to the clusters that fit a leaf. With list->nodes NULL it only
- * counts. `stack` holds depth + root_count + 1 entries. */
+/* Descends from the roots, left child first, to the clusters that fit a leaf. If list->nodes is NULL, it only
+ * counts them. `stack` has room for depth + root_count + 1 entries. *units receives the size of all leaves in
+ * units of FCT_REF_UNIT bytes. */
 static void choose_leaves(const fct_tree *tree, uint32_t *stack, fct_leaf_list *list, uint64_t *units) {
     const fct_tree_view *view = &tree->view;
     uint32_t height = 0, found = 0;
     *units = 0;
     for (uint32_t r = view->root_count; r-- > 0;) stack[height++] = view->roots[r];
     while (height) {
-        uint32_t node = stack[--height], octets = leaf_octets(tree, node);
+        uint32_t node = stack[--height], octets = count_vertex_octets(tree, node);
         if (octets == 0) {
             stack[height++] = fct_node_child(tree, node, 1);
             stack[height++] = fct_node_child(tree, node, 0);
@@ -59,6 +62,8 @@ static void choose_leaves(const fct_tree *tree, uint32_t *stack, fct_leaf_list *
     }
     list->count = found;
 }
+
+enum { PACK_CHUNK = 1024 }; /* leaves per task */
 
 typedef struct pack_job {
     fct_bvh *bvh;
@@ -92,7 +97,7 @@ static void pack_leaf(const fct_bvh *bvh, uint32_t node, fct_leaf *leaf, float b
     }
 }
 
-static void pack_range(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void pack_leaves(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     pack_job *job = user;
     for (size_t i = begin; i < end; ++i) {
@@ -118,7 +123,7 @@ fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out) {
         choose_leaves(bvh->tree, stack, &list, &units);
         bvh->leaf_bytes = (size_t)units * FCT_REF_UNIT;
         pack_job job = {bvh, &list};
-        fct_parallel_for(env, list.count, 1024, pack_range, &job);
+        fct_parallel_for(env, list.count, PACK_CHUNK, pack_leaves, &job);
         result = FCT_OK;
     }
     fct_release(env, stack);

@@ -1,29 +1,34 @@
-/* bvh/near/compare.c: how far two surfaces lie apart.
+/* bvh/near/compare.c: the distance between two surfaces, and between their colours.
  *
- * Sample points: every vertex a face uses, and samples_per_face points of every face, spread by the R2
- * sequence (steps of the plastic number) shifted by a hash of seed and face. E_avg and E_max as in Garland
- * 1999, (2.8) and (2.7). Where several faces are equally near, to a millionth of the diameter, the colour is
- * that of the face whose normal is closest to the sample's: the floor under a plinth is not compared with the
- * plinth's underside. Sums run over fixed chunks in order: the same bits for every thread count.
+ * E_max and E_avg are (2.7) and (2.8) of Garland 1999. Samples: each vertex that a face uses, and
+ * samples_per_face points per face, from the R2 sequence (powers of the plastic number) shifted by a hash of
+ * the seed and the face id.
+ *
+ * If several faces are equally near, up to TIE, the colour comes from the face whose normal is closest to the
+ * sample's. So the floor under a plinth is not compared with the underside of the plinth. Sums run over fixed
+ * chunks in order, so the thread count does not change the bits.
  */
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
 #include "bvh/near/nearest.h"
 
-enum { CHUNK = 64 };
+enum { CHUNK = 64 }; /* vertices or faces per task */
 
-/* Faces this near, in diameters, are equally near. */
+/* Steps of the R2 sequence: 1 / p and 1 / p^2 with p^3 = p + 1. */
+#define R2_U .7548776662466927
+#define R2_V .5698402909980532
+/* Faces whose distances differ by less, in diameters, are equally near. */
 #define TIE 1e-6
-/* Normals that agree better than this cosine need no search for a better one. */
+/* If the nearest face's normal has this cosine to the sample's, no other face is searched. */
 #define AGREE .99
-/* Colours up to those of this part of the surface count in full. */
+/* The colour bound is the colour that this part of the area does not exceed. */
 #define COVERED .95
 
 typedef struct sums {
     double squares, largest2;
     double color2, color_largest;
-    double bounded2, own2; /* of differences and the sample's own colours, each at most the bound */
+    double bounded2, own2; /* squares of colour differences and of own colours, each cut at the bound */
     uint64_t samples;
 } sums;
 
@@ -34,12 +39,12 @@ typedef struct compare_job {
     bool colors;
     double tie;         /* distance */
     v3 bound;           /* of colours */
-    uint32_t *vertices; /* those in use */
-    v3 *normals;        /* with colours, by vertex: the sum of its faces' area vectors */
+    uint32_t *vertices; /* that faces use */
+    v3 *normals;        /* per vertex, the sum of its faces' area vectors; NULL without colours */
     sums *parts;
 } compare_job;
 
-static v3 corner_mix(const float *data, const uint32_t *t, double u, double v) {
+static v3 mix_corners(const float *data, const uint32_t *t, double u, double v) {
     v3 a = v3_load(data + 3 * (size_t)t[0]), b = v3_load(data + 3 * (size_t)t[1]),
        c = v3_load(data + 3 * (size_t)t[2]);
     return v3_add(v3_scale(a, 1 - u - v), v3_add(v3_scale(b, u), v3_scale(c, v)));
@@ -52,13 +57,14 @@ static v3 area_vector(const fct_tree_view *view, uint32_t place) {
                     v3_sub(v3_load(view->positions + 3 * (size_t)t[2]), a));
 }
 
-/* The smaller of the sizes, channel by channel, squared and summed. */
+/* Sum of squares of the channels, each cut at the bound. */
 static double bounded_norm2(v3 color, v3 bound) {
     return v3_norm2(
         (v3){fmin(fabs(color.x), bound.x), fmin(fabs(color.y), bound.y), fmin(fabs(color.z), bound.z)});
 }
 
-static void add_color(const compare_job *job, v3 point, v3 normal, v3 color, fct_near near, sums *s) {
+static void add_color_difference(const compare_job *job, v3 point, v3 normal, v3 color, fct_near near,
+                                 sums *s) {
     const fct_tree_view *view = &job->to->view;
     v3 unit = v3_unit(normal);
     if (v3_dot(unit, v3_unit(area_vector(view, near.place))) < AGREE) {
@@ -66,21 +72,21 @@ static void add_color(const compare_job *job, v3 point, v3 normal, v3 color, fct
         if (fct_nearest_search(job->to, point, &unit, sqrt(near.distance2) + job->tie, &facing, NULL))
             near = facing;
     }
-    v3 d = v3_sub(color, corner_mix(view->colors, view->triangles + 3 * (size_t)near.place, near.u, near.v));
+    v3 d = v3_sub(color, mix_corners(view->colors, view->triangles + 3 * (size_t)near.place, near.u, near.v));
     s->color2 += v3_norm2(d);
     s->color_largest = fmax(s->color_largest, fmax(fabs(d.x), fmax(fabs(d.y), fabs(d.z))));
     s->bounded2 += bounded_norm2(d, job->bound);
     s->own2 += bounded_norm2(color, job->bound);
 }
 
-/* With colours, those of the sample and its normal, of any length. */
+/* `normal` (of any length) and `color` count only if both meshes have colours. */
 static void add_sample(const compare_job *job, v3 point, v3 normal, v3 color, sums *s) {
     fct_near near;
     if (!fct_nearest_search(job->to, point, NULL, INFINITY, &near, NULL)) return;
     s->squares += near.distance2;
     if (near.distance2 > s->largest2) s->largest2 = near.distance2;
     ++s->samples;
-    if (job->colors) add_color(job, point, normal, color, near, s);
+    if (job->colors) add_color_difference(job, point, normal, color, near, s);
 }
 
 static void sample_vertices(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -97,13 +103,13 @@ static void sample_vertices(void *user, size_t begin, size_t end, size_t chunk, 
     job->parts[chunk] = s;
 }
 
-static uint64_t hash(uint64_t x) {
+static uint64_t mix_bits(uint64_t x) {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
     x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
     return x ^ (x >> 31);
 }
 
-static double fraction(double x) {
+static double fraction_of(double x) {
     return x - floor(x);
 }
 
@@ -115,21 +121,20 @@ static void sample_faces(void *user, size_t begin, size_t end, size_t chunk, uin
     for (size_t place = begin; place < end; ++place) {
         const uint32_t *t = view->triangles + 3 * place;
         v3 normal = area_vector(view, (uint32_t)place);
-        uint64_t random = hash(job->seed + 0x9e3779b97f4a7c15u * (1 + (uint64_t)view->face_ids[place]));
+        uint64_t random = mix_bits(job->seed + 0x9e3779b97f4a7c15u * (1 + (uint64_t)view->face_ids[place]));
         double x0 = (double)(random >> 40) * 0x1p-24, y0 = (double)(random & 0xffffff) * 0x1p-24;
         for (uint32_t i = 0; i < job->samples_per_face; ++i) {
-            double u = fraction(x0 + .7548776662466927 * (i + 1.0)),
-                   v = fraction(y0 + .5698402909980532 * (i + 1.0));
+            double u = fraction_of(x0 + R2_U * (i + 1.0)), v = fraction_of(y0 + R2_V * (i + 1.0));
             if (u + v > 1) u = 1 - u, v = 1 - v;
             v3 color = {0, 0, 0};
-            if (job->colors) color = corner_mix(view->colors, t, u, v);
-            add_sample(job, corner_mix(view->positions, t, u, v), normal, color, &s);
+            if (job->colors) color = mix_corners(view->colors, t, u, v);
+            add_sample(job, mix_corners(view->positions, t, u, v), normal, color, &s);
         }
     }
     job->parts[chunk] = s;
 }
 
-static void fold(sums *total, const sums *parts, size_t count) {
+static void add_sums(sums *total, const sums *parts, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         total->squares += parts[i].squares;
         total->color2 += parts[i].color2;
@@ -141,8 +146,8 @@ static void fold(sums *total, const sums *parts, size_t count) {
     }
 }
 
-/* Writes the vertices that faces use to job->vertices, ascending, and returns how many. */
-static size_t used_vertices(compare_job *job) {
+/* Lists the vertices that faces use in job->vertices, ascending, and returns their number. */
+static size_t list_used_vertices(compare_job *job) {
     const fct_tree_view *view = &job->from->view;
     for (uint32_t i = 0; i < view->vertex_count; ++i) job->vertices[i] = 0;
     for (size_t i = 0; i < 3 * (size_t)view->face_count; ++i) job->vertices[view->triangles[i]] = 1;
@@ -152,7 +157,7 @@ static size_t used_vertices(compare_job *job) {
     return count;
 }
 
-static void sum_normals(compare_job *job) {
+static void sum_vertex_normals(compare_job *job) {
     const fct_tree_view *view = &job->from->view;
     for (uint32_t i = 0; i < view->face_count; ++i) {
         v3 n = area_vector(view, i);
@@ -163,8 +168,9 @@ static void sum_normals(compare_job *job) {
     }
 }
 
-/* Per channel, the colour that COVERED of the surface does not exceed, by the means of its faces. */
-static fct_result color_bound(const fct_env *env, const fct_tree_view *view, v3 *out) {
+/* Sets the colour bound per channel: sorts the faces by their mean colour, and takes the largest corner
+ * colour of the darkest faces that make up COVERED of the area. */
+static fct_result find_color_bound(const fct_env *env, const fct_tree_view *view, v3 *out) {
     uint64_t *keys = fct_allocate(env, view->face_count, sizeof *keys);
     uint32_t *places = fct_allocate(env, view->face_count, sizeof *places);
     fct_result result = keys && places ? FCT_OK : fct_fail_memory(env, "a comparison");
@@ -172,7 +178,7 @@ static fct_result color_bound(const fct_env *env, const fct_tree_view *view, v3 
     for (uint32_t i = 0; i < view->face_count && result == FCT_OK; ++i) area += v3_norm(area_vector(view, i));
     for (uint32_t channel = 0; channel < 3 && result == FCT_OK; ++channel) {
         for (uint32_t i = 0; i < view->face_count; ++i) {
-            v3 mean = corner_mix(view->colors, view->triangles + 3 * (size_t)i, 1. / 3, 1. / 3);
+            v3 mean = mix_corners(view->colors, view->triangles + 3 * (size_t)i, 1. / 3, 1. / 3);
             double value = channel == 0 ? mean.x : channel == 1 ? mean.y : mean.z;
             keys[i] = fct_float_key((float)fabs(value));
             places[i] = i;
@@ -192,8 +198,8 @@ static fct_result color_bound(const fct_env *env, const fct_tree_view *view, v3 
     return result;
 }
 
-/* Samples of one surface measured to the other. */
-static fct_result measure(const fct_env *env, compare_job *job, sums *total) {
+/* Measures the samples of job->from to job->to. */
+static fct_result measure_one_way(const fct_env *env, compare_job *job, sums *total) {
     const fct_tree_view *view = &job->from->view;
     size_t larger = view->vertex_count > view->face_count ? view->vertex_count : view->face_count;
     fct_result result = FCT_OK;
@@ -206,14 +212,14 @@ static fct_result measure(const fct_env *env, compare_job *job, sums *total) {
         result = fct_fail_memory(env, "a comparison");
         goto done;
     }
-    size_t used = used_vertices(job);
-    if (job->colors) sum_normals(job);
+    size_t used = list_used_vertices(job);
+    if (job->colors) sum_vertex_normals(job);
     result = fct_parallel_for_progress(env, "comparing", used, CHUNK, sample_vertices, job);
     if (result != FCT_OK) goto done;
-    fold(total, job->parts, fct_chunk_count(used, CHUNK));
+    add_sums(total, job->parts, fct_chunk_count(used, CHUNK));
     if (job->samples_per_face == 0) goto done;
     result = fct_parallel_for_progress(env, "comparing", view->face_count, CHUNK, sample_faces, job);
-    if (result == FCT_OK) fold(total, job->parts, fct_chunk_count(view->face_count, CHUNK));
+    if (result == FCT_OK) add_sums(total, job->parts, fct_chunk_count(view->face_count, CHUNK));
 done:
     fct_release(env, job->vertices);
     fct_release(env, job->parts);
@@ -221,7 +227,7 @@ done:
     return result;
 }
 
-static double ratio(double a, double b) {
+static double divide_or_zero(double a, double b) {
     return b > 0 ? a / b : 0;
 }
 
@@ -232,26 +238,27 @@ fct_result fct_mesh_compare(const fct_env *env, const fct_bvh *a, const fct_bvh 
     job.colors = a->view.colors && b->view.colors;
     double diameter = v3_norm(v3_sub(v3_load(a->bounds.upper), v3_load(a->bounds.lower)));
     job.tie = TIE * diameter;
-    fct_result result = job.colors ? color_bound(env, &a->view, &job.bound) : FCT_OK;
-    if (result == FCT_OK) result = measure(env, &job, &ab);
+    fct_result result = job.colors ? find_color_bound(env, &a->view, &job.bound) : FCT_OK;
+    if (result == FCT_OK) result = measure_one_way(env, &job, &ab);
     if (result != FCT_OK) return result;
     job.from = b, job.to = a;
-    result = measure(env, &job, &ba);
+    result = measure_one_way(env, &job, &ba);
     if (result != FCT_OK) return result;
     double samples = (double)(ab.samples + ba.samples);
     *out = (fct_mesh_error){
-        .e_avg = ratio(ab.squares + ba.squares, samples),
-        .e_avg_ab = ratio(ab.squares, (double)ab.samples),
-        .e_avg_ba = ratio(ba.squares, (double)ba.samples),
+        .e_avg = divide_or_zero(ab.squares + ba.squares, samples),
+        .e_avg_ab = divide_or_zero(ab.squares, (double)ab.samples),
+        .e_avg_ba = divide_or_zero(ba.squares, (double)ba.samples),
         .e_max = sqrt(fmax(ab.largest2, ba.largest2)),
         .e_max_ab = sqrt(ab.largest2),
         .e_max_ba = sqrt(ba.largest2),
         .diameter = diameter,
-        .color_rms = sqrt(ratio(ab.color2 + ba.color2, 3 * samples)),
+        .color_rms = sqrt(divide_or_zero(ab.color2 + ba.color2, 3 * samples)),
         .color_max = fmax(ab.color_largest, ba.color_largest),
         .samples = (size_t)(ab.samples + ba.samples),
     };
-    double bounded = ratio(ab.bounded2 + ba.bounded2, samples), own = ratio(ab.own2, (double)ab.samples);
-    out->color_rms_relative = sqrt(ratio(bounded, own));
+    double bounded = divide_or_zero(ab.bounded2 + ba.bounded2, samples),
+           own = divide_or_zero(ab.own2, (double)ab.samples);
+    out->color_rms_relative = sqrt(divide_or_zero(bounded, own));
     return FCT_OK;
 }

@@ -1,7 +1,8 @@
-/* bvh/near/closest.c: the nearest point of the surface.
+/* bvh/near/nearest.c: the nearest point of the surface. A kernel file.
  *
- * Boxes are opened nearest first and pruned in float with a margin; what remains in a leaf is measured in
- * double, so the answer is the exact one to double rounding. Equal distances go to the lower face id.
+ * The search opens the nearest box first. It prunes boxes and triangles in float, with a margin, and measures
+ * the remaining triangles in double, so the answer is exact up to double rounding. Equal distances: the lower
+ * face id.
  */
 #include "bvh/near/nearest.h"
 
@@ -13,26 +14,27 @@
 typedef struct search {
     const fct_bvh *bvh;
     v3 point;        /* scaled */
-    float at[3];     /* the same in float, no farther than 10^9 from the centre */
-    double rounding; /* how far `at` may lie from the point as far as bounds are concerned */
-    double best2;
-    float limit2; /* a box beyond this squared distance of `at` holds nothing better */
+    float at[3];     /* the point in float, clamped to 10^9 around the centre */
+    double rounding; /* at least the distance between `at` and the clamped point */
+    double best2;    /* squared distance of the best face, or of the maximum distance */
+    float limit2;    /* a box farther than this from `at`, squared, has no better face */
     double u, v;
     uint32_t place;
     fct_visits visits;
-    /* Where set, faces within the first best2 compete by how well they agree with this unit normal. */
+    /* If `normal` is set, best2 stays the maximum distance, and faces compete by their cosine to it. */
     const v3 *normal;
-    double agreement, facing2; /* cosine and squared distance of the best */
+    double agreement, facing2; /* cosine and squared distance of the best face */
 } search;
 
-static void set_best(search *s, double best2) {
+static void set_best_distance(search *s, double best2) {
     s->best2 = best2;
     double limit = sqrt(best2) + s->rounding;
     s->limit2 = (float)fmin(limit * limit * 1.0001 + 1e-30, 3e38);
     if (best2 == INFINITY) s->limit2 = INFINITY;
 }
 
-static uint32_t near_axis(const fct_axis_node *node, const float at[3], float limit2, float distance2[8]) {
+static uint32_t measure_axis_boxes(const fct_axis_node *node, const float at[3], float limit2,
+                                   float distance2[8]) {
     f8 zero = f8_set(0), sum = zero;
     for (int k = 0; k < 3; ++k) {
         f8 p = f8_set(at[k]);
@@ -44,9 +46,10 @@ static uint32_t near_axis(const fct_axis_node *node, const float at[3], float li
     return f8_le(sum, f8_set(limit2));
 }
 
-/* Rows of a map are a box's axes over its half extents, so |row|^-2 takes squares back to lengths. */
-static uint32_t near_oriented(const fct_oriented_node *node, const float centered[3], float limit2,
-                              float distance2[8]) {
+/* A row of a map is an axis of the box over its half extent h, so a distance d in mapped units is d h = d /
+ * |row|. */
+static uint32_t measure_oriented_boxes(const fct_oriented_node *node, const float centered[3], float limit2,
+                                       float distance2[8]) {
     f8 zero = f8_set(0), one = f8_set(1), sum = zero;
     f8 x = f8_set(centered[0]), y = f8_set(centered[1]), z = f8_set(centered[2]);
     for (int k = 0; k < 3; ++k) {
@@ -60,7 +63,7 @@ static uint32_t near_oriented(const fct_oriented_node *node, const float centere
     return f8_le(sum, f8_set(limit2));
 }
 
-/* A face within reach: takes it if it agrees better with the wanted normal than those before. */
+/* Takes the face if it is in reach and its normal is closer to the wanted one than that of the best face. */
 static void consider_facing(search *s, const v3 p[3], double d2, double u, double v, uint32_t place) {
     if (!(d2 <= s->best2)) return;
     v3 n = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
@@ -89,10 +92,10 @@ static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     const uint32_t *ids = s->bvh->view.face_ids;
     if (!(d2 < s->best2 || (d2 == s->best2 && (s->place == FCT_NONE || ids[place] < ids[s->place])))) return;
     s->u = u, s->v = v, s->place = place;
-    set_best(s, d2);
+    set_best_distance(s, d2);
 }
 
-/* Triangles whose bounds come near enough are measured. */
+/* Measures the triangles whose axis boxes are near enough. */
 static void search_leaf(search *s, const fct_leaf *leaf) {
     const float *rows = fct_leaf_vertices(leaf);
     const uint8_t *corners = fct_leaf_corners(leaf);
@@ -123,24 +126,24 @@ static void search_leaf(search *s, const fct_leaf *leaf) {
     }
 }
 
-static uint64_t wait_entry(float distance2, uint32_t ref) {
+static uint64_t make_entry(float distance2, uint32_t ref) {
     return (uint64_t)fct_float_bits(distance2) << 32 | ref;
 }
 
-static float wait_distance2(uint64_t entry) {
+static float entry_distance2(uint64_t entry) {
     return fct_float_of_bits((uint32_t)(entry >> 32));
 }
 
-static void run_search(search *s) {
+static void search_nodes(search *s) {
     const fct_bvh *bvh = s->bvh;
     float centered[3];
     for (int k = 0; k < 3; ++k) centered[k] = s->at[k] - bvh->center[k];
     uint64_t stack[FCT_STACK_SIZE];
     uint32_t height = 1;
-    stack[0] = wait_entry(0, bvh->root);
+    stack[0] = make_entry(0, bvh->root);
     while (height) {
         uint64_t entry = stack[--height];
-        if (wait_distance2(entry) > s->limit2) continue;
+        if (entry_distance2(entry) > s->limit2) continue;
         uint32_t ref = (uint32_t)entry;
         if (ref & FCT_REF_LEAF) {
             search_leaf(s, fct_bvh_leaf(bvh, ref));
@@ -153,16 +156,16 @@ static void run_search(search *s) {
         s->visits.boxes += 8;
         if (ref & FCT_REF_ORIENTED) {
             const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = near_oriented(node, centered, s->limit2, distance2) & node->present;
+            met = measure_oriented_boxes(node, centered, s->limit2, distance2) & node->present;
             child = node->child;
         } else {
             const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = near_axis(node, s->at, s->limit2, distance2) & node->present;
+            met = measure_axis_boxes(node, s->at, s->limit2, distance2) & node->present;
             child = node->child;
         }
         for (; met; met &= met - 1) {
             uint32_t i = (uint32_t)__builtin_ctz(met);
-            uint64_t waiting = wait_entry(distance2[i], child[i]);
+            uint64_t waiting = make_entry(distance2[i], child[i]);
             uint32_t at = height++;
             while (at > base && stack[at - 1] < waiting) stack[at] = stack[at - 1], --at;
             stack[at] = waiting;
@@ -170,9 +173,9 @@ static void run_search(search *s) {
     }
 }
 
-/* A float point near the scaled one. Moving it onto a large cube around the model brings it no farther from
- * anything inside, so distances from it remain lower bounds. */
-static void place_point(search *s) {
+/* Sets `at` and `rounding`. Clamping the point to a large cube around the model moves it nearer to everything
+ * in the model, so box distances from the clamped point are lower bounds of those from the point. */
+static void round_point(search *s) {
     double p[3] = {s->point.x, s->point.y, s->point.z};
     s->rounding = 0;
     for (int k = 0; k < 3; ++k) {
@@ -183,7 +186,7 @@ static void place_point(search *s) {
     }
 }
 
-static void give(const search *s, double distance2, fct_near *out) {
+static void report_face(const search *s, double distance2, fct_near *out) {
     const fct_tree_view *view = &s->bvh->view;
     const uint32_t *t = view->triangles + 3 * (size_t)s->place;
     v3 a = v3_load(view->positions + 3 * (size_t)t[0]), b = v3_load(view->positions + 3 * (size_t)t[1]),
@@ -198,12 +201,12 @@ bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double m
     search s = {.bvh = bvh, .point = v3_scale(point, bvh->scale), .place = FCT_NONE, .normal = normal};
     double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
     if (bvh->embree || !(size < INFINITY) || !(max_distance >= 0)) return false;
-    place_point(&s);
+    round_point(&s);
     double reach = max_distance * bvh->scale;
-    set_best(&s, reach * reach);
-    run_search(&s);
+    set_best_distance(&s, reach * reach);
+    search_nodes(&s);
     fct_visits_add(visits, &s.visits);
     if (s.place == FCT_NONE) return false;
-    give(&s, normal ? s.facing2 : s.best2, out);
+    report_face(&s, normal ? s.facing2 : s.best2, out);
     return true;
 }

@@ -1,10 +1,11 @@
-/* bvh/ray/check.c: two backends on the same rays, and who is right where they differ.
+/* bvh/ray/check.c: compares two backends on the same rays, and decides their differences in double.
  *
- * A difference is settled from the ray as given and the faces concerned, in double. Ours is wrong if the
- * point it reports is not on its face; or if Embree's nearer face is truly there: the ray passes it inside,
- * farther from its rim than float rounding. On the rim either answer may be right for one face, but not a ray
- * that slips through a closed surface: so the faces around are looked at, and if they cover the ray's
- * neighbourhood on all sides, having missed them is wrong too.
+ * A difference is explained unless our answer is wrong. Our answer is wrong in three cases:
+ *   1. The point that we report is not on its face.
+ *   2. Embree reports a nearer face, and the ray meets it farther from its rim than float rounding.
+ *   3. Embree reports a nearer face, the ray meets it within rounding of its rim, and the faces there leave
+ * no gap around the ray (surface_covers). One face alone may be missed there, a closed surface may not. It is
+ * also correct to miss Embree's face within rounding of t_min or t_max.
  */
 #include <string.h>
 
@@ -13,20 +14,21 @@
 #include "bvh/ray/traverse.h"
 #include "cluster/tree/node.h"
 
-/* More than the float test moves a triangle by, in scaled units; see bvh.h. */
+/* In scaled units, more than the float test can move a triangle (model.h). */
 #define ROUNDING ((double)FCT_AXIS_PAD)
-enum { SLICE = 65536, AROUND = 16 };
+enum { SLICE = 65536 /* rays per step */, AROUND = 16 /* rays of the ring in surface_covers */ };
 
-/* The ray in scaled units, its direction of unit length; distances run from a point near the model. */
+/* The ray in scaled units, with a unit direction. `origin` is the point of the ray's line nearest to the
+ * centre of the model; distances start there. */
 typedef struct exact_ray {
     v3 origin, direction;
     v3 across[2]; /* completes direction to a frame */
     double t_min, t_max;
     double start;  /* distance of `origin` from the ray's own origin */
-    double length; /* scaled distance for a unit of the caller's t */
+    double length; /* scaled distance per unit of the caller's t */
 } exact_ray;
 
-static exact_ray make_exact(const fct_bvh *bvh, const fct_ray *ray) {
+static exact_ray make_exact_ray(const fct_bvh *bvh, const fct_ray *ray) {
     const float *o = ray->origin, *d = ray->direction;
     long double length = 0, middle = 0, unit[3], far[3];
     for (int k = 0; k < 3; ++k) length += (long double)d[k] * (long double)d[k];
@@ -54,9 +56,9 @@ static void face_corners(const fct_bvh *bvh, uint32_t place, v3 p[3]) {
     }
 }
 
-/* Distance of the ray, moved across by (x, y), from the rim of the face as seen along the ray: positive
- * inside. *at receives where it meets the face's plane. */
-static double rim_distance(const exact_ray *e, const v3 p[3], double x, double y, double *at) {
+/* Moves the ray by (x, y) across its direction and returns its distance from the face's rim, as seen along
+ * the ray: positive inside, negative outside. *at receives the distance along the ray to the face's plane. */
+static double measure_rim_distance(const exact_ray *e, const v3 p[3], double x, double y, double *at) {
     double qx[3], qy[3], nearest2 = INFINITY, area = 0;
     bool positive = true, negative = true;
     for (int i = 0; i < 3; ++i) {
@@ -82,11 +84,11 @@ static double rim_distance(const exact_ray *e, const v3 p[3], double x, double y
 typedef struct checker {
     const fct_bvh *obb;
     uint32_t *stack; /* depth + root_count + 2 */
-    double near;     /* a difference of distance that counts for none */
+    double near;     /* smaller differences of distance do not count */
 } checker;
 
-/* Distance of a scaled point from a cluster's box, from below. */
-static double box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
+/* A lower bound of the distance of a scaled point from a cluster's box. */
+static double bound_box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
     fct_cluster room;
     fct_box box;
     fct_cluster_box(fct_node_cluster(bvh->tree, node, &room), &box);
@@ -99,8 +101,8 @@ static double box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
     return sqrt(sum) * (1 - 1e-5) - 1e-6;
 }
 
-/* A number for the segment from a to b, the same from b to a and for other vertices at the same places. */
-static uint64_t segment_hash(v3 a, v3 b) {
+/* A hash of the segment a b: the same for b a, and for other vertices at the same positions. */
+static uint64_t hash_segment(v3 a, v3 b) {
     double ends[2][3] = {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
     uint64_t sum = 0;
     for (int i = 0; i < 2; ++i) {
@@ -112,28 +114,29 @@ static uint64_t segment_hash(v3 a, v3 b) {
             h = (h ^ bits) * 0x9e3779b97f4a7c15u;
             h ^= h >> 29;
         }
-        sum += h * h; /* no bijection: two segments' ends do not add up to the same but by chance */
+        sum += h * h; /* not linear, so that different pairs of ends have different sums */
     }
     return sum * 0xbf58476d1ce4e5b9u;
 }
 
-/* The sides of a face that pass the point, folded: what an even number of faces have in common vanishes. */
-static uint64_t sides_at(v3 point, const v3 p[3]) {
+/* XOR of the hashes of the sides of a face that pass near the point. A side that two faces share cancels. */
+static uint64_t hash_sides_near(v3 point, const v3 p[3]) {
     uint64_t fold = 0;
     for (int i = 0; i < 3; ++i) {
         v3 a = p[i], b = p[(i + 1) % 3];
         double u, v;
         if (v3_norm(v3_sub(fct_triangle_closest(point, a, b, b, &u, &v), point)) <= 4 * ROUNDING)
-            fold ^= segment_hash(a, b);
+            fold ^= hash_segment(a, b);
     }
     return fold;
 }
 
-/* Whether the ray, as given, meets a face near `point`, and the faces there leave no gap: all rays of a ring
- * around this one meet one of them too, and every side that passes the point belongs to two of them. Where
- * faces only touch, at the end of another's side or by way of a face without area, which no ray meets,
- * rounding may open a slit. Only what lies before `farthest` counts: at a silhouette the surface behind it
- * is met just as surely. */
+/* Whether the faces near `point` leave no gap around the ray:
+ *   1. the ray meets one of them;
+ *   2. so does each ray of a ring around it;
+ *   3. each side that passes near the point belongs to an even number of faces. Faces that only touch (a
+ * corner on another's side, or a face without area between them) may leave a slit after rounding. Only hits
+ * before `farthest` count, because at a silhouette the rays of the ring also meet the surface behind. */
 static bool surface_covers(const checker *c, const exact_ray *e, v3 point, double farthest) {
     const fct_bvh *bvh = c->obb;
     const fct_tree_view *view = &bvh->view;
@@ -144,7 +147,7 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
     while (height) {
         uint32_t node = c->stack[--height];
         if (node < view->node_count) {
-            if (box_distance(bvh, node, point) > 4 * ROUNDING) continue;
+            if (bound_box_distance(bvh, node, point) > 4 * ROUNDING) continue;
             c->stack[height++] = fct_node_child(bvh->tree, node, 0);
             c->stack[height++] = fct_node_child(bvh->tree, node, 1);
             continue;
@@ -155,19 +158,19 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         if (fct_bvh_degenerate(bvh, node - view->node_count)) continue;
         if (v3_norm(v3_sub(fct_triangle_closest(point, p[0], p[1], p[2], &u, &v), point)) > 4 * ROUNDING)
             continue;
-        unpaired ^= sides_at(point, p);
-        met = met || (rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
+        unpaired ^= hash_sides_near(point, p);
+        met = met || (measure_rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
-            double rim = rim_distance(e, p, radius * cos(angle), radius * sin(angle), &at);
+            double rim = measure_rim_distance(e, p, radius * cos(angle), radius * sin(angle), &at);
             if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }
     return met && !unpaired && covered == (1u << AROUND) - 1;
 }
 
-/* Whether our answer `ours` (distance from e->origin) is wrong given Embree's. Either place may be FCT_NONE.
- */
+/* Whether our answer is wrong, given Embree's: see the top of this file. A place is FCT_NONE on a miss;
+ * distances start at e->origin. */
 static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, double our_distance,
                           uint32_t theirs, double their_distance) {
     v3 p[3];
@@ -180,7 +183,7 @@ static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, d
     }
     if (theirs == FCT_NONE || (ours != FCT_NONE && their_distance >= our_distance)) return false;
     face_corners(c->obb, theirs, p);
-    double rim = rim_distance(e, p, 0, 0, &at);
+    double rim = measure_rim_distance(e, p, 0, 0, &at);
     if (rim < -ROUNDING) return false;
     if (rim > ROUNDING) {
         bool within = at > e->t_min + ROUNDING && at < e->t_max - ROUNDING;
@@ -191,14 +194,15 @@ static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, d
     return surface_covers(c, e, v3_mad(e->origin, their_distance, e->direction), farthest);
 }
 
-/* Both backends' unrounded answers to one ray that differed. */
-static void settle(const checker *c, const fct_bvh *embree, const fct_ray *ray, fct_ray_check *out) {
+/* Asks both backends for their unrounded answers and counts the difference. */
+static void settle_difference(const checker *c, const fct_bvh *embree, const fct_ray *ray,
+                              fct_ray_check *out) {
     fct_prepared_ray prepared;
     fct_raw_hit ours, theirs;
     if (!fct_ray_prepare(c->obb, ray, &prepared)) return;
     if (!fct_traverse_closest(c->obb, &prepared, &ours, NULL)) ours.place = FCT_NONE;
     if (!fct_embree_closest(embree, &prepared, &theirs)) theirs.place = FCT_NONE;
-    exact_ray e = make_exact(c->obb, ray);
+    exact_ray e = make_exact_ray(c->obb, ray);
     double ours_at = 0, theirs_at = 0;
     if (ours.place != FCT_NONE)
         ours_at = (prepared.shift + (double)ours.t) * prepared.factor * e.length - e.start;
@@ -212,7 +216,7 @@ static void settle(const checker *c, const fct_bvh *embree, const fct_ray *ray, 
         ++out->explained;
 }
 
-/* Seconds that one thread takes for a slice. */
+/* Seconds of one thread. */
 static double time_slice(const fct_bvh *bvh, size_t count, const fct_ray *rays, fct_hit *hits) {
     double start = fct_seconds();
     for (size_t i = 0; i < count; ++i) fct_bvh_closest_hit(bvh, &rays[i], &hits[i], NULL);
@@ -225,7 +229,7 @@ static void compare_slice(const checker *c, const fct_bvh *embree, size_t count,
         bool hit = ours[i].face != FCT_NONE;
         out->hits += hit;
         out->occlusion_differences += fct_bvh_any_hit(c->obb, &rays[i], NULL) != hit;
-        if (ours[i].face != theirs[i].face) settle(c, embree, &rays[i], out);
+        if (ours[i].face != theirs[i].face) settle_difference(c, embree, &rays[i], out);
     }
 }
 

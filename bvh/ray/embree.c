@@ -1,7 +1,7 @@
-/* bvh/ray/embree.c: Embree behind the same queries, over the same scaled triangles in the order of places.
+/* bvh/ray/embree.c: Embree over the same scaled triangles, in order of place.
  *
- * One device for each structure. Robust traversal, as watertight as ours. Embree runs with denormals flushed
- * to zero, as it asks for; the caller's floating point mode is restored after each call.
+ * Each structure has its own device. Robust traversal is watertight, as ours is. Embree requires that
+ * denormals are flushed to zero, so each call switches the floating-point mode and restores the caller's.
  */
 #include "bvh/ray/embree.h"
 
@@ -34,29 +34,30 @@ struct fct_embree {
     RTCScene scene;
     float *positions;
     uint32_t *triangles;
-    size_t own_bytes;      /* of these two */
-    _Atomic int64_t bytes; /* of Embree */
+    size_t own_bytes;      /* of positions and triangles */
+    _Atomic int64_t bytes; /* that Embree has allocated */
 };
 
-static bool count_memory(void *user, ssize_t bytes, bool post) {
+static bool count_embree_memory(void *user, ssize_t bytes, bool post) {
     (void)post;
     fct_embree *embree = user;
     embree->bytes += bytes;
     return true;
 }
 
-/* `made`: what was asked for is there; without it there is an error, whatever the device says. */
-static fct_result check_device(const fct_env *env, RTCDevice device, bool made) {
+/* The device's error as a result. `made` tells whether the call returned an object: if not, the result is an
+ * error even if the device reports none. */
+static fct_result check_device_error(const fct_env *env, RTCDevice device, bool made) {
     enum RTCError error = rtcGetDeviceError(device);
     if (made && error == RTC_ERROR_NONE) return FCT_OK;
     if (error == RTC_ERROR_OUT_OF_MEMORY) return fct_fail_memory(env, "Embree");
     return fct_fail(env, FCT_ERROR_INTERNAL, "Embree failed with error %d", (int)error);
 }
 
-/* Scaled copies; a degenerate face becomes a point, which Embree never hits. */
-static fct_result copy_triangles(const fct_bvh *bvh, fct_embree *embree) {
+/* A degenerate face becomes a point, which Embree never hits. */
+static fct_result copy_scaled_triangles(const fct_bvh *bvh, fct_embree *embree) {
     const fct_tree_view *view = &bvh->view;
-    /* Embree reads 16 bytes at every vertex. */
+    /* Embree reads 16 bytes per vertex of 12 bytes: the last read must stay in the array. */
     embree->positions = fct_allocate(bvh->env, 3 * (size_t)view->vertex_count + 4, sizeof(float));
     embree->triangles = fct_allocate(bvh->env, 3 * (size_t)view->face_count, sizeof(uint32_t));
     embree->own_bytes = 12 * ((size_t)view->vertex_count + view->face_count);
@@ -71,15 +72,15 @@ static fct_result copy_triangles(const fct_bvh *bvh, fct_embree *embree) {
     return FCT_OK;
 }
 
-static fct_result build_scene(const fct_bvh *bvh, fct_embree *embree) {
+static fct_result build_embree_scene(const fct_bvh *bvh, fct_embree *embree) {
     char config[64];
     snprintf(config, sizeof config, "threads=%u", fct_env_threads(bvh->env));
     embree->device = rtcNewDevice(config);
-    if (!embree->device) return check_device(bvh->env, NULL, false);
-    rtcSetDeviceMemoryMonitorFunction(embree->device, count_memory, embree);
+    if (!embree->device) return check_device_error(bvh->env, NULL, false);
+    rtcSetDeviceMemoryMonitorFunction(embree->device, count_embree_memory, embree);
     embree->scene = rtcNewScene(embree->device);
     RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (!embree->scene || !geometry) return check_device(bvh->env, embree->device, false);
+    if (!embree->scene || !geometry) return check_device_error(bvh->env, embree->device, false);
     rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, embree->positions, 0,
                                12, bvh->view.vertex_count);
@@ -89,7 +90,7 @@ static fct_result build_scene(const fct_bvh *bvh, fct_embree *embree) {
     rtcAttachGeometryByID(embree->scene, geometry, 0);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(embree->scene);
-    return check_device(bvh->env, embree->device, true);
+    return check_device_error(bvh->env, embree->device, true);
 }
 
 fct_result fct_embree_create(fct_bvh *bvh) {
@@ -97,10 +98,10 @@ fct_result fct_embree_create(fct_bvh *bvh) {
     if (!embree) return fct_fail_memory(bvh->env, "Embree");
     bvh->embree = embree;
     fct_result result = fct_progress(bvh->env, "ray structure", 0);
-    if (result == FCT_OK) result = copy_triangles(bvh, embree);
+    if (result == FCT_OK) result = copy_scaled_triangles(bvh, embree);
     if (result == FCT_OK) {
         float_mode mode = flush_denormals();
-        result = build_scene(bvh, embree);
+        result = build_embree_scene(bvh, embree);
         restore_mode(mode);
     }
     return result == FCT_OK ? fct_progress(bvh->env, "ray structure", 1) : result;
@@ -119,7 +120,7 @@ size_t fct_embree_bytes(const fct_embree *embree) {
     return embree->own_bytes + (size_t)embree->bytes;
 }
 
-static struct RTCRay embree_ray(const fct_prepared_ray *ray) {
+static struct RTCRay make_embree_ray(const fct_prepared_ray *ray) {
     return (struct RTCRay){.org_x = ray->origin[0],
                            .org_y = ray->origin[1],
                            .org_z = ray->origin[2],
@@ -134,7 +135,7 @@ static struct RTCRay embree_ray(const fct_prepared_ray *ray) {
 bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit query = {.ray = embree_ray(ray), .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    struct RTCRayHit query = {.ray = make_embree_ray(ray), .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
     float_mode mode = flush_denormals();
     rtcIntersect1(bvh->embree->scene, &context, &query);
     restore_mode(mode);
@@ -150,7 +151,7 @@ bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw
 bool fct_embree_any(const fct_bvh *bvh, const fct_prepared_ray *ray) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRay query = embree_ray(ray);
+    struct RTCRay query = make_embree_ray(ray);
     float_mode mode = flush_denormals();
     rtcOccluded1(bvh->embree->scene, &context, &query);
     restore_mode(mode);

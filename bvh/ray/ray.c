@@ -1,13 +1,13 @@
-/* bvh/ray/ray.c: see ray.h.
+/* bvh/ray/ray.c: prepares rays.
  *
- * Scaling by powers of two is exact, so a prepared ray is the caller's ray in another unit. An origin out of
- * reach, or a negative t_min, moves the origin to where the ray enters the bounds, in double: the float tests
- * then see distances of the order of the model, and a ray from 10^7 diameters away is as exact as one from
- * near.
+ * Scaling by powers of two is exact, so a prepared ray is the caller's ray in another unit. If the origin is
+ * out of FCT_REACH, or t_min is negative, the origin moves along the ray to the bounds, in double. The float
+ * tests then see distances of the size of the model. The moved origin is rounded to float, so on models far
+ * from the coordinate origin such a ray can miss a face or hit a wrong one.
  */
 #include "bvh/ray/ray.h"
 
-/* 2^(127 - e) for a float of biased exponent e, which is thus brought to [1, 2). */
+/* The power of two that brings a positive float to [1, 2). */
 static double unit_factor(float largest) {
     union {
         float f;
@@ -22,7 +22,8 @@ static double unit_factor(float largest) {
     return factor.d;
 }
 
-/* Moves the origin along the ray to its entry into the bounds or to t_min, whichever comes later. */
+/* Moves the origin along the ray to where it enters the bounds, or to t_min if that is later. Returns false
+ * if the ray misses the bounds. */
 static bool move_origin(const fct_bvh *bvh, const double o[3], const double d[3], double t_min, double t_max,
                         fct_prepared_ray *out) {
     double enter = t_min, leave = t_max;
@@ -69,7 +70,8 @@ bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *o
     if (near) {
         for (int i = 0; i < 3; ++i) out->origin[i] = (float)od[i];
         out->shift = 0;
-        out->t_min = (float)t_min + 0.0f; /* no -0: traversal orders distances by their bits */
+        out->t_min =
+            (float)t_min + 0.0f; /* turns -0 to +0, because the traversal sorts distances by their bits */
         out->t_max = (float)t_max;
         out->moved = false;
     } else if (!move_origin(bvh, od, dd, t_min, t_max, out)) {
@@ -77,7 +79,8 @@ bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *o
     }
 
     for (int i = 0; i < 3; ++i) {
-        /* A slower component moves the ray by less than the boxes' padding while it is inside the model. */
+        /* A component below 1e-18 moves the ray by less than the padding of a box while it is in the model.
+         */
         float c = out->direction[i];
         out->side[i] = c < 0;
         out->inverse[i] = fabsf(c) < 1e-18f ? (c < 0 ? -1e18f : 1e18f) : 1 / c;

@@ -1,11 +1,12 @@
-/* bvh/ray/traverse.c: closest and any hit through nodes of eight.
+/* bvh/ray/traverse.c: closest hit and any hit through nodes of eight children. A kernel file.
  *
- * The nearest child is entered first, the others wait on a stack ordered by distance. Triangles: Woop,
- * Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013: vertices are moved to the ray's origin
- * and sheared so that the ray is the z axis; the signs of three edge functions decide, and since neighbours
- * compute those of a shared edge from the same numbers, none slips between. Every product is rounded on its
- * own: a fused multiply-add would break that symmetry. An edge function that comes out zero is computed
- * again in double, where it is exact.
+ * The traversal enters the nearest child first and keeps the others on a stack, sorted by entry distance.
+ *
+ * Triangles: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. The test subtracts the
+ * ray's origin from the vertices and shears them, so that the ray becomes the z axis. The signs of three edge
+ * functions decide. Two faces compute the function of their shared edge from the same numbers, so no ray
+ * passes between them. This needs products that are rounded separately: a fused multiply-add would break it.
+ * An edge function that is zero in float is computed again in double, where it is exact.
  */
 #include "bvh/ray/traverse.h"
 
@@ -15,15 +16,16 @@
 typedef struct traversal {
     const fct_bvh *bvh;
     const fct_prepared_ray *ray;
-    fct_raw_hit hit;      /* hit.t: nothing beyond matters */
+    fct_raw_hit hit;      /* the closest so far; hit.t is ray->t_max before the first */
     const fct_leaf *leaf; /* of the hit */
-    uint32_t number;      /* of its triangle */
+    uint32_t number;      /* of the hit triangle in its leaf */
     fct_visits visits;
 } traversal;
 
-/* Eight axis boxes: entry distances, and a bit for each box met within [t_min, t_max]. */
-static inline uint32_t meet_axis(const fct_axis_node *node, const fct_prepared_ray *r, float t_max,
-                                 float enter[8]) {
+/* Tests eight axis boxes. Returns a mask of the boxes that the ray meets within [t_min, t_max]; enter[i] is
+ * the entry distance of box i. */
+static inline uint32_t meet_axis_boxes(const fct_axis_node *node, const fct_prepared_ray *r, float t_max,
+                                       float enter[8]) {
     f8 first = f8_set(r->t_min), last = f8_set(t_max);
     for (int k = 0; k < 3; ++k) {
         f8 origin = f8_set(r->origin[k]), inverse = f8_set(r->inverse[k]);
@@ -36,9 +38,9 @@ static inline uint32_t meet_axis(const fct_axis_node *node, const fct_prepared_r
     return f8_le(first, last);
 }
 
-/* The same with eight oriented boxes, each [-1, 1]^3 under its own map. */
-static inline uint32_t meet_oriented(const fct_oriented_node *node, const fct_prepared_ray *r,
-                                     const float origin[3], float t_max, float enter[8]) {
+/* The same with eight oriented boxes: map i takes box i to [-1, 1]^3. `origin` is relative to the centre. */
+static inline uint32_t meet_oriented_boxes(const fct_oriented_node *node, const fct_prepared_ray *r,
+                                           const float origin[3], float t_max, float enter[8]) {
     f8 first = f8_set(r->t_min), last = f8_set(t_max);
     f8 ox = f8_set(origin[0]), oy = f8_set(origin[1]), oz = f8_set(origin[2]);
     f8 dx = f8_set(r->direction[0]), dy = f8_set(r->direction[1]), dz = f8_set(r->direction[2]);
@@ -47,7 +49,7 @@ static inline uint32_t meet_oriented(const fct_oriented_node *node, const fct_pr
         f8 at =
             f8_add(f8_add(f8_mul(mx, ox), f8_mul(my, oy)), f8_add(f8_mul(mz, oz), f8_load(node->map[k][3])));
         f8 go = f8_add(f8_add(f8_mul(mx, dx), f8_mul(my, dy)), f8_mul(mz, dz));
-        /* Slower than this, the ray stays within the padding all the way through. */
+        /* A component below 1e-18 moves the ray by less than the padding of the box. */
         f8 inverse = f8_div(f8_set(1), f8_copysign(f8_max(f8_abs(go), f8_set(1e-18f)), go));
         f8 middle = f8_sub(f8_set(0), f8_mul(at, inverse)), half = f8_abs(inverse);
         first = f8_max(f8_sub(middle, half), first);
@@ -57,7 +59,7 @@ static inline uint32_t meet_oriented(const fct_oriented_node *node, const fct_pr
     return f8_le(first, last);
 }
 
-/* The leaf's vertices as the ray sees them: 16 places, the second eight doubled where there are only eight.
+/* The vertices of a leaf after translation and shear. A leaf of eight vertices fills both halves with them.
  */
 typedef struct sheared {
     f8 x[2], y[2], z[2];
@@ -78,12 +80,12 @@ static inline void shear_vertices(const fct_leaf *leaf, const fct_prepared_ray *
     }
 }
 
-/* Weights and sheared z of a triangle's corners. */
+/* Barycentric weights, not normalised, and sheared z of a triangle's corners. */
 typedef struct weights {
     double w[3], z[3];
 } weights;
 
-/* Weights of the point of the triangle's rim that is nearest to the ray, which is at the origin of x, y. */
+/* Weights of the point of the triangle's three sides that is nearest to the ray, at x = y = 0. */
 static void rim_weights(const double x[3], const double y[3], double w[3]) {
     double nearest2 = INFINITY;
     for (int i = 0; i < 3; ++i) {
@@ -98,10 +100,10 @@ static void rim_weights(const double x[3], const double y[3], double w[3]) {
     }
 }
 
-/* The weights again, in double all the way. The float test has found that the ray meets the triangle as
- * floats see it; on a triangle seen almost edge-on they say poorly where. Signs that differ mean that the ray
- * passes the rim by less than float rounding: the hit is then on the rim. */
-static void refine(const fct_leaf *leaf, uint32_t number, const fct_prepared_ray *r, weights *out) {
+/* Computes the weights again in double. The float test has decided that the ray hits, but on a triangle seen
+ * almost edge-on its weights are inaccurate. If the signs differ in double, the ray misses the triangle by
+ * less than float rounding, and the hit is the nearest point of its sides. */
+static void refine_weights(const fct_leaf *leaf, uint32_t number, const fct_prepared_ray *r, weights *out) {
     const float *rows = fct_leaf_vertices(leaf);
     const uint8_t *corners = fct_leaf_corners(leaf) + 24 * (number / 8) + number % 8;
     uint32_t stride = 8u * leaf->vertex_octets;
@@ -123,22 +125,24 @@ static void refine(const fct_leaf *leaf, uint32_t number, const fct_prepared_ray
     for (int c = 0; c < 3; ++c) out->w[c] = w[c], out->z[c] = z[c];
 }
 
-static inline float spread(const float x[3]) {
+static inline float measure_spread(const float x[3]) {
     float low = x[0] < x[1] ? x[0] : x[1], high = x[0] < x[1] ? x[1] : x[0];
     low = x[2] < low ? x[2] : low, high = x[2] > high ? x[2] : high;
     return high - low;
 }
 
-/* Whether the triangle is seen so flat that rounding moves the hit along it by much more than across. */
-static inline bool seen_flat(const float x[3], const float y[3], const float z[3], double det) {
-    float dx = spread(x), dy = spread(y), dz = spread(z);
+/* Whether the ray sees the triangle almost edge-on, so that a rounding error across the ray moves the hit
+ * much farther along the ray. `det` is twice the area that the ray sees. */
+static inline bool is_seen_edge_on(const float x[3], const float y[3], const float z[3], double det) {
+    float dx = measure_spread(x), dy = measure_spread(y), dz = measure_spread(z);
     double wide = (double)(dx > dy ? dx : dy), deep = (double)dz;
     return 4 * fabs(det) < wide * (deep > wide ? deep : wide);
 }
 
-/* Settles one triangle that the eight-wide test could not refuse. x, y, z: its corners. */
-static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, const float x[3],
-                          const float y[3], const float z[3]) {
+/* Tests one triangle that the eight-wide test has not rejected, and records a hit that is nearer, or as near
+ * with a lower face id. x, y, z: its sheared corners. */
+static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t number, const float x[3],
+                                 const float y[3], const float z[3]) {
     float u = x[2] * y[1] - y[2] * x[1], v = x[0] * y[2] - y[0] * x[2], w = x[1] * y[0] - y[1] * x[0];
     weights s = {{(double)u, (double)v, (double)w}, {(double)z[0], (double)z[1], (double)z[2]}};
     if (u == 0 || v == 0 || w == 0) {
@@ -149,8 +153,8 @@ static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, c
     if ((s.w[0] < 0 || s.w[1] < 0 || s.w[2] < 0) && (s.w[0] > 0 || s.w[1] > 0 || s.w[2] > 0)) return false;
     double det = s.w[0] + s.w[1] + s.w[2];
     if (det == 0) return false;
-    if (seen_flat(x, y, z, det)) {
-        refine(leaf, number, t->ray, &s);
+    if (is_seen_edge_on(x, y, z, det)) {
+        refine_weights(leaf, number, t->ray, &s);
         det = s.w[0] + s.w[1] + s.w[2];
     }
     float at = (float)((s.w[0] * s.z[0] + s.w[1] * s.z[1] + s.w[2] * s.z[2]) / det);
@@ -163,8 +167,8 @@ static inline bool settle(traversal *t, const fct_leaf *leaf, uint32_t number, c
     return true;
 }
 
-/* Up to 16 triangles; whether one is hit nearer than t->hit.t. */
-static inline bool meet_leaf(traversal *t, const fct_leaf *leaf, bool any) {
+/* Tests the triangles of a leaf; returns whether t->hit has changed. With `any`, stops at the first hit. */
+static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
     sheared s;
     bool found = false;
     shear_vertices(leaf, t->ray, &s);
@@ -192,7 +196,7 @@ static inline bool meet_leaf(traversal *t, const fct_leaf *leaf, bool any) {
             uint32_t i = (uint32_t)__builtin_ctz(open);
             float tx[3] = {x[0][i], x[1][i], x[2][i]}, ty[3] = {y[0][i], y[1][i], y[2][i]},
                   tz[3] = {z[0][i], z[1][i], z[2][i]};
-            if (!settle(t, leaf, first + i, tx, ty, tz)) continue;
+            if (!test_triangle(t, leaf, first + i, tx, ty, tz)) continue;
             found = true;
             if (any) return true;
         }
@@ -200,17 +204,18 @@ static inline bool meet_leaf(traversal *t, const fct_leaf *leaf, bool any) {
     return found;
 }
 
-/* A waiting child: entry distance (not negative, so its bits order like the number) above the reference. */
-static inline uint64_t wait_entry(float enter, uint32_t ref) {
+/* A pending child: the bits of the entry distance, then the reference. The distance is not negative, so the
+ * entries sort by distance. */
+static inline uint64_t make_entry(float enter, uint32_t ref) {
     return (uint64_t)fct_float_bits(enter) << 32 | ref;
 }
 
-static inline float wait_distance(uint64_t entry) {
+static inline float entry_distance(uint64_t entry) {
     return fct_float_of_bits((uint32_t)(entry >> 32));
 }
 
-/* Leaves are read a little later: four lines of 64 bytes. */
-static inline void prefetch(const fct_bvh *bvh, uint32_t ref) {
+/* Prefetches 256 bytes: an axis node, or the largest leaf. */
+static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
     const char *at = ref & FCT_REF_LEAF ? (const char *)fct_bvh_leaf(bvh, ref) : fct_bvh_node(bvh, ref);
     __builtin_prefetch(at);
     __builtin_prefetch(at + 64);
@@ -218,14 +223,14 @@ static inline void prefetch(const fct_bvh *bvh, uint32_t ref) {
     __builtin_prefetch(at + 192);
 }
 
-/* Puts the children met on the stack, farthest first, and returns its new height. */
+/* Pushes the children in the mask, the nearest on top, and returns the new height of the stack. */
 static inline uint32_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t height, uint32_t met,
                                      const float enter[8], const uint32_t child[8]) {
     uint32_t base = height;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met);
-        uint64_t entry = wait_entry(enter[i], child[i]);
-        prefetch(bvh, child[i]);
+        uint64_t entry = make_entry(enter[i], child[i]);
+        prefetch_child(bvh, child[i]);
         uint32_t at = height++;
         while (at > base && stack[at - 1] < entry) stack[at] = stack[at - 1], --at;
         stack[at] = entry;
@@ -233,21 +238,21 @@ static inline uint32_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32
     return height;
 }
 
-static inline bool traverse(traversal *t, bool any) {
+static inline bool traverse_nodes(traversal *t, bool any) {
     const fct_prepared_ray *r = t->ray;
     const fct_bvh *bvh = t->bvh;
     float centered[3];
     for (int k = 0; k < 3; ++k) centered[k] = r->origin[k] - bvh->center[k];
     uint64_t stack[FCT_STACK_SIZE];
     uint32_t height = 1;
-    stack[0] = wait_entry(r->t_min, bvh->root);
+    stack[0] = make_entry(r->t_min, bvh->root);
     bool found = false;
     while (height) {
         uint64_t entry = stack[--height];
-        if (wait_distance(entry) > t->hit.t) continue;
+        if (entry_distance(entry) > t->hit.t) continue;
         uint32_t ref = (uint32_t)entry;
         if (ref & FCT_REF_LEAF) {
-            if (meet_leaf(t, fct_bvh_leaf(bvh, ref), any)) {
+            if (test_leaf(t, fct_bvh_leaf(bvh, ref), any)) {
                 found = true;
                 if (any) return true;
             }
@@ -260,11 +265,11 @@ static inline bool traverse(traversal *t, bool any) {
         t->visits.boxes += 8;
         if (ref & FCT_REF_ORIENTED) {
             const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = meet_oriented(node, r, centered, t->hit.t, enter) & node->present;
+            met = meet_oriented_boxes(node, r, centered, t->hit.t, enter) & node->present;
             child = node->child;
         } else {
             const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = meet_axis(node, r, t->hit.t, enter) & node->present;
+            met = meet_axis_boxes(node, r, t->hit.t, enter) & node->present;
             child = node->child;
         }
         height = push_children(bvh, stack, height, met, enter, child);
@@ -272,7 +277,7 @@ static inline bool traverse(traversal *t, bool any) {
     return found;
 }
 
-static traversal begin(const fct_bvh *bvh, const fct_prepared_ray *ray) {
+static traversal begin_traversal(const fct_bvh *bvh, const fct_prepared_ray *ray) {
     return (traversal){
         .bvh = bvh, .ray = ray, .hit = {.t = ray->t_max, .place = FCT_NONE}, .visits = {0, 0, 0}};
 }
@@ -285,8 +290,8 @@ static v3 cross_sides(const traversal *t) {
 
 bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit,
                           fct_visits *visits) {
-    traversal t = begin(bvh, ray);
-    bool found = traverse(&t, false);
+    traversal t = begin_traversal(bvh, ray);
+    bool found = traverse_nodes(&t, false);
     if (found) t.hit.normal = cross_sides(&t);
     *hit = t.hit;
     fct_visits_add(visits, &t.visits);
@@ -294,8 +299,8 @@ bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_r
 }
 
 bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits) {
-    traversal t = begin(bvh, ray);
-    bool found = traverse(&t, true);
+    traversal t = begin_traversal(bvh, ray);
+    bool found = traverse_nodes(&t, true);
     fct_visits_add(visits, &t.visits);
     return found;
 }

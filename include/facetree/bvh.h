@@ -1,10 +1,12 @@
-/* facetree/bvh.h: ray, distance and error queries on one model.
+/* facetree/bvh.h: ray, distance and error queries on one model. docs/queries.md is the guide.
  *
- * An fct_bvh is built from a tree, is immutable, and serves any number of threads. Queries neither allocate
- * nor fail. Faces in results are input face ids. Rays: points origin + t direction with t_min <= t <= t_max;
- * the direction need not have unit length; a ray with a NaN, or a zero direction, hits nothing. Triangles are
- * two-sided and watertight (Woop, Benthin, Wald 2013): a ray through a shared edge or vertex never slips
- * between. A degenerate triangle is never hit.
+ * An fct_bvh is built from a tree, is immutable, and serves any number of threads. Queries do not allocate
+ * and do not fail. Faces in results are input face ids.
+ *
+ * A ray is the set of points origin + t direction with t_min <= t <= t_max. Its direction may have any
+ * length. A ray with a NaN, an infinite origin or direction, or a zero direction hits nothing. Triangles are
+ * two-sided and watertight (Woop, Benthin, Wald 2013): no ray passes between two faces at a shared edge or
+ * vertex. A triangle without area is never hit.
  */
 #ifndef FACETREE_BVH_H
 #define FACETREE_BVH_H
@@ -17,15 +19,17 @@ extern "C" {
 
 typedef struct fct_bvh fct_bvh;
 
+/* OBB is our own structure, which answers all queries. EMBREE answers ray queries alone. */
 typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE } fct_backend;
 
-/* Packs the tree for traversal. The tree must outlive the bvh. Errors: MEMORY, CANCELLED, INTERNAL (Embree).
- */
+/* The tree must outlive the bvh. Errors: DATA (a damaged hierarchy file), MEMORY, CANCELLED, INTERNAL
+ * (Embree). */
 FCT_API fct_result fct_bvh_create(const fct_env *env, const fct_tree *tree, fct_backend backend,
                                   fct_bvh **out);
 FCT_API void fct_bvh_destroy(fct_bvh *bvh);
-/* Bytes the structure holds beside the tree (0 where the backend does not tell). */
+/* Bytes of the structure, without the tree. */
 FCT_API size_t fct_bvh_bytes(const fct_bvh *bvh);
+/* Bounds of the vertices that faces use. */
 FCT_API fct_bounds fct_bvh_bounds(const fct_bvh *bvh);
 FCT_API const fct_tree *fct_bvh_tree(const fct_bvh *bvh);
 
@@ -38,73 +42,79 @@ typedef struct fct_hit {
     float t;
     float u, v;      /* the hit is (1 - u - v) p0 + u p1 + v p2 in the face's input corner order */
     uint32_t face;   /* input face id, FCT_NONE on a miss */
-    float normal[3]; /* geometric, (p1 - p0) x (p2 - p0), not normalised (a positive multiple of it where a
-                        float would overflow or vanish); undefined on a miss */
-    uint32_t place;  /* the face's place in the tree's order */
+    float normal[3]; /* (p1 - p0) x (p2 - p0), not normalised; a positive multiple of it if a float would
+                        overflow or vanish; undefined on a miss */
+    uint32_t place;  /* the face's place in the tree's order; FCT_NONE on a miss */
 } fct_hit;
 
-/* What a query visited, added to the counts given. */
+/* A query adds its visits to these counts. */
 typedef struct fct_visits {
     uint64_t nodes, boxes, triangles;
 } fct_visits;
 
-/* Closest hit; returns whether there is one. visits may be NULL. Equal t: the lower face id. */
+/* The hit of least t; returns whether there is one. Equal t: the lower face id. visits may be NULL; the
+ * Embree backend does not count. */
 FCT_API bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, fct_visits *visits);
+/* Whether the ray hits anything. */
 FCT_API bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits);
-/* Batches over the environment's threads. */
+/* The same for `count` rays, on the threads of the environment. */
 FCT_API void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, fct_hit *hits);
-/* Bit i % 64 of occluded[i / 64] tells of ray i. */
+/* Bit i % 64 of occluded[i / 64] tells whether ray i hits anything. `occluded` has (count + 63) / 64 words.
+ */
 FCT_API void fct_bvh_any_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, uint64_t *occluded);
 
-/* Two backends' answers on the same rays, each disagreement settled by testing the faces concerned in double
- * precision. Times are of one thread. */
+/* The answers of two backends to the same rays. A test in double of the faces concerned decides each
+ * difference. Times are of one thread. */
 typedef struct fct_ray_check {
     size_t rays, hits;
-    size_t differences; /* neither the same face nor the same t to 1e-5 of the extent, or hit against miss */
-    size_t explained;   /* the double-precision test finds ours right, or the case on the rim of a triangle
+    size_t differences; /* different faces whose t differ by over 1e-5 of the extent, or a hit and a miss */
+    size_t explained;   /* differences where our answer is right, or the ray meets the rim of a triangle
                            within rounding */
-    size_t unexplained; /* ours is wrong */
-    size_t occlusion_differences; /* any-hit against our own closest hit */
+    size_t unexplained; /* differences where our answer is wrong */
+    size_t occlusion_differences; /* our any hit differs from our closest hit */
     double seconds_obb, seconds_embree;
 } fct_ray_check;
-/* Both over the same tree: `obb` and `embree`. Errors: MEMORY, CANCELLED. */
+/* `obb` and `embree` are built from the same tree. Errors: MEMORY, CANCELLED. */
 FCT_API fct_result fct_bvh_check(const fct_env *env, const fct_bvh *obb, const fct_bvh *embree, size_t count,
                                  const fct_ray *rays, fct_ray_check *out);
 
-/* `count` rays of every kind that has broken a ray tracer, kind i % 12 at place i: anywhere; from the
- * surface; grazing; along an axis; along an axis through a vertex to the last bit; through a vertex; through
- * an edge; from up to 10^6 diameters away; with a direction of length 2^-60 to 2^60; between two points of
- * the surface; in a coordinate plane; from a vertex. The same rays for the same tree and seed. */
+/* Makes `count` rays of the kinds that have broken ray tracers; ray i has kind i % 12: anywhere; from the
+ * surface; grazing; along an axis; along an axis exactly through a vertex; through a vertex; through an edge;
+ * from up to 10^6 diameters away; with a direction of length 2^-60 to 2^60; between two points of the
+ * surface; in a coordinate plane; from a vertex. The same tree and seed give the same rays. */
 FCT_API void fct_ray_mix(const fct_bvh *bvh, uint64_t seed, size_t count, fct_ray *rays);
 
 typedef struct fct_closest {
     float point[3];
     float distance;
-    uint32_t face;  /* input face id; FCT_NONE when nothing lies within the maximum distance */
+    uint32_t face;  /* input face id; FCT_NONE if no face is within the maximum distance */
     float u, v;     /* barycentrics of the point as in fct_hit */
     uint32_t place; /* of the face in the tree's order */
 } fct_closest;
-/* The point of the surface nearest to `point`, if within max_distance (may be infinity). OBB backend only. */
+/* The point of the surface that is nearest to `point`; returns whether it is within max_distance, which may
+ * be infinity. Equal distances: the lower face id. OBB backend only: others return false. visits may be NULL.
+ */
 FCT_API bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], float max_distance,
                                    fct_closest *out, fct_visits *visits);
+/* The same for `count` points (count x 3), on the threads of the environment. */
 FCT_API void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                                     fct_closest *out);
 
-/* Distance between two surfaces sampled at every referenced vertex and at samples_per_face points of every
- * face (Garland 1999, (2.7), (2.8)); avg is the mean squared distance, max the largest distance. _ab: samples
- * of a, measured to b. Colours are those at the nearest point; where faces are equally near, to 1e-6 of the
- * diameter, at the one whose normal is closest to the sample's. */
+/* The distance between two surfaces (Garland 1999, (2.7) and (2.8)): e_avg is the mean squared distance of
+ * all samples, e_max the largest distance. _ab: samples of a, measured to b. Samples are the vertices that
+ * faces use and samples_per_face points per face. Colours are compared at the nearest point. If several faces
+ * are equally near, up to 1e-6 of the diameter, the face whose normal is closest to the sample's counts. */
 typedef struct fct_mesh_error {
     double e_avg, e_avg_ab, e_avg_ba;
     double e_max, e_max_ab, e_max_ba;
     double diameter;             /* diagonal of the bounds of a */
-    double color_rms, color_max; /* over RGB, at the samples; 0 unless both meshes have vertex colours */
-    double color_rms_relative;   /* the same over the root mean square colour of a, with differences and
-                                    colours of each channel cut at what 95 % of a's area does not exceed:
-                                    lamps do not outweigh all else; 0 likewise */
+    double color_rms, color_max; /* over RGB and all samples; 0 unless both meshes have vertex colours */
+    double color_rms_relative; /* color_rms over the root mean square colour of a. Differences and colours are
+                                  cut per channel at the colour that 95 % of a's area does not exceed, so
+                                  that lamps do not outweigh the rest; 0 unless both have colours */
     size_t samples;
 } fct_mesh_error;
-/* Both bvh with the OBB backend. Errors: MEMORY, CANCELLED. */
+/* Both with the OBB backend. Errors: MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_compare(const fct_env *env, const fct_bvh *a, const fct_bvh *b,
                                     uint32_t samples_per_face, uint64_t seed, fct_mesh_error *out);
 
