@@ -1,10 +1,11 @@
-/* scene/closest.c: the surface point of the whole scene that is nearest to a point, in world distance.
+/* scene/closest.c: the nearest surface point of the whole scene, in world distance.
  *
- * Instances are visited by the distance to their boxes. Under a rotation, reflection and uniform scale the
- * model's own query answers. Under any other transform nearest in the model is not nearest in the world: the
- * cluster tree is searched with triangles taken to the world, pruned by shrink * (distance to the oriented
- * box in the model), which never exceeds the distance in the world; exact, and slower the more the scales
- * differ.
+ * The search visits the nearest instance box first. An instance has one of two kinds of transform:
+ *   1. Rotation, reflection and uniform scale: the model's own query answers.
+ *   2. Any other: the point nearest in the model is not the nearest in the world. So the search descends the
+ *      cluster tree and measures triangles in the world. It prunes a cluster by frame->shrink times the
+ *      distance to its box in the model, which never exceeds the distance in the world. The result is exact;
+ *      the search gets slower as the scales differ more.
  */
 #include <math.h>
 
@@ -27,7 +28,8 @@ typedef struct search {
     fct_closest best;
 } search;
 
-static double box_distance(const fct_cluster *cluster, v3 p) {
+/* A lower bound of the distance to the cluster's box. The factors cover the rounding of the box to floats. */
+static double bound_box_distance(const fct_cluster *cluster, v3 p) {
     fct_box box;
     fct_cluster_box(cluster, &box);
     v3 d = v3_sub(p, v3_load(box.center));
@@ -60,7 +62,7 @@ static void try_triangle(search *s, const fct_tree_view *view, const float *to_w
     v3_store(s->best.point, nearest);
 }
 
-static void search_tree(search *s, const fct_scene *scene, uint32_t instance) {
+static void search_cluster_tree(search *s, const fct_scene *scene, uint32_t instance) {
     const fct_instance *placed = scene->instances + instance;
     const fct_tree *tree = scene->own[placed->model].tree;
     const fct_scene_frame *frame = scene->frames + instance;
@@ -82,7 +84,7 @@ static void search_tree(search *s, const fct_scene *scene, uint32_t instance) {
                 fct_cluster room;
                 child[k].child = fct_node_child(tree, next.child, k);
                 const fct_cluster *cluster = fct_node_cluster(tree, child[k].child, &room);
-                child[k].bound = frame->shrink * box_distance(cluster, local);
+                child[k].bound = frame->shrink * bound_box_distance(cluster, local);
             }
             int near = child[1].bound < child[0].bound;
             if (child[!near].bound <= s->distance) stack[top++] = child[!near];
@@ -110,7 +112,7 @@ static void search_model(search *s, const fct_scene *scene, uint32_t instance) {
     v3_store(s->best.point, nearest);
 }
 
-static double child_distance(const fct_scene_node *node, int k, v3 p) {
+static double measure_child_distance(const fct_scene_node *node, int k, v3 p) {
     double point[3] = {p.x, p.y, p.z}, square = 0;
     for (int c = 0; c < 3; ++c) {
         double below = node->bounds[2 * c][k] - point[c], above = point[c] - node->bounds[2 * c + 1][k];
@@ -138,13 +140,13 @@ bool fct_scene_closest_point(const fct_scene *scene, const float point[3], float
             if (scene->instances[i].uniform_scale > 0)
                 search_model(&s, scene, i);
             else
-                search_tree(&s, scene, i);
+                search_cluster_tree(&s, scene, i);
             continue;
         }
         const fct_scene_node *node = scene->nodes + next.child;
         int base = top;
         for (int k = 0; k < FCT_SCENE_WIDTH && node->child[k] != FCT_NONE; ++k) {
-            double bound = child_distance(node, k, s.point);
+            double bound = measure_child_distance(node, k, s.point);
             if (bound > s.distance) continue;
             int place = top++;
             while (place > base && stack[place - 1].bound < bound) stack[place] = stack[place - 1], --place;

@@ -1,10 +1,11 @@
 /* scene/rays.c: closest hit and any hit through the instances.
  *
- * Wide nodes are tested eight children at a time, in plain loops that compilers turn into vector code; the
- * near ones are visited first. At an instance the ray is taken to the model, its direction not normalised, so
- * that t means the same in both spaces; an instance that stands untransformed gets the ray as it is. Box
- * tests widen the far side by the rounding of the products, and instance boxes hold the slack of the
- * transform (transform.c), so no hit is lost to a box. Equal t: the lower instance.
+ * A plain loop tests the eight children of a node, so that compilers vectorise it. The traversal visits the
+ * nearest child first. At an instance it transforms the ray to the model without normalising the direction,
+ * so t means the same in both spaces; an instance without a transform gets the ray unchanged.
+ *
+ * No box loses a hit: the box test allows for the rounding of its products, and instance boxes have slack for
+ * the rounding of the transformed ray (transform.c). Equal t: the lower instance.
  */
 #include <float.h>
 #include <math.h>
@@ -13,13 +14,15 @@
 #include "scene/transform.h"
 
 enum { STACK = FCT_SCENE_DEPTH * (FCT_SCENE_WIDTH - 1) + 1 };
+#define ROUNDING 4e-7f
 
 typedef struct slabs {
     float origin[3], inverse[3];
-    int near[3]; /* row of fct_scene_node.bounds on the ray's near side; the far side is near ^ 1 */
+    int near[3]; /* row of fct_scene_node.bounds where the ray enters a slab; it leaves at row near ^ 1 */
 } slabs;
 
-static inline bool set_slabs(const fct_ray *ray, slabs *s) {
+/* Returns false for a ray that hits nothing: a NaN, no direction, or t_min > t_max. */
+static inline bool prepare_slabs(const fct_ray *ray, slabs *s) {
     bool moving = false;
     for (int c = 0; c < 3; ++c) {
         float o = ray->origin[c], d = ray->direction[c];
@@ -32,9 +35,9 @@ static inline bool set_slabs(const fct_ray *ray, slabs *s) {
     return moving && ray->t_min <= ray->t_max;
 }
 
-/* Entry distances of the eight children, INFINITY where the ray passes by. */
-static inline void enter(const fct_scene_node *node, const slabs *s, float t_min, float t_max,
-                         float entry[FCT_SCENE_WIDTH]) {
+/* Entry distances of the eight children, or INFINITY for a child that the ray misses. */
+static inline void meet_children(const fct_scene_node *node, const slabs *s, float t_min, float t_max,
+                                 float entry[FCT_SCENE_WIDTH]) {
     const float *x0 = node->bounds[s->near[0]], *x1 = node->bounds[s->near[0] ^ 1];
     const float *y0 = node->bounds[s->near[1]], *y1 = node->bounds[s->near[1] ^ 1];
     const float *z0 = node->bounds[s->near[2]], *z1 = node->bounds[s->near[2] ^ 1];
@@ -45,15 +48,16 @@ static inline void enter(const fct_scene_node *node, const slabs *s, float t_min
         float fx = (x1[k] - ox) * ix, fy = (y1[k] - oy) * iy, fz = (z1[k] - oz) * iz;
         float near = nx > ny ? nx : ny, far = fx < fy ? fx : fy;
         near = nz > near ? nz : near, far = fz < far ? fz : far;
-        /* three roundings on either side; products, so that the infinities of an empty child stay what they
-         * are */
-        near *= near > 0 ? 1 - 4e-7f : 1 + 4e-7f, far *= far > 0 ? 1 + 4e-7f : 1 - 4e-7f;
+        /* Each distance has three roundings, below ROUNDING together. A product keeps the infinities of an
+         * empty child. */
+        near *= near > 0 ? 1 - ROUNDING : 1 + ROUNDING, far *= far > 0 ? 1 + ROUNDING : 1 - ROUNDING;
         near = near > t_min ? near : t_min, far = far < t_max ? far : t_max;
         entry[k] = near <= far ? near : INFINITY;
     }
 }
 
-static inline void to_model(const fct_scene_frame *frame, const fct_ray *ray, float t_max, fct_ray *out) {
+static inline void move_ray_to_model(const fct_scene_frame *frame, const fct_ray *ray, float t_max,
+                                     fct_ray *out) {
     const double *m = frame->to_model;
     const float *l = frame->linear, *d = ray->direction;
     double x = ray->origin[0], y = ray->origin[1], z = ray->origin[2];
@@ -70,9 +74,9 @@ typedef struct pending {
     uint32_t child;
 } pending;
 
-/* Pushes the children that are entered, the nearest on top. */
-static inline int push_sorted(const fct_scene_node *node, const float entry[FCT_SCENE_WIDTH], pending *stack,
-                              int top) {
+/* Pushes the children that the ray enters, the nearest on top. */
+static inline int push_children_sorted(const fct_scene_node *node, const float entry[FCT_SCENE_WIDTH],
+                                       pending *stack, int top) {
     int base = top;
     for (int k = 0; k < FCT_SCENE_WIDTH; ++k) {
         if (!(entry[k] < INFINITY)) continue;
@@ -91,15 +95,15 @@ bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene
     pending stack[STACK];
     int top = 0;
     hit->instance = hit->face = FCT_NONE;
-    if (!set_slabs(ray, &s)) return false;
+    if (!prepare_slabs(ray, &s)) return false;
     stack[top++] = (pending){ray->t_min, 0};
     while (top > 0) {
         pending next = stack[--top];
         if (next.entry > limit) continue;
         if (!(next.child & FCT_SCENE_LEAF)) {
             float entry[FCT_SCENE_WIDTH];
-            enter(scene->nodes + next.child, &s, ray->t_min, limit, entry);
-            top = push_sorted(scene->nodes + next.child, entry, stack, top);
+            meet_children(scene->nodes + next.child, &s, ray->t_min, limit, entry);
+            top = push_children_sorted(scene->nodes + next.child, entry, stack, top);
             if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
             continue;
         }
@@ -108,7 +112,7 @@ bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene
         fct_ray local = *ray;
         fct_hit found;
         local.t_max = limit;
-        if (!frame->identity) to_model(frame, ray, limit, &local);
+        if (!frame->identity) move_ray_to_model(frame, ray, limit, &local);
         if (!fct_bvh_closest_hit(frame->bvh, &local, &found, visits)) continue;
         if (hit->instance != FCT_NONE && (found.t > limit || (found.t == limit && i > hit->instance)))
             continue;
@@ -121,7 +125,7 @@ bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene
     hit->face = best.face, hit->place = best.place;
     v3 normal = v3_load(best.normal);
     if (!scene->frames[hit->instance].identity) {
-        /* unit first: the square of a small triangle's area may not fit the matrix's products */
+        /* Normalised first, so that the products of a tiny or huge normal stay in range. */
         const fct_instance *placed = scene->instances + hit->instance;
         normal = fct_transform_normal(placed->normal_matrix, v3_unit(normal));
         if (placed->mirrored) normal = v3_scale(normal, -1);
@@ -134,14 +138,14 @@ bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *v
     slabs s;
     uint32_t stack[STACK];
     int top = 0;
-    if (!set_slabs(ray, &s)) return false;
+    if (!prepare_slabs(ray, &s)) return false;
     stack[top++] = 0;
     while (top > 0) {
         uint32_t child = stack[--top];
         if (!(child & FCT_SCENE_LEAF)) {
             const fct_scene_node *node = scene->nodes + child;
             float entry[FCT_SCENE_WIDTH];
-            enter(node, &s, ray->t_min, ray->t_max, entry);
+            meet_children(node, &s, ray->t_min, ray->t_max, entry);
             for (int k = 0; k < FCT_SCENE_WIDTH; ++k)
                 if (entry[k] < INFINITY) stack[top++] = node->child[k];
             if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
@@ -149,7 +153,7 @@ bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *v
         }
         const fct_scene_frame *frame = scene->frames + (child & ~FCT_SCENE_LEAF);
         fct_ray local;
-        if (!frame->identity) to_model(frame, ray, ray->t_max, &local);
+        if (!frame->identity) move_ray_to_model(frame, ray, ray->t_max, &local);
         if (fct_bvh_any_hit(frame->bvh, frame->identity ? ray : &local, visits)) return true;
     }
     return false;

@@ -1,5 +1,5 @@
-/* scene/scene.c: building a scene: materials, models cut by material, objects, and the step that freezes it
- * all. Rays are in rays.c, closest points in closest.c, the hierarchy above the instances in volume.c.
+/* scene/scene.c: builds a scene: materials, models split by material, objects, and the commit that makes it
+ * immutable. Queries are in rays.c and closest.c, the hierarchy over instances is in volume.c.
  */
 #include "scene/scene.h"
 
@@ -42,8 +42,8 @@ void fct_scene_destroy(fct_scene *scene) {
 static fct_result copy_name(const fct_env *env, const char *what, const char *name, char *to, size_t size) {
     size_t length = strlen(name);
     if (length >= size)
-        return fct_fail(env, FCT_ERROR_DATA, "%s name \"%.40s...\" has %zu bytes, at most %zu are allowed",
-                        what, name, length, size - 1);
+        return fct_fail(env, FCT_ERROR_DATA, "%s name \"%.40s...\" has %zu bytes, expected at most %zu", what,
+                        name, length, size - 1);
     memcpy(to, name, length + 1);
     return FCT_OK;
 }
@@ -55,7 +55,7 @@ fct_result fct_scene_add_material(fct_scene *scene, const fct_material *material
     const fct_env *env = scene->env;
     *id = FCT_NONE;
     if (!memchr(material->name, 0, sizeof material->name))
-        return fct_fail(env, FCT_ERROR_DATA, "a material's name is not terminated");
+        return fct_fail(env, FCT_ERROR_DATA, "a material's name has no terminating zero");
     for (int c = 0; c < 3; ++c) {
         float r = material->reflectance[c], e = material->emission[c];
         if (!(r >= 0 && r < 1))
@@ -91,6 +91,8 @@ fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_
 
 /* ---- Models ---- */
 
+/* A tree with more roots is built again from its mesh: opening a model opens all its roots, and the links
+ * between roots grow with the square of their number. */
 #define MOST_ROOTS 64
 
 static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model *own) {
@@ -100,7 +102,7 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
     if (result == FCT_OK && depth > FCT_SCENE_TREE_DEPTH)
-        result = fct_fail(env, FCT_ERROR_DATA, "model \"%s\": its tree has depth %u, at most %d is allowed",
+        result = fct_fail(env, FCT_ERROR_DATA, "model \"%s\": its tree has depth %u, expected at most %d",
                           name, depth, FCT_SCENE_TREE_DEPTH);
     if (result == FCT_OK)
         result = fct_grow(env, (void **)&scene->models, &scene->model_capacity,
@@ -117,9 +119,9 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
     return FCT_OK;
 }
 
-/* One tree over the faces listed, or over the whole mesh when `faces` is NULL. */
-static fct_result add_part(fct_scene *scene, const char *name, const fct_mesh *mesh, uint32_t *faces,
-                           uint32_t count) {
+/* Adds a model of the listed faces, or of the whole mesh if `faces` is NULL. */
+static fct_result add_model_of_faces(fct_scene *scene, const char *name, const fct_mesh *mesh,
+                                     uint32_t *faces, uint32_t count) {
     const fct_env *env = scene->env;
     fct_scene_model own = {0};
     fct_mesh part = {0};
@@ -142,16 +144,15 @@ static fct_result add_part(fct_scene *scene, const char *name, const fct_mesh *m
     return add_model(scene, name, &own);
 }
 
-/* The model of a tree that came from outside. One of very many roots is built anew: whoever opens a model
- * meets all its roots at once, and links between them grow with their square. */
-static fct_result add_tree(fct_scene *scene, const char *name, fct_tree *tree) {
+/* Adds a model of a given tree, and destroys the tree after a failure. */
+static fct_result add_model_of_tree(fct_scene *scene, const char *name, fct_tree *tree) {
     fct_scene_model own = {.tree = tree};
     if (fct_tree_get(tree).root_count <= MOST_ROOTS) return add_model(scene, name, &own);
     fct_mesh mesh;
     fct_result result = fct_tree_mesh(scene->env, tree, &mesh);
     fct_tree_destroy(tree);
     if (result != FCT_OK) return result;
-    result = add_part(scene, name, &mesh, NULL, mesh.face_count);
+    result = add_model_of_faces(scene, name, &mesh, NULL, mesh.face_count);
     fct_mesh_release(scene->env, &mesh);
     return result;
 }
@@ -187,7 +188,7 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
     for (uint32_t k = 0; k < label_count && result == FCT_OK; ++k) {
         uint32_t count = starts[k + 1] - starts[k];
         if (count == 0) continue;
-        result = add_part(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count);
+        result = add_model_of_faces(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count);
         if (result == FCT_OK) parts->labels[parts->count++] = k;
     }
 done:
@@ -209,7 +210,8 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
             if (tree) fct_tree_destroy(tree);
             return fct_fail_memory(env, "a model");
         }
-        result = tree ? add_tree(scene, name, tree) : add_part(scene, name, mesh, NULL, mesh->face_count);
+        result = tree ? add_model_of_tree(scene, name, tree)
+                      : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count);
         parts->count = 1;
     }
     if (result != FCT_OK) {
@@ -222,8 +224,8 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
 
 /* ---- Instances ---- */
 
-static fct_result set_transform(const fct_env *env, const char *name, const float transform[12],
-                                fct_instance *instance, fct_scene_frame *frame) {
+static fct_result set_instance_transform(const fct_env *env, const char *name, const float transform[12],
+                                         fct_instance *instance, fct_scene_frame *frame) {
     const float *m = transform ? transform : fct_transform_identity;
     switch (fct_transform_set(m, instance, frame->to_model)) {
     case FCT_TRANSFORM_NOT_FINITE:
@@ -248,7 +250,7 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
     fct_instance instance = {.object = scene->object_count};
     fct_scene_frame frame = {0};
     fct_result result = copy_name(env, "instance", name, instance.name, sizeof instance.name);
-    if (result == FCT_OK) result = set_transform(env, name, transform, &instance, &frame);
+    if (result == FCT_OK) result = set_instance_transform(env, name, transform, &instance, &frame);
     size_t needed = (size_t)scene->instance_count + count;
     if (result == FCT_OK && needed > INT32_MAX / 2)
         result = fct_fail(env, FCT_ERROR_DATA, "the scene has more than 2^30 instances");
@@ -280,16 +282,17 @@ fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_me
     assert(face_materials || material < scene->material_count);
     const fct_env *env = scene->env;
     fct_scene_parts parts = {0};
-    fct_instance probe; /* a bad transform is told before the mesh is clustered */
+    fct_instance probe; /* a bad transform is reported before the mesh is clustered */
     fct_scene_frame frame;
-    fct_result result = set_transform(env, name, transform, &probe, &frame);
+    fct_result result = set_instance_transform(env, name, transform, &probe, &frame);
     if (result == FCT_OK && !tree) result = fct_mesh_validate(env, mesh);
     if (result == FCT_OK && !tree && mesh->face_count == 0)
         result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\" has no faces", name);
     for (uint32_t f = 0; result == FCT_OK && face_materials && f < mesh->face_count; ++f)
         if (face_materials[f] >= scene->material_count)
-            result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\": face %u has material %u of %u", name, f,
-                              face_materials[f], scene->material_count);
+            result =
+                fct_fail(env, FCT_ERROR_DATA, "object \"%s\": face %u has material %u, expected one below %u",
+                         name, f, face_materials[f], scene->material_count);
     if (result != FCT_OK) {
         if (tree) fct_tree_destroy(tree);
         return result;
@@ -326,7 +329,7 @@ void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera) {
 
 /* ---- Commit ---- */
 
-static fct_result build_bvhs(fct_scene *scene) {
+static fct_result build_ray_structures(fct_scene *scene) {
     const fct_env *env = scene->env;
     for (uint32_t m = 0; m < scene->model_count; ++m) {
         fct_scene_model *own = scene->own + m;
@@ -339,7 +342,7 @@ static fct_result build_bvhs(fct_scene *scene) {
     return FCT_OK;
 }
 
-static fct_result place_bounds(fct_scene *scene, fct_bounds *bounds) {
+static fct_result bound_instances(fct_scene *scene, fct_bounds *bounds) {
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         fct_instance *instance = scene->instances + i;
         const fct_scene_model *own = scene->own + instance->model;
@@ -349,8 +352,8 @@ static fct_result place_bounds(fct_scene *scene, fct_bounds *bounds) {
         if (result != FCT_OK) return result;
         for (int c = 0; c < 3; ++c)
             if (!isfinite(instance->bounds.lower[c]) || !isfinite(instance->bounds.upper[c]))
-                return fct_fail(scene->env, FCT_ERROR_DATA,
-                                "instance \"%s\" reaches beyond what a float can hold", instance->name);
+                return fct_fail(scene->env, FCT_ERROR_DATA, "instance \"%s\": its bounds do not fit a float",
+                                instance->name);
         bounds[i] = instance->bounds;
         scene->frames[i].bvh = own->bvh;
         scene->face_count += fct_tree_get(own->tree).face_count;
@@ -358,8 +361,9 @@ static fct_result place_bounds(fct_scene *scene, fct_bounds *bounds) {
     return FCT_OK;
 }
 
-/* From the front, a little above and to the right (y is up), so that the sphere around the bounds fits. */
-static void view_the_whole(fct_scene *scene) {
+/* Default camera: from the front right, a little above (y is up). The sphere around the bounds fills the
+ * view. */
+static void set_default_camera(fct_scene *scene) {
     double square = 0;
     v3 toward = v3_unit(v3_make(.45, .35, .85));
     for (int c = 0; c < 3; ++c) {
@@ -370,12 +374,12 @@ static void view_the_whole(fct_scene *scene) {
     }
     double radius = fmax(.5 * sqrt(square), 1e-30);
     scene->camera.vertical_fov = 40;
-    double distance = radius / sin(20 * 3.14159265358979323846 / 180);
+    double distance = radius / sin(20 * 3.14159265358979323846 / 180); /* half of the angle */
     v3_store(scene->camera.position, v3_mad(v3_load(scene->camera.target), distance, toward));
     scene->camera.up[1] = 1;
 }
 
-static fct_result check_groups(fct_scene *scene) {
+static fct_result check_light_groups(fct_scene *scene) {
     uint32_t id;
     if (scene->light_group_count == 0) {
         fct_result result = fct_scene_add_light_group(scene, "all", &id);
@@ -383,9 +387,9 @@ static fct_result check_groups(fct_scene *scene) {
     }
     for (uint32_t m = 0; m < scene->material_count; ++m)
         if (scene->materials[m].light_group >= scene->light_group_count)
-            return fct_fail(scene->env, FCT_ERROR_DATA, "material \"%s\" is in light group %u of %u",
-                            scene->materials[m].name, scene->materials[m].light_group,
-                            scene->light_group_count);
+            return fct_fail(
+                scene->env, FCT_ERROR_DATA, "material \"%s\" has light group %u, expected one below %u",
+                scene->materials[m].name, scene->materials[m].light_group, scene->light_group_count);
     return FCT_OK;
 }
 
@@ -393,8 +397,8 @@ fct_result fct_scene_commit(fct_scene *scene) {
     assert(!scene->committed);
     const fct_env *env = scene->env;
     if (scene->instance_count == 0) return fct_fail(env, FCT_ERROR_DATA, "the scene has no instances");
-    fct_result result = check_groups(scene);
-    if (result == FCT_OK) result = build_bvhs(scene);
+    fct_result result = check_light_groups(scene);
+    if (result == FCT_OK) result = build_ray_structures(scene);
     if (result != FCT_OK) return result;
     fct_bounds *bounds = fct_allocate(env, scene->instance_count, sizeof *bounds);
     scene->volumes = fct_allocate(env, 2 * (size_t)scene->instance_count - 1, sizeof *scene->volumes);
@@ -402,7 +406,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
         fct_release(env, bounds);
         return fct_fail_memory(env, "the volumes of a scene");
     }
-    result = place_bounds(scene, bounds);
+    result = bound_instances(scene, bounds);
     if (result == FCT_OK)
         result = fct_scene_build_volumes(env, scene->instance_count, bounds, scene->volumes);
     if (result == FCT_OK)
@@ -410,7 +414,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
     fct_release(env, bounds);
     if (result != FCT_OK) return result;
     scene->bounds = scene->volumes[0].bounds;
-    if (!scene->camera.given) view_the_whole(scene);
+    if (!scene->camera.given) set_default_camera(scene);
     scene->committed = true;
     return FCT_OK;
 }

@@ -1,7 +1,7 @@
-/* scene/transform.c: see transform.h. Everything is computed in double and rounded once.
+/* scene/transform.c: transforms of instances, computed in double and rounded once.
  *
- * Area vectors: the transformed triangle's cross product is cof(R) times the old one, cof(R) = det(R) R^-T;
- * under a reflection it points into a closed model.
+ * R takes the area vector n of a triangle to cof(R) n, where cof(R) = det(R) R^-T. Under a reflection the
+ * result of an outward vector points into a closed model.
  */
 #include "scene/transform.h"
 
@@ -13,7 +13,15 @@
 
 const float fct_transform_identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-enum { CUT = 256 }; /* clusters whose boxes bound a placed model */
+enum { CUT = 256 }; /* clusters whose boxes bound an instance */
+
+/* Relative differences of R^T R from a multiple of the identity below this count as rounding of floats. */
+#define UNIFORM_TOLERANCE 1e-5
+/* |det R| over the product of the columns' lengths. */
+#define SINGULAR_RATIO 1e-6
+/* Of the coordinates of a box: the float origin of a transformed ray errs by less than 2^-23 of them per
+ * axis. */
+#define RAY_SLACK 1e-6
 
 static bool all_finite(const float *values, int count) {
     for (int i = 0; i < count; ++i)
@@ -21,11 +29,12 @@ static bool all_finite(const float *values, int count) {
     return true;
 }
 
-static double rotation_scale(const v3 column[3]) {
+/* The factor s if R is s times a rotation or reflection, else 0. */
+static double find_uniform_scale(const v3 column[3]) {
     double square = (v3_norm2(column[0]) + v3_norm2(column[1]) + v3_norm2(column[2])) / 3;
     for (int i = 0; i < 3; ++i) {
-        if (fabs(v3_norm2(column[i]) - square) > 1e-5 * square) return 0;
-        if (fabs(v3_dot(column[i], column[(i + 1) % 3])) > 1e-5 * square) return 0;
+        if (fabs(v3_norm2(column[i]) - square) > UNIFORM_TOLERANCE * square) return 0;
+        if (fabs(v3_dot(column[i], column[(i + 1) % 3])) > UNIFORM_TOLERANCE * square) return 0;
     }
     return sqrt(square);
 }
@@ -37,9 +46,9 @@ fct_transform_kind fct_transform_set(const float m[12], fct_instance *instance, 
     for (int j = 0; j < 3; ++j) cofactor[j] = v3_cross(column[(j + 1) % 3], column[(j + 2) % 3]);
     double det = v3_dot(column[0], cofactor[0]);
     double volume = v3_norm(column[0]) * v3_norm(column[1]) * v3_norm(column[2]);
-    if (!(fabs(det) > 1e-6 * volume)) return FCT_TRANSFORM_SINGULAR;
+    if (!(fabs(det) > SINGULAR_RATIO * volume)) return FCT_TRANSFORM_SINGULAR;
     v3 t = v3_make(m[3], m[7], m[11]);
-    for (int j = 0; j < 3; ++j) { /* the cofactor columns over det are the rows of the inverse */
+    for (int j = 0; j < 3; ++j) { /* column j of the cofactors over det is row j of the inverse */
         v3 row = v3_scale(cofactor[j], 1 / det);
         double four[4] = {row.x, row.y, row.z, -v3_dot(row, t)};
         memcpy(inverse + 4 * j, four, sizeof four);
@@ -55,7 +64,7 @@ fct_transform_kind fct_transform_set(const float m[12], fct_instance *instance, 
         return FCT_TRANSFORM_SINGULAR;
     for (int j = 0; j < 3; ++j)
         if (v3_norm(cofactor[j]) < (double)FLT_MIN) return FCT_TRANSFORM_SINGULAR;
-    instance->uniform_scale = (float)rotation_scale(column);
+    instance->uniform_scale = (float)find_uniform_scale(column);
     instance->mirrored = det < 0;
     return FCT_TRANSFORM_GOOD;
 }
@@ -82,8 +91,8 @@ void fct_transform_compose(const double translate[3], const double q[4], const d
     }
 }
 
-/* Grows bounds by the image of an oriented box, and by what the rounding of a transformed ray may move. */
-static void add_box(const float m[12], const fct_box *box, double lower[3], double upper[3]) {
+/* Grows bounds by the image of an oriented box, with slack. */
+static void add_transformed_box(const float m[12], const fct_box *box, double lower[3], double upper[3]) {
     v3 center = fct_transform_point(m, v3_load(box->center));
     double c[3] = {center.x, center.y, center.z}, extent[3] = {0, 0, 0};
     for (int k = 0; k < 3; ++k) {
@@ -91,7 +100,7 @@ static void add_box(const float m[12], const fct_box *box, double lower[3], doub
         extent[0] += fabs(axis.x), extent[1] += fabs(axis.y), extent[2] += fabs(axis.z);
     }
     for (int i = 0; i < 3; ++i) {
-        double slack = 1e-6 * (fabs(c[i]) + extent[0] + extent[1] + extent[2]);
+        double slack = RAY_SLACK * (fabs(c[i]) + extent[0] + extent[1] + extent[2]);
         lower[i] = fmin(lower[i], c[i] - extent[i] - slack);
         upper[i] = fmax(upper[i], c[i] + extent[i] + slack);
     }
@@ -112,7 +121,7 @@ fct_result fct_transform_bounds(const fct_env *env, const fct_tree *tree, const 
         float below = whole.center[i] - model->lower[i], above = model->upper[i] - whole.center[i];
         whole.half[i] = below > above ? below : above;
     }
-    add_box(to_world, &whole, lower, upper);
+    add_transformed_box(to_world, &whole, lower, upper);
 
     fct_tree_view view = fct_tree_get(tree);
     uint32_t count = view.root_count > CUT ? view.root_count : CUT;
@@ -124,11 +133,11 @@ fct_result fct_transform_bounds(const fct_env *env, const fct_tree *tree, const 
         fct_box box;
         result = fct_tree_cluster(tree, nodes[k], &cluster);
         fct_cluster_box(&cluster, &box);
-        add_box(to_world, &box, tight_lower, tight_upper);
+        add_transformed_box(to_world, &box, tight_lower, tight_upper);
     }
     fct_release(env, nodes);
     if (result != FCT_OK) return result;
-    for (int i = 0; i < 3; ++i) { /* each is conservative, so their meeting is; rounded outwards to float */
+    for (int i = 0; i < 3; ++i) { /* both bounds hold the surface, so their intersection does */
         out->lower[i] = nextafterf((float)fmax(lower[i], tight_lower[i]), -INFINITY);
         out->upper[i] = nextafterf((float)fmin(upper[i], tight_upper[i]), INFINITY);
     }
@@ -136,8 +145,10 @@ fct_result fct_transform_bounds(const fct_env *env, const fct_tree *tree, const 
 }
 
 double fct_transform_shrink(const fct_instance *instance) {
-    if (instance->uniform_scale > 0) return instance->uniform_scale * (1 - 2e-5);
-    /* |R^-1|_2 <= sqrt(|R^-1|_1 |R^-1|_inf) */
+    /* A uniform R may differ from a rotation by UNIFORM_TOLERANCE. */
+    if (instance->uniform_scale > 0) return instance->uniform_scale * (1 - 2 * UNIFORM_TOLERANCE);
+    /* The least stretch of R is 1 / |R^-1|_2, and |R^-1|_2 <= sqrt(|R^-1|_1 |R^-1|_inf). The factor covers
+     * the rounding of to_model. */
     double row = 0, column = 0;
     for (int i = 0; i < 3; ++i) {
         const float *m = instance->to_model;

@@ -1,9 +1,10 @@
 /* scene/volume.c: the hierarchy over instances.
  *
- * In: a box per instance. Out: a binary tree of volumes by the surface area heuristic (every split of the
- * boxes sorted by centre along each axis), and the same tree eight wide for rays. O(n log^2 n). Depth is at
- * most FCT_SCENE_DEPTH, for below level 32 ranges are halved; 2^30 instances need 30 more levels. Ties go to
- * the lower instance, so the result does not depend on threads or addresses.
+ * Input: a box per instance. Output: a binary tree of volumes, and the same tree eight wide for rays. A range
+ * of boxes is sorted by centre along each axis and split where area times count, summed over both sides, is
+ * least. Below level HALVE_LEVEL ranges are halved, so that the depth stays below FCT_SCENE_DEPTH: 2^30
+ * instances need 30 more levels. Equal centres are sorted by instance, so the result does not depend on
+ * addresses. O(n log^2 n).
  */
 #include "scene/volume.h"
 
@@ -13,6 +14,7 @@
 #include <string.h>
 
 #define PAD 0x1p-21f /* of the scene's largest extent */
+enum { HALVE_LEVEL = 32 };
 
 typedef struct entry {
     float key;
@@ -37,27 +39,27 @@ static int compare_entries(const void *a, const void *b) {
     return (x->instance > y->instance) - (x->instance < y->instance);
 }
 
-static void grow(fct_bounds *box, const fct_bounds *by) {
+static void grow_bounds(fct_bounds *box, const fct_bounds *by) {
     for (int c = 0; c < 3; ++c) {
         box->lower[c] = by->lower[c] < box->lower[c] ? by->lower[c] : box->lower[c];
         box->upper[c] = by->upper[c] > box->upper[c] ? by->upper[c] : box->upper[c];
     }
 }
 
-/* Half the surface, scaled down so that extents of 1e30 do not overflow. */
+/* Half of the surface. The scale keeps extents of 1e30 from overflowing. */
 static float half_area(const fct_bounds *box, float scale) {
     float x = (box->upper[0] - box->lower[0]) * scale, y = (box->upper[1] - box->lower[1]) * scale,
           z = (box->upper[2] - box->lower[2]) * scale;
     return x * y + y * z + z * x;
 }
 
-/* Reorders the range's entries for its best split and returns how many go left. */
-static uint32_t split(builder *b, const range *r, float scale) {
+/* Sorts the range's entries for its best split and returns the size of the left part. */
+static uint32_t split_range(builder *b, const range *r, float scale) {
     entry *entries = b->entries + r->first;
     int best_axis = -1;
     uint32_t best_left = r->count / 2;
     double best_cost = INFINITY;
-    bool halve = r->level >= 32;
+    bool halve = r->level >= HALVE_LEVEL;
     for (int axis = 0; axis < 3; ++axis) {
         for (uint32_t k = 0; k < r->count; ++k) {
             const fct_bounds *box = b->bounds + entries[k].instance;
@@ -66,12 +68,12 @@ static uint32_t split(builder *b, const range *r, float scale) {
         qsort(b->trial, r->count, sizeof *b->trial, compare_entries);
         fct_bounds box = b->bounds[b->trial[0].instance];
         for (uint32_t k = 0; k + 1 < r->count; ++k) {
-            grow(&box, b->bounds + b->trial[k].instance);
+            grow_bounds(&box, b->bounds + b->trial[k].instance);
             b->areas[k] = half_area(&box, scale);
         }
         box = b->bounds[b->trial[r->count - 1].instance];
         for (uint32_t k = r->count - 1; k > 0; --k) {
-            grow(&box, b->bounds + b->trial[k].instance);
+            grow_bounds(&box, b->bounds + b->trial[k].instance);
             double cost = (double)b->areas[k - 1] * k + (double)half_area(&box, scale) * (r->count - k);
             bool allowed = !halve || k == r->count / 2;
             if (allowed && cost < best_cost) best_cost = cost, best_left = k, best_axis = axis;
@@ -87,7 +89,7 @@ static uint32_t split(builder *b, const range *r, float scale) {
     return best_left;
 }
 
-static void build(builder *b, uint32_t count, float scale) {
+static void split_ranges(builder *b, uint32_t count, float scale) {
     range stack[FCT_SCENE_DEPTH + 2];
     int top = 0;
     b->volume_count = 1;
@@ -97,12 +99,12 @@ static void build(builder *b, uint32_t count, float scale) {
         fct_volume *volume = b->volumes + r.node;
         const entry *entries = b->entries + r.first;
         *volume = (fct_volume){b->bounds[entries[0].instance], {FCT_NONE, FCT_NONE}, FCT_NONE};
-        for (uint32_t k = 1; k < r.count; ++k) grow(&volume->bounds, b->bounds + entries[k].instance);
+        for (uint32_t k = 1; k < r.count; ++k) grow_bounds(&volume->bounds, b->bounds + entries[k].instance);
         if (r.count == 1) {
             volume->instance = entries[0].instance;
             continue;
         }
-        uint32_t left = split(b, &r, scale), child = b->volume_count;
+        uint32_t left = split_range(b, &r, scale), child = b->volume_count;
         volume->child[0] = child, volume->child[1] = child + 1;
         b->volume_count += 2;
         stack[top++] = (range){child + 1, r.first + left, r.count - left, r.level + 1};
@@ -122,10 +124,10 @@ fct_result fct_scene_build_volumes(const fct_env *env, uint32_t count, const fct
         float size = FLT_MIN;
         for (uint32_t i = 0; i < count; ++i) {
             b.entries[i] = (entry){0, i};
-            grow(&whole, bounds + i);
+            grow_bounds(&whole, bounds + i);
         }
         for (int c = 0; c < 3; ++c) size = fmaxf(size, whole.upper[c] - whole.lower[c]);
-        build(&b, count, 1 / size);
+        split_ranges(&b, count, 1 / size);
     } else {
         result = fct_fail_memory(env, "the volumes of a scene");
     }
@@ -135,8 +137,9 @@ fct_result fct_scene_build_volumes(const fct_env *env, uint32_t count, const fct
     return result;
 }
 
-/* Opens the children of a volume until there are eight of them or none can be opened: the largest first. */
-static uint32_t collect(const fct_volume *volumes, uint32_t root, uint32_t slots[FCT_SCENE_WIDTH]) {
+/* Lists the children of a wide node: opens the largest volume until there are eight, or only instances.
+ * Returns their number. */
+static uint32_t collect_children(const fct_volume *volumes, uint32_t root, uint32_t slots[FCT_SCENE_WIDTH]) {
     uint32_t count = 1;
     slots[0] = root;
     while (count < FCT_SCENE_WIDTH) {
@@ -157,9 +160,10 @@ static uint32_t collect(const fct_volume *volumes, uint32_t root, uint32_t slots
     return count;
 }
 
-/* Boxes are widened by `pad`, for a ray that runs in the plane of a box's side never enters the bare box. */
-static void set_slot(fct_scene_node *node, uint32_t slot, const fct_volume *volume, float pad,
-                     uint32_t child) {
+/* Sets a child and its box. The box is wider by `pad`, because a ray in the plane of a box's side does not
+ * enter the bare box. Without a volume, the bounds are such that no ray hits them. */
+static void set_child(fct_scene_node *node, uint32_t slot, const fct_volume *volume, float pad,
+                      uint32_t child) {
     node->child[slot] = child;
     for (int c = 0; c < 3; ++c) {
         node->bounds[2 * c][slot] = volume ? nextafterf(volume->bounds.lower[c] - pad, -INFINITY) : INFINITY;
@@ -170,9 +174,9 @@ static void set_slot(fct_scene_node *node, uint32_t slot, const fct_volume *volu
 
 fct_result fct_scene_build_nodes(const fct_env *env, uint32_t count, const fct_volume *volumes,
                                  fct_scene_node **out) {
-    /* every wide node takes in at least one inner volume, or is the root of a single leaf */
+    /* Each wide node replaces at least one inner volume, except the root over a single instance. */
     fct_scene_node *nodes = fct_allocate(env, count, sizeof *nodes);
-    uint32_t *origins = fct_allocate(env, count, sizeof *origins); /* wide node -> its volume */
+    uint32_t *origins = fct_allocate(env, count, sizeof *origins); /* wide node -> the volume it replaces */
     *out = NULL;
     if (!nodes || !origins) {
         fct_release(env, nodes);
@@ -185,15 +189,15 @@ fct_result fct_scene_build_nodes(const fct_env *env, uint32_t count, const fct_v
     const float pad = PAD * size;
     origins[0] = 0;
     for (uint32_t n = 0; n < node_count; ++n) {
-        uint32_t slots[FCT_SCENE_WIDTH], used = collect(volumes, origins[n], slots);
+        uint32_t slots[FCT_SCENE_WIDTH], used = collect_children(volumes, origins[n], slots);
         for (uint32_t k = 0; k < FCT_SCENE_WIDTH; ++k) {
             if (k >= used) {
-                set_slot(nodes + n, k, NULL, 0, FCT_NONE);
+                set_child(nodes + n, k, NULL, 0, FCT_NONE);
                 continue;
             }
             const fct_volume *volume = volumes + slots[k];
             uint32_t child = volume->instance != FCT_NONE ? FCT_SCENE_LEAF | volume->instance : node_count;
-            set_slot(nodes + n, k, volume, pad, child);
+            set_child(nodes + n, k, volume, pad, child);
             if (volume->instance == FCT_NONE) origins[node_count++] = slots[k];
         }
     }

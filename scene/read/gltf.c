@@ -1,9 +1,9 @@
-/* scene/read/gltf.c: glTF 2.0 as a scene: materials, meshes that nodes share, nodes, the first camera.
+/* scene/read/gltf.c: reads glTF 2.0: materials, meshes, nodes and the first perspective camera.
  *
- * Source: glTF 2.0 specification, chapters 3.5 to 3.10, and KHR_materials_emissive_strength. A mesh becomes
- * models, one for each material, when the first node places it. Points and lines are left out, and so are
- * textures, skins and animations. Under a mirroring node the specification turns the winding, as instances of
- * a scene do.
+ * Source: glTF 2.0 specification, chapters 3.5 to 3.10, and KHR_materials_emissive_strength. Nodes share
+ * meshes. When the first node places a mesh, the mesh becomes models, one per material. Points, lines,
+ * textures, skins and animations are ignored. A mirroring node reverses the winding, as the specification
+ * requires and as instances of a scene do.
  */
 #include "scene/read/gltf.h"
 
@@ -16,12 +16,12 @@
 #include "scene/read/gltf_pack.h"
 #include "scene/transform.h"
 
-/* Whites of 1 would let light live for ever. */
+/* With a reflectance of 1, light would never be absorbed. */
 #define MOST_REFLECTANCE .9f
 
 typedef struct visit {
     int64_t node;
-    double to_world[12]; /* of the parent */
+    double to_world[12]; /* of the parent node */
 } visit;
 
 typedef struct reader {
@@ -29,25 +29,25 @@ typedef struct reader {
     const fct_env *env;
     const char *name;
     fct_glb glb;
-    fct_scene_parts *meshes;        /* count 0: not read yet */
-    unsigned char *visited, *empty; /* by node; by mesh: read, and without triangles */
+    fct_scene_parts *meshes;        /* per mesh; count 0: not read yet */
+    unsigned char *visited, *empty; /* per node; per mesh: it has been read and has no triangles */
     size_t mesh_count, node_count, material_count, whitened;
     visit *stack;
     size_t stack_count, stack_capacity;
-    fct_soup soup; /* of the mesh at hand */
+    fct_soup soup; /* of the mesh that is being read */
     size_t position_capacity, corner_capacity, label_capacity;
 } reader;
 
-static size_t count_of(const reader *r, const char *name) {
+static size_t count_items(const reader *r, const char *name) {
     return json_array_size(json_object_get(r->glb.root, name));
 }
 
-static fct_result fail(const reader *r, const char *what, int64_t index, const char *text) {
+static fct_result fail_item(const reader *r, const char *what, int64_t index, const char *text) {
     return fct_fail(r->env, FCT_ERROR_DATA, "%s: %s[%lld]: %s", r->name, what, (long long)index, text);
 }
 
-/* `count` numbers, left as they are when the key is absent. */
-static bool numbers(json_t *object, const char *key, size_t count, double *out) {
+/* Reads `count` numbers. If the key is absent, *out is unchanged and the result is true. */
+static bool read_numbers(json_t *object, const char *key, size_t count, double *out) {
     json_t *array = json_object_get(object, key);
     if (!array) return true;
     if (json_array_size(array) != count) return false;
@@ -58,7 +58,7 @@ static bool numbers(json_t *object, const char *key, size_t count, double *out) 
     return true;
 }
 
-static void name_of(json_t *object, const char *what, size_t index, char *out, size_t size) {
+static void name_item(json_t *object, const char *what, size_t index, char *out, size_t size) {
     const char *name = json_string_value(json_object_get(object, "name"));
     if (name && name[0])
         snprintf(out, size, "%.*s", (int)size - 1, name);
@@ -66,10 +66,10 @@ static void name_of(json_t *object, const char *what, size_t index, char *out, s
         snprintf(out, size, "%s %zu", what, index);
 }
 
-/* ---- Materials: glTF's, and a last one for primitives without ---- */
+/* ---- Materials: those of the file, then one for primitives without a material ---- */
 
 static fct_result read_materials(reader *r) {
-    r->material_count = count_of(r, "materials");
+    r->material_count = count_items(r, "materials");
     for (size_t k = 0; k <= r->material_count; ++k) {
         json_t *object = json_array_get(json_object_get(r->glb.root, "materials"), k);
         json_t *surface = json_object_get(object, "pbrMetallicRoughness"),
@@ -79,20 +79,21 @@ static fct_result read_materials(reader *r) {
         double color[4] = {1, 1, 1, 1}, light[3] = {0, 0, 0},
                strength = strong ? json_number_value(strong) : 1;
         fct_material material = {.two_sided = json_is_true(json_object_get(object, "doubleSided"))};
-        name_of(object, "material", k, material.name, sizeof material.name);
+        name_item(object, "material", k, material.name, sizeof material.name);
         if (k == r->material_count) {
             color[0] = color[1] = color[2] = .7;
             strcpy(material.name, "(none)");
-        } else if (!numbers(surface, "baseColorFactor", 4, color) ||
-                   !numbers(object, "emissiveFactor", 3, light)) {
-            return fail(r, "materials", (int64_t)k, "a colour is not the numbers it should be");
+        } else if (!read_numbers(surface, "baseColorFactor", 4, color) ||
+                   !read_numbers(object, "emissiveFactor", 3, light)) {
+            return fail_item(r, "materials", (int64_t)k,
+                             "expected 4 numbers of baseColorFactor and 3 of emissiveFactor");
         }
         bool white = false;
         for (int c = 0; c < 3; ++c) {
             if (!(color[c] >= 0 && color[c] <= 1))
-                return fail(r, "materials", (int64_t)k, "expected a base colour in [0, 1]");
+                return fail_item(r, "materials", (int64_t)k, "expected a base colour in [0, 1]");
             if (!(light[c] >= 0 && strength >= 0))
-                return fail(r, "materials", (int64_t)k, "expected an emission >= 0");
+                return fail_item(r, "materials", (int64_t)k, "expected an emission >= 0");
             white |= color[c] > MOST_REFLECTANCE;
             material.reflectance[c] = fminf((float)color[c], MOST_REFLECTANCE);
             material.emission[c] = (float)(light[c] * strength);
@@ -104,15 +105,15 @@ static fct_result read_materials(reader *r) {
     }
     if (r->whitened)
         fct_note(r->env, FCT_MESSAGE_NOTE,
-                 "%s: %zu materials reflect more than %g and are taken to reflect that", r->name, r->whitened,
-                 (double)MOST_REFLECTANCE);
+                 "%s: %zu materials reflect more than %g; their reflectance is reduced to %g", r->name,
+                 r->whitened, (double)MOST_REFLECTANCE, (double)MOST_REFLECTANCE);
     return FCT_OK;
 }
 
 /* ---- Meshes ---- */
 
-/* Places in the index list of triangle k of a list (4), a strip (5) or a fan (6). */
-static void triangle_places(int64_t mode, size_t k, size_t places[3]) {
+/* Positions in the index list of the corners of triangle k of a list (mode 4), a strip (5) or a fan (6). */
+static void find_triangle_places(int64_t mode, size_t k, size_t places[3]) {
     size_t odd = k & 1;
     places[0] = mode == 4 ? 3 * k : mode == 5 ? k : k + 1;
     places[1] = mode == 4 ? 3 * k + 1 : mode == 5 ? k + 1 + odd : k + 2;
@@ -146,7 +147,7 @@ static fct_result add_triangles(reader *r, int64_t mode, const fct_glb_array *in
             fct_grow(r->env, (void **)&soup->materials, &r->label_capacity, total, sizeof *soup->materials);
     for (size_t k = 0; result == FCT_OK && k < triangles; ++k) {
         size_t places[3];
-        triangle_places(mode, k, places);
+        find_triangle_places(mode, k, places);
         for (int j = 0; j < 3; ++j) {
             double index = indices ? fct_glb_value(indices, places[j], 0) : (double)places[j];
             if (!(index >= 0 && index < (double)vertices))
@@ -170,10 +171,11 @@ static fct_result add_primitive(reader *r, json_t *primitive) {
     if (result != FCT_OK || position == FCT_GLB_ABSENT) return result;
     if (mode == FCT_GLB_ABSENT) mode = 4;
     if (mode > 6)
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive of mode %lld", r->name, (long long)mode);
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive has mode %lld, expected 0 to 6", r->name,
+                        (long long)mode);
     if (mode < 4) return FCT_OK;
     if (material != FCT_GLB_ABSENT && (uint64_t)material >= r->material_count)
-        return fail(r, "materials", material, "it is not there");
+        return fail_item(r, "materials", material, "a primitive uses it, but it does not exist");
     result = fct_glb_array_of(&r->glb, position, 3, 3, &positions);
     if (result == FCT_OK && index != FCT_GLB_ABSENT)
         result = fct_glb_array_of(&r->glb, index, 1, 1, &indices);
@@ -182,15 +184,15 @@ static fct_result add_primitive(reader *r, json_t *primitive) {
     bool indexed = index != FCT_GLB_ABSENT;
     size_t count = indexed ? indices.count : positions.count;
     if (mode == 4 && count % 3)
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive's %zu indices are no triangles", r->name,
-                        count);
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive has %zu indices, expected a multiple of 3",
+                        r->name, count);
     uint32_t label = material == FCT_GLB_ABSENT ? (uint32_t)r->material_count : (uint32_t)material;
     result = add_triangles(r, mode, indexed ? &indices : NULL, positions.count, count, label);
     r->soup.vertex_count += (uint32_t)positions.count;
     return result;
 }
 
-/* The mesh's models, made when a node first asks for them. */
+/* Adds the models of a mesh to the scene, unless they are there already. */
 static fct_result need_mesh(reader *r, int64_t index) {
     json_t *mesh, *primitive;
     size_t k;
@@ -208,10 +210,10 @@ static fct_result need_mesh(reader *r, int64_t index) {
         fct_soup_release(r->env, &r->soup);
         return result;
     }
-    uint32_t *labels = r->soup.materials; /* a soup of triangles keeps its faces */
+    uint32_t *labels = r->soup.materials; /* face k is triangle k, because nothing is triangulated */
     r->soup.materials = NULL;
     result = fct_soup_mesh(r->env, r->name, &r->soup, &made);
-    name_of(mesh, "mesh", (size_t)index, name, sizeof name);
+    name_item(mesh, "mesh", (size_t)index, name, sizeof name);
     if (result == FCT_OK) {
         result = fct_scene_split(r->scene, name, &made, NULL, labels, (uint32_t)r->material_count + 1,
                                  r->meshes + index);
@@ -223,18 +225,19 @@ static fct_result need_mesh(reader *r, int64_t index) {
 
 /* ---- Nodes ---- */
 
-static fct_result local_transform(const reader *r, json_t *node, int64_t index, double out[12]) {
+static fct_result read_local_transform(const reader *r, json_t *node, int64_t index, double out[12]) {
     double m[16], t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
     bool matrix = json_object_get(node, "matrix") != NULL;
-    if (!numbers(node, "matrix", 16, m) || !numbers(node, "translation", 3, t) ||
-        !numbers(node, "rotation", 4, q) || !numbers(node, "scale", 3, s))
-        return fail(r, "nodes", index, "its transform is not the numbers it should be");
+    if (!read_numbers(node, "matrix", 16, m) || !read_numbers(node, "translation", 3, t) ||
+        !read_numbers(node, "rotation", 4, q) || !read_numbers(node, "scale", 3, s))
+        return fail_item(r, "nodes", index,
+                         "expected numbers: 16 of matrix, 3 of translation, 4 of rotation, 3 of scale");
     fct_transform_compose(t, q, s, out);
     for (int i = 0; matrix && i < 12; ++i) out[i] = m[4 * (i % 4) + i / 4];
     return FCT_OK;
 }
 
-static fct_result take_camera(reader *r, json_t *node, int64_t index, const double m[12]) {
+static fct_result read_node_camera(reader *r, json_t *node, int64_t index, const double m[12]) {
     json_t *object;
     int64_t camera;
     fct_result result = fct_glb_index(&r->glb, node, "camera", &camera);
@@ -245,19 +248,19 @@ static fct_result take_camera(reader *r, json_t *node, int64_t index, const doub
     fct_camera c = {.vertical_fov = (float)(angle * 180 / 3.14159265358979323846)};
     if (!json_object_get(object, "perspective")) return FCT_OK;
     if (!(c.vertical_fov > 0 && c.vertical_fov < 180))
-        return fail(r, "cameras", camera, "expected yfov in (0, pi)");
+        return fail_item(r, "cameras", camera, "expected yfov in (0, pi)");
     for (int k = 0; k < 3; ++k) {
         c.position[k] = (float)m[4 * k + 3];
         c.target[k] = (float)(m[4 * k + 3] - m[4 * k + 2]);
         c.up[k] = (float)m[4 * k + 1];
         if (!isfinite(c.position[k]) || !isfinite(c.target[k]) || !isfinite(c.up[k]))
-            return fail(r, "nodes", index, "the camera's transform is not finite");
+            return fail_item(r, "nodes", index, "the camera's transform is not finite");
     }
     fct_scene_set_camera(r->scene, &c);
     return FCT_OK;
 }
 
-static fct_result place_mesh(reader *r, json_t *node, int64_t index, const double m[12]) {
+static fct_result place_node_mesh(reader *r, json_t *node, int64_t index, const double m[12]) {
     int64_t mesh;
     char name[128];
     float to_world[12];
@@ -265,18 +268,19 @@ static fct_result place_mesh(reader *r, json_t *node, int64_t index, const doubl
     if (result != FCT_OK || mesh == FCT_GLB_ABSENT) return result;
     result = need_mesh(r, mesh);
     if (result != FCT_OK || r->empty[mesh]) return result;
-    name_of(node, "node", (size_t)index, name, sizeof name);
+    name_item(node, "node", (size_t)index, name, sizeof name);
     for (int k = 0; k < 12; ++k) to_world[k] = (float)m[k];
     const fct_scene_parts *parts = r->meshes + mesh;
     return fct_scene_place(r->scene, name, parts->first, parts->count, parts->labels, to_world);
 }
 
-static fct_result push(reader *r, json_t *nodes, const double to_world[12]) {
+static fct_result push_nodes(reader *r, json_t *nodes, const double to_world[12]) {
     fct_result result = FCT_OK;
     for (size_t k = json_array_size(nodes); k-- > 0 && result == FCT_OK;) {
         json_t *item = json_array_get(nodes, k);
         if (!json_is_integer(item))
-            return fct_fail(r->env, FCT_ERROR_DATA, "%s: a node's number is no number", r->name);
+            return fct_fail(r->env, FCT_ERROR_DATA,
+                            "%s: a list of nodes holds something else than a whole number", r->name);
         result =
             fct_grow(r->env, (void **)&r->stack, &r->stack_capacity, r->stack_count + 1, sizeof *r->stack);
         if (result != FCT_OK) return result;
@@ -292,24 +296,24 @@ static fct_result visit_node(reader *r, const visit *v) {
     double local[12], to_world[12];
     fct_result result = fct_glb_item(&r->glb, "nodes", v->node, &node);
     if (result != FCT_OK) return result;
-    if (r->visited[v->node]) return fail(r, "nodes", v->node, "it has two parents");
+    if (r->visited[v->node]) return fail_item(r, "nodes", v->node, "it has two parents");
     r->visited[v->node] = 1;
-    result = local_transform(r, node, v->node, local);
+    result = read_local_transform(r, node, v->node, local);
     if (result != FCT_OK) return result;
     fct_transform_multiply(v->to_world, local, to_world);
-    result = take_camera(r, node, v->node, to_world);
-    if (result == FCT_OK) result = place_mesh(r, node, v->node, to_world);
-    return result == FCT_OK ? push(r, json_object_get(node, "children"), to_world) : result;
+    result = read_node_camera(r, node, v->node, to_world);
+    if (result == FCT_OK) result = place_node_mesh(r, node, v->node, to_world);
+    return result == FCT_OK ? push_nodes(r, json_object_get(node, "children"), to_world) : result;
 }
 
-static fct_result walk(reader *r) {
+static fct_result visit_all_nodes(reader *r) {
     double identity[12];
     int64_t scene;
     json_t *object;
     for (int k = 0; k < 12; ++k) identity[k] = fct_transform_identity[k];
     fct_result result = fct_glb_index(&r->glb, r->glb.root, "scene", &scene);
     if (result == FCT_OK) result = fct_glb_item(&r->glb, "scenes", scene < 0 ? 0 : scene, &object);
-    if (result == FCT_OK) result = push(r, json_object_get(object, "nodes"), identity);
+    if (result == FCT_OK) result = push_nodes(r, json_object_get(object, "nodes"), identity);
     while (result == FCT_OK && r->stack_count > 0) {
         visit v = r->stack[--r->stack_count];
         result = visit_node(r, &v);
@@ -324,14 +328,14 @@ static fct_result read_glb(fct_scene *scene, const char *name, const unsigned ch
     fct_source source = {scene->env, name, data, size};
     fct_result result = fct_glb_open(&source, &r.glb);
     if (result == FCT_OK) {
-        r.mesh_count = count_of(&r, "meshes"), r.node_count = count_of(&r, "nodes");
+        r.mesh_count = count_items(&r, "meshes"), r.node_count = count_items(&r, "nodes");
         r.meshes = fct_allocate_zero(r.env, r.mesh_count, sizeof *r.meshes);
         r.empty = fct_allocate_zero(r.env, r.mesh_count, 1);
         r.visited = fct_allocate_zero(r.env, r.node_count, 1);
         if (!r.meshes || !r.empty || !r.visited) result = fct_fail_memory(r.env, "a glTF scene");
     }
     if (result == FCT_OK) result = read_materials(&r);
-    if (result == FCT_OK) result = walk(&r);
+    if (result == FCT_OK) result = visit_all_nodes(&r);
     for (size_t k = 0; r.meshes && k < r.mesh_count; ++k) fct_release(r.env, r.meshes[k].labels);
     fct_release(r.env, r.meshes);
     fct_release(r.env, r.empty);

@@ -1,8 +1,7 @@
-/* scene/read/gltf_pack.c: a .gltf and the buffers it names, as one GLB in memory, so that one reader serves
- * both.
+/* scene/read/gltf_pack.c: packs a .gltf and its buffers into one GLB, so that one reader serves both formats.
  *
- * Buffers are files beside the .gltf or data URIs in base64; they are laid one behind another, and
- * bufferViews are moved along. Nothing is allocated beyond what the files hold.
+ * A buffer is a file beside the .gltf, or a data URI in base64. The packer concatenates the buffers and moves
+ * the offsets of the buffer views. A false byteLength cannot make it allocate more than the buffers hold.
  */
 #include "scene/read/gltf_pack.h"
 
@@ -16,13 +15,13 @@ typedef struct packer {
     fct_json json;
     const char *base;
     json_t *root;
-    unsigned char *bytes; /* of the buffers */
+    unsigned char *bytes; /* all buffers, each at a multiple of 8 */
     size_t count, capacity;
-    size_t *starts, *sizes; /* by buffer */
+    size_t *starts, *sizes; /* per buffer */
     size_t buffer_count;
 } packer;
 
-static fct_result append(packer *p, const void *data, size_t size) {
+static fct_result append_bytes(packer *p, const void *data, size_t size) {
     if (size > INT32_MAX || p->count + size > INT32_MAX)
         return fct_json_fail(&p->json, "the buffers hold more than 2 GB");
     fct_result result =
@@ -54,7 +53,7 @@ static fct_result append_base64(packer *p, const char *text) {
         if (held < 8) continue;
         held -= 8;
         unsigned char byte = (unsigned char)(bits >> held);
-        result = append(p, &byte, 1);
+        result = append_bytes(p, &byte, 1);
     }
     return result;
 }
@@ -69,7 +68,7 @@ static fct_result append_file(packer *p, const char *uri) {
     char *path = fct_path_join(p->json.env, p->base, uri);
     if (!path) return FCT_ERROR_MEMORY;
     char *to = path + (uri[0] == '/' ? 0 : strlen(p->base));
-    for (const char *from = to; *from || *to; ++to) { /* %20 and the like */
+    for (const char *from = to; *from || *to; ++to) { /* decodes %20 and other escapes */
         bool coded = from[0] == '%' && hex_digit(from[1]) >= 0 && hex_digit(from[2]) >= 0;
         *to = coded ? (char)(16 * hex_digit(from[1]) + hex_digit(from[2])) : *from;
         if (!*from) break;
@@ -78,7 +77,7 @@ static fct_result append_file(packer *p, const char *uri) {
     fct_file file;
     fct_result result = fct_file_open(p->json.env, path, &file);
     if (result == FCT_OK) {
-        result = append(p, file.data, file.size);
+        result = append_bytes(p, file.data, file.size);
         fct_file_close(p->json.env, &file);
     }
     fct_release(p->json.env, path);
@@ -90,15 +89,15 @@ static fct_result append_buffer(packer *p, const json_t *buffer, size_t index) {
     const char *uri = json_string_value(json_object_get(buffer, "uri")), *comma;
     if (!uri) return fct_json_expected(&p->json, "a buffer with a uri", buffer);
     if (!json_is_integer(length) || json_integer_value(length) < 0)
-        return fct_json_fail(&p->json, "byteLength is no whole number from 0");
+        return fct_json_fail(&p->json, "expected a whole number >= 0 as byteLength");
     static const unsigned char zeros[8];
-    fct_result result = append(p, zeros, (8 - p->count % 8) % 8);
+    fct_result result = append_bytes(p, zeros, (8 - p->count % 8) % 8);
     if (result != FCT_OK) return result;
     p->starts[index] = p->count;
     if (strncmp(uri, "data:", 5) == 0) {
         comma = strchr(uri, ',');
         if (!comma || comma - uri < 12 || strncmp(comma - 7, ";base64", 7) != 0)
-            return fct_json_fail(&p->json, "a data URI that is not base64");
+            return fct_json_fail(&p->json, "expected a data URI in base64");
         result = append_base64(p, comma + 1);
     } else {
         result = append_file(p, uri);
@@ -127,7 +126,7 @@ static fct_result append_buffers(packer *p) {
     return FCT_OK;
 }
 
-/* A view keeps within its own buffer, and then moves with it. */
+/* Checks that each view lies within its buffer, and moves it to its place in the packed buffer. */
 static fct_result move_views(packer *p) {
     json_t *views = json_object_get(p->root, "bufferViews"), *view;
     size_t k, before = fct_json_enter(&p->json, "bufferViews");
@@ -138,10 +137,10 @@ static fct_result move_views(packer *p) {
         json_int_t b = json_integer_value(buffer), begin = json_integer_value(offset),
                    size = json_integer_value(length);
         if (!json_is_integer(buffer) || b < 0 || (uint64_t)b >= p->buffer_count)
-            return fct_json_fail(&p->json, "its buffer is not there");
+            return fct_json_fail(&p->json, "its buffer does not exist");
         if (begin < 0 || size < 0 || (uint64_t)begin > p->sizes[b] ||
             (uint64_t)size > p->sizes[b] - (uint64_t)begin)
-            return fct_json_fail(&p->json, "it reaches beyond its buffer");
+            return fct_json_fail(&p->json, "it extends beyond its buffer");
         if (json_object_set_new(view, "buffer", json_integer(0)) ||
             json_object_set_new(view, "byteOffset", json_integer(begin + (json_int_t)p->starts[b])))
             return fct_fail_memory(p->json.env, "buffer views");
@@ -156,7 +155,7 @@ static void put_32(unsigned char *to, size_t value) {
     for (int k = 0; k < 4; ++k) to[k] = (unsigned char)(value >> 8 * k);
 }
 
-static fct_result assemble(packer *p, unsigned char **out, size_t *size) {
+static fct_result assemble_glb(packer *p, unsigned char **out, size_t *size) {
     size_t text_size = json_dumpb(p->root, NULL, 0, JSON_COMPACT), padded = (text_size + 3) & ~(size_t)3,
            binary = (p->count + 3) & ~(size_t)3;
     if (text_size == 0 || padded > INT32_MAX) return fct_fail_memory(p->json.env, "a glTF document");
@@ -186,7 +185,7 @@ fct_result fct_gltf_pack(const fct_env *env, const char *name, const char *text,
     if (result == FCT_OK && !json_is_object(p.root)) result = fct_json_expected(&p.json, "an object", p.root);
     if (result == FCT_OK) result = append_buffers(&p);
     if (result == FCT_OK) result = move_views(&p);
-    if (result == FCT_OK) result = assemble(&p, out, out_size);
+    if (result == FCT_OK) result = assemble_glb(&p, out, out_size);
     json_decref(p.root);
     fct_release(env, p.bytes);
     fct_release(env, p.starts);

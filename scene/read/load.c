@@ -10,8 +10,8 @@
 #include "scene/read/obj.h"
 #include "scene/read/path.h"
 
-/* Any mesh or hierarchy file: one grey object without light. */
-static fct_result read_mesh(fct_scene *scene, const char *path) {
+/* Adds a mesh or hierarchy file as one grey object without light. */
+static fct_result add_plain_model(fct_scene *scene, const char *path) {
     const fct_env *env = scene->env;
     fct_material grey = {.name = "grey", .reflectance = {.7f, .7f, .7f}, .two_sided = true};
     fct_model_file file;
@@ -45,11 +45,11 @@ fct_result fct_scene_parse_json(const fct_env *env, const char *name, const char
     return result;
 }
 
-static fct_result read_any(fct_scene *scene, const char *path) {
+static fct_result read_scene_file(fct_scene *scene, const char *path) {
     const fct_env *env = scene->env;
     bool json = fct_path_ends(path, ".json"), obj = fct_path_ends(path, ".obj"),
          gltf = fct_path_ends(path, ".gltf") || fct_path_ends(path, ".glb");
-    if (!json && !obj && !gltf) return read_mesh(scene, path);
+    if (!json && !obj && !gltf) return add_plain_model(scene, path);
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
@@ -66,13 +66,13 @@ static fct_result read_any(fct_scene *scene, const char *path) {
         result = fct_scene_read_obj(scene, path, text, file.size, base);
     fct_release(env, base);
     fct_file_close(env, &file);
-    return result == FCT_OK && plain ? read_mesh(scene, path) : result;
+    return result == FCT_OK && plain ? add_plain_model(scene, path) : result;
 }
 
 fct_result fct_scene_load(const fct_env *env, const char *path, fct_backend backend, fct_scene **out) {
     fct_result result = fct_scene_create(env, backend, out);
     if (result != FCT_OK) return result;
-    result = read_any(*out, path);
+    result = read_scene_file(*out, path);
     if (result == FCT_OK) result = fct_scene_commit(*out);
     if (result != FCT_OK) {
         fct_scene_destroy(*out);

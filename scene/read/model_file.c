@@ -1,4 +1,4 @@
-/* scene/read/model_file.c: see model_file.h. */
+/* scene/read/model_file.c: opens the mesh or the hierarchy of a model. */
 #include "scene/read/model_file.h"
 
 #include <string.h>
@@ -8,8 +8,9 @@
 #include "base/io/file.h"
 #include "scene/read/path.h"
 
-/* The hierarchy beside the mesh, if there is one and it is of these very bytes. */
-static fct_result open_beside(const fct_env *env, const char *path, fct_tree **out) {
+/* Opens NAME.fct beside a mesh file if it records the hash of that file. *out is NULL if there is none or the
+ * hash differs. */
+static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fct_tree **out) {
     *out = NULL;
     const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
     if (!dot || (slash && dot < slash)) return FCT_OK;
@@ -24,7 +25,7 @@ static fct_result open_beside(const fct_env *env, const char *path, fct_tree **o
         result = fct_file_open(env, path, &file);
         if (result == FCT_OK) result = fct_tree_open(env, beside, out);
         if (result == FCT_OK && fct_tree_get(*out).source_hash != XXH3_64bits(file.data, file.size)) {
-            fct_note(env, FCT_MESSAGE_NOTE, "%s is not of the present %s and is left aside", beside, path);
+            fct_note(env, FCT_MESSAGE_NOTE, "%s does not match %s and is not used", beside, path);
             fct_tree_destroy(*out);
             *out = NULL;
         }
@@ -37,7 +38,7 @@ static fct_result open_beside(const fct_env *env, const char *path, fct_tree **o
 fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, fct_model_file *out) {
     *out = (fct_model_file){0};
     if (fct_path_ends(path, ".fct")) return fct_tree_open(env, path, &out->tree);
-    fct_result result = want_mesh ? FCT_OK : open_beside(env, path, &out->tree);
+    fct_result result = want_mesh ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
     if (result != FCT_OK || out->tree) return result;
     result = fct_mesh_load(env, path, &out->mesh);
     if (result == FCT_OK && out->mesh.face_count == 0) {

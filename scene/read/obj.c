@@ -1,10 +1,10 @@
-/* scene/read/obj.c: Wavefront OBJ with its MTL as a scene.
+/* scene/read/obj.c: reads Wavefront OBJ with MTL.
  *
- * The mesh comes from the mesh reader; this file finds where objects begin (`o` and `g`: polygons between two
- * of these are one object; all objects of a name are one) and reads the material libraries: Kd is the
- * reflectance, Ke the emission, everything else is passed over. What reflects only is two-sided, for the
- * winding of such files is seldom to be trusted; what emits is one-sided, by its winding. A library that is
- * missing, a material that is used and not defined, and a polygon before the first usemtl are errors.
+ * The mesh reader reads the mesh. This file reads the objects and the material libraries. Statements `o` and
+ * `g` begin an object; objects of one name are one. Kd is the reflectance and Ke the emission; other
+ * statements of a library are ignored. A material without emission is two-sided, because the winding of such
+ * files is often wrong. A material with emission is one-sided, by the winding. Errors: a library that cannot
+ * be read, a material that is used but not defined, a polygon before the first usemtl.
  */
 #include "scene/read/obj.h"
 
@@ -27,9 +27,9 @@ typedef struct reader {
     const fct_env *env;
     const char *name, *base;
     fct_mesh mesh;
-    char **objects;     /* names */
+    char **objects;     /* their names */
     json_t *object_ids; /* by name */
-    span *spans;        /* in the file's order */
+    span *spans;        /* in the order of the file */
     size_t object_count, object_capacity, span_count, span_capacity;
     char **libraries;
     size_t library_count, library_capacity;
@@ -43,7 +43,7 @@ static fct_result read_color(fct_text *t, const char *what, float out[3]) {
         fct_result result = fct_text_float(t, what, out + c);
         if (result != FCT_OK) return result;
         if (c == 0 && (fct_text_at_line_end(t) || *t->p == '#')) {
-            out[1] = out[2] = out[0]; /* the format lets green and blue follow red */
+            out[1] = out[2] = out[0]; /* a single number is grey */
             return FCT_OK;
         }
     }
@@ -51,7 +51,7 @@ static fct_result read_color(fct_text *t, const char *what, float out[3]) {
     return FCT_OK;
 }
 
-static const char *rest_of_line(fct_text *t, size_t *length) {
+static const char *read_rest_of_line(fct_text *t, size_t *length) {
     fct_text_skip_blanks(t);
     const char *begin = t->p, *end = begin;
     while (end < t->end && *end != '\n') ++end;
@@ -69,13 +69,13 @@ static uint32_t find_material(const fct_scene *scene, const char *name) {
 
 static fct_result begin_material(reader *r, fct_text *t, fct_material *material) {
     size_t length;
-    const char *name = rest_of_line(t, &length);
+    const char *name = read_rest_of_line(t, &length);
     *material = (fct_material){.reflectance = {.7f, .7f, .7f}};
     if (length == 0 || length >= sizeof material->name)
         return fct_text_fail(t, "a material's name has %zu bytes, expected 1 to %zu", length,
                              sizeof material->name - 1);
     memcpy(material->name, name, length);
-    if (strlen(material->name) != length) return fct_text_fail(t, "a material's name with a zero byte in it");
+    if (strlen(material->name) != length) return fct_text_fail(t, "a material's name has a zero byte");
     if (find_material(r->scene, material->name) != FCT_NONE)
         return fct_text_fail(t, "material \"%s\" is defined twice", material->name);
     return FCT_OK;
@@ -164,8 +164,8 @@ static fct_result begin_object(reader *r, const char *name, size_t length) {
     return result;
 }
 
-/* Where objects begin, and which libraries there are. The mesh reader has found the text sound. */
-static fct_result scan(reader *r, const char *text, size_t size) {
+/* Lists where objects begin, and the material libraries. The mesh reader has already checked the syntax. */
+static fct_result scan_objects(reader *r, const char *text, size_t size) {
     fct_text t = {text, text + size, r->env, r->name, 1};
     fct_result result = begin_object(r, "", 0);
     while (result == FCT_OK && fct_text_skip_lines(&t, '#')) {
@@ -174,10 +174,10 @@ static fct_result scan(reader *r, const char *text, size_t size) {
         if (fct_text_word_is(word, length, "f")) {
             ++r->polygons;
         } else if (fct_text_word_is(word, length, "o") || fct_text_word_is(word, length, "g")) {
-            const char *name = rest_of_line(&t, &length);
+            const char *name = read_rest_of_line(&t, &length);
             result = begin_object(r, name, length);
         } else if (fct_text_word_is(word, length, "mtllib")) {
-            const char *name = rest_of_line(&t, &length);
+            const char *name = read_rest_of_line(&t, &length);
             result = add_name(r, &r->libraries, &r->library_count, &r->library_capacity, name, length);
         }
         if (result == FCT_OK) fct_text_next_line(&t);
@@ -185,7 +185,7 @@ static fct_result scan(reader *r, const char *text, size_t size) {
     return result;
 }
 
-/* Scene materials in the place of the file's. */
+/* Replaces the file's material ids of faces by those of the scene. */
 static fct_result resolve_materials(reader *r) {
     fct_mesh *mesh = &r->mesh;
     if (!mesh->materials)
@@ -201,8 +201,8 @@ static fct_result resolve_materials(reader *r) {
         if (ids[m] != FCT_NONE)
             mesh->materials[f] = ids[m];
         else if (name[0])
-            result = fct_fail(r->env, FCT_ERROR_DATA, "%s: material \"%s\" is used and in no library",
-                              r->name, name);
+            result = fct_fail(r->env, FCT_ERROR_DATA,
+                              "%s: material \"%s\" is used, but no library defines it", r->name, name);
         else
             result = fct_fail(r->env, FCT_ERROR_DATA, "%s: expected usemtl before the first face", r->name);
     }
@@ -210,8 +210,8 @@ static fct_result resolve_materials(reader *r) {
     return result;
 }
 
-/* The mesh's colours, normals and names stay behind: a scene's light is made of materials. Their ids are the
- * scene's by now, of which there may be more than the mesh names. */
+/* Adds an object of the listed faces. Its material ids are those of the scene, which may exceed the mesh's
+ * own material count, so they are detached from the mesh before it is checked. */
 static fct_result add_object(reader *r, const char *name, const uint32_t *faces, uint32_t count) {
     fct_mesh part;
     fct_result result = fct_mesh_extract(r->env, &r->mesh, faces, count, &part, NULL);
@@ -236,7 +236,7 @@ static fct_result add_objects(reader *r) {
     }
     uint32_t *faces = lists + mesh->face_count;
     size_t at = 0;
-    for (uint32_t f = 0; f < mesh->face_count; ++f) { /* object of each face */
+    for (uint32_t f = 0; f < mesh->face_count; ++f) { /* lists[f]: object of face f */
         uint32_t polygon = mesh->source_faces ? mesh->source_faces[f] : f;
         while (at + 1 < r->span_count && r->spans[at + 1].first <= polygon) ++at;
         lists[f] = r->spans[at].object;
@@ -271,10 +271,10 @@ fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *te
     if (!r.object_ids) result = fct_fail_memory(r.env, "names");
     if (result == FCT_OK && r.mesh.face_count == 0)
         result = fct_fail(r.env, FCT_ERROR_DATA, "%s: a scene needs at least one face, found none", name);
-    if (result == FCT_OK) result = scan(&r, text, size);
+    if (result == FCT_OK) result = scan_objects(&r, text, size);
     uint32_t last = r.mesh.face_count ? r.mesh.face_count - 1 : 0;
     if (result == FCT_OK && r.polygons != (r.mesh.source_faces ? r.mesh.source_faces[last] : last) + 1)
-        result = fct_fail(r.env, FCT_ERROR_DATA, "%s: a statement other than f goes on behind a \\", name);
+        result = fct_fail(r.env, FCT_ERROR_DATA, "%s: a statement other than f continues after a \\", name);
     for (size_t k = 0; result == FCT_OK && k < r.library_count; ++k)
         result = read_library(&r, r.libraries[k]);
     if (result == FCT_OK) result = resolve_materials(&r);

@@ -1,4 +1,4 @@
-/* scene/read/path.c: see path.h. */
+/* scene/read/path.c: paths of files that other files name. */
 #include "scene/read/path.h"
 
 #include <ctype.h>

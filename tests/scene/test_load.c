@@ -190,7 +190,7 @@ static const bad bad_scenes[] = {
     {ONE(", \"colour\": 1"), "instances[0]: unknown key \"colour\"", FCT_ERROR_DATA},
     {ONE(", \"name\": \"\""), "instances[0].name: expected a string of 1 to", FCT_ERROR_DATA},
     {ONE(", \"name\": \"x\"}, {\"model\": \"t\", \"material\": \"a\", \"name\": \"x\""),
-     "instances[1].name: the name is there already", FCT_ERROR_DATA},
+     "instances[1].name: the name exists already", FCT_ERROR_DATA},
     {ONE(", \"transform\": [1, 2]"), "transform: expected an array of 16 numbers, found an array of 2",
      FCT_ERROR_DATA},
     {ONE(", \"transform\": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,\"x\",1]"),
@@ -236,7 +236,7 @@ static const bad bad_scenes[] = {
      FCT_ERROR_DATA},
     {HEAD "\"models\": [{\"name\": \"t\", \"file\": \"x\"}, {\"name\": \"t\", \"file\": \"x\"}], "
           "\"instances\": []}",
-     "models[1].name: \"t\" is there already", FCT_ERROR_DATA},
+     "models[1].name: \"t\" exists already", FCT_ERROR_DATA},
     {HEAD "\"models\": [{\"file\": \"x\"}], \"instances\": []}", "models[0].name", FCT_ERROR_DATA},
     {HEAD PARTS "\"instances\": [{\"model\": \"p\"}]}", "no material for \"oak\"", FCT_ERROR_DATA},
     {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"materials\": {\"pine\": \"a\"}}]}",
@@ -247,7 +247,7 @@ static const bad bad_scenes[] = {
      "face_materials: expected an array of 3 materials, one per face, found an array of 1", FCT_ERROR_DATA},
     {HEAD PARTS "\"instances\": [{\"model\": \"p\", \"face_materials\": [\"a\", \"b\", \"c\"]}]}",
      "face_materials[2]: there is no material \"c\"", FCT_ERROR_DATA},
-    {"{\"light_groups\": [\"x\", \"x\"]}", "light_groups[1]: the name is there already", FCT_ERROR_DATA},
+    {"{\"light_groups\": [\"x\", \"x\"]}", "light_groups[1]: the name exists already", FCT_ERROR_DATA},
 };
 
 static void refuses_bad_scenes_and_says_where(void **unused) {
@@ -378,7 +378,7 @@ static void refuses_bad_obj_scenes(void **unused) {
         fct_result result;
     } cases[] = {
         {"mtllib none.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "", "none.mtl", FCT_ERROR_INPUT},
-        {"mtllib bad.mtl\n" QUAD "usemtl b\nf 1 2 3\n", "newmtl a\n", "\"b\" is used and in no library",
+        {"mtllib bad.mtl\n" QUAD "usemtl b\nf 1 2 3\n", "newmtl a\n", "\"b\" is used, but no library",
          FCT_ERROR_DATA},
         {"mtllib bad.mtl\n" QUAD "f 1 2 3\n", "newmtl a\n", "usemtl before the first face", FCT_ERROR_DATA},
         {"mtllib bad.mtl\n" QUAD "f 1 2 3\nusemtl a\nf 1 2 3\n", "newmtl a\n", "usemtl before the first face",

@@ -31,7 +31,7 @@ static fct_result read_table_array(fct_document *d, json_t *array, json_t *ids, 
         fct_result result = fct_json_string(&d->json, json_object_get(value, "name"), 64, &name);
         char clean[64];
         if (result == FCT_OK && json_object_get(ids, name))
-            result = fct_json_fail(&d->json, "\"%s\" is there already", fct_json_clean(name, clean));
+            result = fct_json_fail(&d->json, "\"%s\" exists already", fct_json_clean(name, clean));
         if (result != FCT_OK) return result;
         fct_json_leave(&d->json, inside);
         result = read(d, name, value);

@@ -98,12 +98,13 @@ static fct_result read_transform(fct_document *d, const json_t *instance, float 
     if (kind != FCT_TRANSFORM_GOOD)
         return fct_json_fail(&d->json, kind == FCT_TRANSFORM_SINGULAR
                                            ? "the transform is singular"
-                                           : "the transform holds numbers that fit no float");
+                                           : "the transform holds numbers that do not fit a float");
     fct_json_leave(&d->json, before);
     return FCT_OK;
 }
 
-/* A material for each part: from the map, from its "*", or the scene's material of the same name. */
+/* Places a split model. The material of a part comes from the map, else from its "*", else it is the scene's
+ * material of the same name. */
 static fct_result place_by_map(fct_document *d, const fct_document_model *model, json_t *map,
                                const char *name, const float transform[12]) {
     const fct_env *env = d->json.env;
@@ -153,7 +154,7 @@ static fct_result check_material_map(fct_document *d, const fct_document_model *
     return FCT_OK;
 }
 
-/* Face labels for face_materials: one name per polygon of the file. */
+/* Reads face_materials, one name per polygon of the file, into one label per face. */
 static fct_result read_face_materials(fct_document *d, const json_t *value, const fct_mesh *mesh,
                                       uint32_t *labels) {
     uint32_t polygons = mesh->face_count;
@@ -204,7 +205,7 @@ done:
     return result;
 }
 
-/* The given name, or the model's, numbered from its second instance on. */
+/* The given name, or that of the model, with a number if it is taken. */
 static fct_result read_instance_name(fct_document *d, const json_t *instance, const fct_document_model *model,
                                      char out[128]) {
     const json_t *value = json_object_get(instance, "name");
@@ -214,7 +215,7 @@ static fct_result read_instance_name(fct_document *d, const json_t *instance, co
         fct_result result = fct_json_string(&d->json, value, 128, &name);
         if (result != FCT_OK) return result;
         if (json_object_get(d->instance_names, name))
-            return fct_json_fail(&d->json, "the name is there already");
+            return fct_json_fail(&d->json, "the name exists already");
         fct_json_leave(&d->json, before);
         strcpy(out, name);
     } else {

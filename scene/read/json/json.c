@@ -1,4 +1,4 @@
-/* scene/read/json/json.c: see json.h. */
+/* scene/read/json/json.c: typed values of a JSON document, and error messages. */
 #include "scene/read/json/json.h"
 
 #include <float.h>
@@ -44,7 +44,7 @@ const char *fct_json_clean(const char *text, char out[64]) {
     return out;
 }
 
-static const char *describe(const json_t *value, char *buffer, size_t size) {
+static const char *describe_value(const json_t *value, char *buffer, size_t size) {
     char clean[64];
     switch (value ? (int)json_typeof(value) : -1) {
     case JSON_OBJECT:
@@ -74,13 +74,14 @@ static const char *describe(const json_t *value, char *buffer, size_t size) {
 
 fct_result fct_json_expected(const fct_json *json, const char *expected, const json_t *found) {
     char buffer[96];
-    return fct_json_fail(json, "expected %s, found %s", expected, describe(found, buffer, sizeof buffer));
+    return fct_json_fail(json, "expected %s, found %s", expected,
+                         describe_value(found, buffer, sizeof buffer));
 }
 
 fct_result fct_json_parse(fct_json *json, const char *text, size_t size, json_t **out) {
     json_error_t error;
     *out = NULL;
-    if (size > INT32_MAX) return fct_json_fail(json, "%zu bytes are more than a scene file may have", size);
+    if (size > INT32_MAX) return fct_json_fail(json, "the file has %zu bytes, expected less than 2^31", size);
     *out = json_loadb(text, size, JSON_REJECT_DUPLICATES, &error);
     if (*out) return FCT_OK;
     if (json_error_code(&error) == json_error_out_of_memory)

@@ -15,7 +15,7 @@ static fct_result read_light_groups(fct_document *d) {
         size_t inside = fct_json_enter_index(&d->json, k);
         fct_result result = fct_json_string(&d->json, json_array_get(groups, k), 64, &name);
         if (result != FCT_OK) return result;
-        if (json_object_get(d->group_ids, name)) return fct_json_fail(&d->json, "the name is there already");
+        if (json_object_get(d->group_ids, name)) return fct_json_fail(&d->json, "the name exists already");
         result = fct_scene_add_light_group(d->scene, name, &id);
         if (result == FCT_OK) result = fct_document_set_id(d, d->group_ids, name, id);
         if (result != FCT_OK) return result;
@@ -49,7 +49,7 @@ static fct_result read_material(fct_document *d, const char *name, json_t *value
     uint32_t id;
     fct_result result = fct_json_check_object(&d->json, value, keys);
     if (result != FCT_OK) return result;
-    strcpy(material.name, name); /* both callers let at most 63 bytes through */
+    strcpy(material.name, name); /* fct_document_read_table passes at most 63 bytes */
     result = read_rgb(d, value, "reflectance", 1, material.reflectance);
     if (result == FCT_OK) result = read_rgb(d, value, "emission", INFINITY, material.emission);
     if (result != FCT_OK) return result;

@@ -31,7 +31,6 @@ static fct_result read_model(fct_document *d, const char *name, json_t *value) {
     return fct_document_set_id(d, d->model_ids, name, (uint32_t)d->model_count++);
 }
 
-/* What the model's file lacks is said by whoever reads it; this adds where the scene asks for it. */
 fct_result fct_document_open_model(fct_document *d, const fct_document_model *model, bool want_mesh,
                                    fct_model_file *file) {
     fct_result result = fct_model_open(d->json.env, model->path, want_mesh, file);
@@ -57,6 +56,7 @@ fct_result fct_document_need_whole(fct_document *d, fct_document_model *model) {
     return result;
 }
 
+/* Copies the names of the parts' materials; a mesh without names has numbers. */
 static fct_result name_model_parts(fct_document *d, fct_document_model *model, const fct_mesh *mesh) {
     const fct_env *env = d->json.env;
     model->part_names = fct_allocate_zero(env, model->split.count, sizeof *model->part_names);
@@ -74,7 +74,6 @@ static fct_result name_model_parts(fct_document *d, fct_document_model *model, c
     return FCT_OK;
 }
 
-/* The mesh of a file that was opened, hierarchy or not, in input order. */
 fct_result fct_document_need_mesh(fct_document *d, fct_model_file *file) {
     return file->tree ? fct_tree_mesh(d->json.env, file->tree, &file->mesh) : FCT_OK;
 }
@@ -88,8 +87,8 @@ fct_result fct_document_need_split(fct_document *d, fct_document_model *model) {
     if (result == FCT_OK && !file.mesh.materials)
         result =
             fct_json_fail(&d->json,
-                          "expected \"material\" or \"face_materials\", for the file of model \"%s\" names "
-                          "no materials",
+                          "expected \"material\" or \"face_materials\", because the file of model \"%s\" "
+                          "names no materials",
                           model->name);
     uint32_t label_count = file.mesh.material_count;
     for (uint32_t f = 0; result == FCT_OK && f < file.mesh.face_count; ++f)
