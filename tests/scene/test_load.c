@@ -461,7 +461,7 @@ static void scenes_made_by_calls_are_checked(void **unused) {
     assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, nan, id, NULL), FCT_ERROR_DATA);
     uint32_t faces[8] = {0, 0, 0, 7, 0, 0, 0, 0};
     assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, NULL, id, faces), FCT_ERROR_DATA);
-    assert_non_null(strstr(r.text, "face 3 has material 7 of 1"));
+    assert_non_null(strstr(r.text, "face 3 has material 7, expected one below 1"));
     mesh.positions[4] = NAN;
     assert_int_equal(fct_scene_add_object(scene, "o", &mesh, NULL, NULL, id, NULL), FCT_ERROR_DATA);
     mesh.positions[4] = 0;
