@@ -293,15 +293,15 @@ static void receiver_on_the_lamp(void **state) {
     end(&f);
 }
 
-/* A row of coloured lamps, the brighter half of them behind a wall: none matters alone, so they share rays,
- * and the mean is the sum of the open ones. */
+/* A row of coloured lamps, the brighter half of them, and all blue ones, behind a wall: none matters alone,
+ * so they share rays, and the mean is the sum of the open ones. */
 static void many_lamps_share_rays(void **state) {
     (void)state;
     fixture f = begin();
     add_ground(&f);
     uint32_t glow[4];
     for (int k = 0; k < 4; ++k) {
-        fct_material m = {.emission = {k < 2 ? 1 : 3, k == 1 ? 1 : k == 3 ? 3 : 0, 0}};
+        fct_material m = {.emission = {k < 2 ? 1 : 3, k == 1 ? 1 : k == 3 ? 3 : 0, k < 2 ? 0 : .5F}};
         assert_int_equal(fct_scene_add_material(f.scene, &m, glow + k), FCT_OK);
     }
     for (int i = 0; i < 300; ++i)

@@ -127,45 +127,50 @@ static void spheres_are_even(void **state) {
 }
 
 /* The noise is the standard error of a leaf's irradiance: it agrees with the spread over seeds. The halves of
- * a stratified sequence are a little worse than its whole, so it may be too large, at most by a half. */
+ * a stratified sequence are a little worse than its whole, so it may be too large, at most by a half. In the
+ * second case a small ball adds direct light of 1 everywhere, without noise. */
 static void noise_is_the_standard_error(void **state) {
     (void)state;
     enum { SEEDS = 24, MOST = 4096 };
     static double sums[MOST], squares[MOST];
-    memset(sums, 0, sizeof sums), memset(squares, 0, sizeof squares);
-    fixture f = begin();
-    fct_mesh mesh = make_sphere(&plain, 6);
-    for (size_t t = 0; t < mesh.face_count; ++t) {
-        uint32_t *c = mesh.triangles + 3 * t, swap = c[1];
-        c[1] = c[2], c[2] = swap;
-    }
-    uint32_t ids[2] = {place_material(f.scene, .1, 0, false), place_material(f.scene, .1, 1, false)};
-    uint32_t *materials = malloc(mesh.face_count * sizeof *materials);
-    for (size_t t = 0; t < mesh.face_count; ++t) materials[t] = ids[t % 2];
-    assert_int_equal(fct_scene_add_object(f.scene, "ball", &mesh, NULL, NULL, 0, materials), FCT_OK);
-    free(materials);
-    fct_mesh_release(&plain, &mesh);
-    double noise2 = 0, spread2 = 0, level2 = 0;
-    size_t count = 0;
-    for (uint64_t seed = 0; seed < SEEDS; ++seed) {
-        solve(&f, seed, 1, 10);
-        count = f.set.count;
-        assert_true(count < MOST);
-        noise2 += f.transport.noise * f.transport.noise / SEEDS;
-        for (size_t id = 0; id < count; ++id) {
-            double e = f.set.items[id].child_count ? 0 : f.set.items[id].irradiance[1];
-            sums[id] += e, squares[id] += e * e;
+    for (int ball = 0; ball < 2; ++ball) {
+        memset(sums, 0, sizeof sums), memset(squares, 0, sizeof squares);
+        fixture f = begin();
+        fct_mesh mesh = make_sphere(&plain, 6);
+        const float small[12] = {.1F, 0, 0, 0, 0, .1F, 0, 0, 0, 0, .1F, 0};
+        if (ball) place_mesh(f.scene, &mesh, place_material(f.scene, 0, 100, false), small);
+        for (size_t t = 0; t < mesh.face_count; ++t) {
+            uint32_t *c = mesh.triangles + 3 * t, swap = c[1];
+            c[1] = c[2], c[2] = swap;
         }
-        if (seed + 1 < SEEDS) clear(&f);
+        uint32_t ids[2] = {place_material(f.scene, .1, 0, false), place_material(f.scene, .1, 1, false)};
+        uint32_t *materials = malloc(mesh.face_count * sizeof *materials);
+        for (size_t t = 0; t < mesh.face_count; ++t) materials[t] = ids[t % 2];
+        assert_int_equal(fct_scene_add_object(f.scene, "ball", &mesh, NULL, NULL, 0, materials), FCT_OK);
+        free(materials);
+        fct_mesh_release(&plain, &mesh);
+        double noise2 = 0, spread2 = 0, level2 = 0;
+        for (uint64_t seed = 0; seed < SEEDS; ++seed) {
+            solve(&f, seed, 1e3, 10);
+            assert_true(f.set.count < MOST);
+            noise2 += f.transport.noise * f.transport.noise / SEEDS;
+            for (size_t id = 0; id < f.set.count; ++id) {
+                double e = f.set.items[id].child_count ? 0 : f.set.items[id].irradiance[1];
+                sums[id] += e, squares[id] += e * e;
+            }
+            if (seed + 1 < SEEDS) clear(&f);
+        }
+        for (size_t id = 0; id < f.set.count; ++id) {
+            double mean = sums[id] / SEEDS;
+            spread2 += f.set.items[id].area * (squares[id] - SEEDS * mean * mean) / (SEEDS - 1);
+            level2 += f.set.items[id].area * mean * mean * (f.set.items[id].child_count == 0);
+        }
+        double ratio = sqrt(noise2 / (spread2 / level2));
+        printf("    noise is %.3f of the spread over seeds\n", ratio);
+        if (!(ratio > (ball ? .7 : .97) && ratio < 1.5))
+            fail_msg("noise is %g of the spread over seeds", ratio);
+        end(&f);
     }
-    for (size_t id = 0; id < count; ++id) {
-        double mean = sums[id] / SEEDS;
-        spread2 += f.set.items[id].area * (squares[id] - SEEDS * mean * mean) / (SEEDS - 1);
-        level2 += f.set.items[id].area * mean * mean * (f.set.items[id].child_count == 0);
-    }
-    double ratio = sqrt(noise2 / (spread2 / level2));
-    if (!(ratio > .97 && ratio < 1.5)) fail_msg("noise is %g of the spread over seeds", ratio);
-    end(&f);
 }
 
 /* A shadow border splits the leaves it crosses, down to min_edge, and no others. */
