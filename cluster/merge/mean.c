@@ -50,10 +50,11 @@ double fct_mean_border(const fct_metric *metric, const float *positions, const u
         v3 side = v3_sub(v3_load(positions + 3 * (size_t)to), v3_load(positions + 3 * (size_t)from));
         if (shared) lengths[count++] = v3_norm(side) * metric->scale;
     }
-    /* a side counts whole, or half where three or more faces meet in it */
-    for (int halves = 0; halves < 1 << count; ++halves) {
+    /* A side counts whole, half where three or more faces meet in it, and not at all where other faces are
+     * between the two in its chain: two bits per side. */
+    for (int shares = 0; shares < 1 << 2 * count; ++shares) {
         double length = 0;
-        for (int i = 0; i < count; ++i) length += halves >> i & 1 ? lengths[i] / 2 : lengths[i];
+        for (int i = 0; i < count; ++i) length += 0.5 * (shares >> 2 * i & 3) * lengths[i];
         if (fabs(length - (double)rounded) >= error) continue;
         best = length, error = fabs(length - (double)rounded);
     }

@@ -130,6 +130,14 @@ static inline fct_mesh make_degenerate(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
+/* Three faces whose corners are one vertex each: neither area nor perimeter. */
+static inline fct_mesh make_points(const fct_env *env) {
+    fct_mesh mesh = shape_of(env, 3, 3);
+    set_vertex(&mesh, 0, 0, 0, 0), set_vertex(&mesh, 1, 0.3, 0.1, 0), set_vertex(&mesh, 2, 1, 0.8, 0.5);
+    for (uint32_t f = 0; f < 3; ++f) set_face(&mesh, f, f, f, f);
+    return mesh;
+}
+
 /* Copies of a mesh, each moved along x and grown. Releases it. */
 static inline fct_mesh make_copies(const fct_env *env, fct_mesh one, uint32_t copies) {
     fct_mesh mesh = shape_of(env, copies * one.vertex_count, copies * one.face_count);

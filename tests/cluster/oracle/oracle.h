@@ -299,15 +299,24 @@ static inline oracle_price oracle_mean(const oracle *o, const oracle_cluster *u,
                                                        o->direction_weight * (1e-12 + loose)};
 }
 
-/* a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 w E_shape. The slack is that of float records. */
+/* How much of the shape weight INCREMENT gives to a union: a twentieth where it is flat, all of it where 1 -
+ * |S| / w is .001 or more. */
+static inline double oracle_shape_share(const oracle_cluster *u) {
+    return u->area > 0 ? fmin(fmax((1 - oracle_norm(u->vector) / u->area) / 0.001, 0.05), 1) : 0.05;
+}
+
+/* a1 D(w E_fit) + a2 2 (|Sa| + |Sb| - |Sa + Sb|) + a3 w E_shape f. The slack is that of float records. */
 static inline oracle_price oracle_increment(const oracle *o, const oracle_cluster *a, const oracle_cluster *b,
                                             const oracle_cluster *u, double shape) {
-    double fit = fmax(u->area * u->fit - a->area * a->fit - b->area * b->fit, 0);
+    double fit = fmax(u->area * u->fit - a->area * a->fit - b->area * b->fit, 0),
+           share = oracle_shape_share(u);
     double direction = 2 * (oracle_norm(a->vector) + oracle_norm(b->vector) - oracle_norm(u->vector));
     double points = u->fit > 0 ? u->area * u->fit / u->spread[0] : 1; /* turns a spread into w E_fit */
+    double share_slack = share > 0.05 && share < 1 ? 3e-4 : 0;
     double floor = o->fit_weight * (1e-6 * u->area * u->fit + 1e-7 * u->spread[2] * points) +
-                   o->direction_weight * 1e-7 * u->area + o->shape_weight * 1e-5 * u->area;
-    fit *= o->fit_weight, direction *= o->direction_weight, shape *= o->shape_weight * u->area;
+                   o->direction_weight * 1e-7 * u->area +
+                   o->shape_weight * u->area * (1e-5 * share + share_slack * fabs(shape));
+    fit *= o->fit_weight, direction *= o->direction_weight, shape *= o->shape_weight * u->area * share;
     return (oracle_price){fit + direction + shape,
                           oracle_increment_slack * (fabs(fit) + fabs(direction) + fabs(shape)) + floor};
 }
