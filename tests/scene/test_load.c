@@ -94,6 +94,14 @@ static void reads_materials_camera_and_groups(void **unused) {
     assert_int_equal(v.light_group_count, 1);
     assert_false(v.camera.given);
     assert_true(v.camera.vertical_fov > 0 && v.camera.position[2] > v.bounds.upper[2]);
+    /* The sphere around the triangle's bounds fills the view: its radius is sqrt(2) / 2. */
+    double distance2 = 0, half_angle = (double)v.camera.vertical_fov / 2 * 3.14159265358979323846 / 180;
+    for (int k = 0; k < 3; ++k) {
+        double from = (double)v.camera.position[k] - (double)v.camera.target[k];
+        assert_true(fabs((double)v.camera.target[k] - (k < 2 ? .5 : 0)) < 1e-6);
+        distance2 += from * from;
+    }
+    assert_true(fabs(sqrt(distance2) * sin(half_angle) - sqrt(.5)) < 1e-5);
     fct_scene_destroy(scene);
 }
 
