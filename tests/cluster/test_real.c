@@ -1,6 +1,7 @@
-/* Real meshes: every promise of check_tree.h, connected partitions of the manifold ones, and the quality that
- * the clustering is known for. Left out where the meshes are absent. */
+/* Real meshes and two generated ones: every promise of check_tree.h, connected partitions of the manifold
+ * ones, and the quality that the clustering is known for. Real ones are left out where they are absent. */
 #include "check_tree.h"
+#include "oracle/meshes.h"
 
 typedef struct figures {
     const char *name;
@@ -23,19 +24,14 @@ static double box_areas(const fct_tree *tree) {
     return sum / v3_norm2(d);
 }
 
-static void check_model(const figures *expected) {
-    char path[512];
-    snprintf(path, sizeof path, "%s/%s.obj", FACETREE_DATA, expected->name);
-    if (!file_exists(path)) return;
+static void check_mesh_figures(const fct_mesh *mesh, const figures *expected) {
     fct_env env = fct_env_default();
-    fct_mesh mesh;
-    assert_int_equal(fct_mesh_load(&env, path, &mesh), FCT_OK);
     for (int method = 0; method < 2; ++method) {
         fct_tree_def def = fct_tree_def_default();
         def.method = (fct_cluster_method)method;
         fct_tree *tree;
-        assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
-        check_tree(tree, &mesh);
+        assert_int_equal(fct_tree_build(&env, mesh, &def, NULL, &tree), FCT_OK);
+        check_tree(tree, mesh);
         fct_tree_view view = fct_tree_get(tree);
         assert_int_equal(view.root_count, 1);
         assert_true(box_areas(tree) <= expected->box_areas);
@@ -53,18 +49,42 @@ static void check_model(const figures *expected) {
         free(nodes);
         fct_tree_destroy(tree);
     }
-    fct_mesh_release(&env, &mesh);
 }
 
 static void real_meshes(void **state) {
     (void)state;
+    fct_env env = fct_env_default();
     const figures models[] = {{"stanford-bunny", true, 0.0202, 3.6, 71},
                               {"cow", true, 0.0102, 2.4, 41},
                               {"fandisk", true, 0.00002, 2.0, 47}};
-    for (size_t i = 0; i < sizeof models / sizeof *models; ++i) check_model(&models[i]);
+    size_t found = 0;
+    for (size_t i = 0; i < sizeof models / sizeof *models; ++i) {
+        char path[512];
+        fct_mesh mesh;
+        snprintf(path, sizeof path, "%s/%s.obj", FACETREE_DATA, models[i].name);
+        if (!file_exists(path)) continue;
+        assert_int_equal(fct_mesh_load(&env, path, &mesh), FCT_OK);
+        check_mesh_figures(&mesh, &models[i]);
+        fct_mesh_release(&env, &mesh);
+        ++found;
+    }
+    if (!found) skip();
+}
+
+static void generated_meshes(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    const figures rough = {"rough sphere", true, 0.0089, 4, 84}, terrain = {"terrain", true, 0.257, 5.4, 42};
+    fct_mesh mesh = make_sphere(&env, 90);
+    roughen(&mesh, 0.004);
+    check_mesh_figures(&mesh, &rough);
+    fct_mesh_release(&env, &mesh);
+    mesh = make_terrain(&env, 120, 0.03, 1);
+    check_mesh_figures(&mesh, &terrain);
+    fct_mesh_release(&env, &mesh);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(real_meshes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(generated_meshes), cmocka_unit_test(real_meshes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
