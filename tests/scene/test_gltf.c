@@ -80,6 +80,15 @@ static void reads_nodes_materials_and_camera(void **unused) {
     assert_int_equal(v.instance_count, 4);
     assert_int_equal(v.object_count, 2);
     assert_int_equal(v.face_count, 8); /* two triangles by indices, two of the strip, twice */
+    for (int m = 0; m < 2; ++m) {      /* each triangle is half of the square */
+        fct_tree_view tree = fct_tree_get(v.models[m].tree);
+        for (uint32_t f = 0; f < tree.face_count; ++f) {
+            v3 p[3];
+            for (uint32_t k = 0; k < 3; ++k) p[k] = v3_load(tree.positions + 3 * tree.triangles[3 * f + k]);
+            v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+            assert_true(fabs(fabs(cross.z) - 1) < 1e-6);
+        }
+    }
     assert_string_equal(v.instances[0].name, "left");
     assert_true(v.instances[0].mirrored && v.instances[0].uniform_scale == 2);
     assert_true(v.instances[0].material == 0 && v.instances[1].material == 1);
