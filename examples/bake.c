@@ -47,7 +47,7 @@ static fct_result make_room(fct_scene *scene, const fct_env *env) {
     return result == FCT_OK ? fct_scene_commit(scene) : result;
 }
 
-static bool report(const fct_bake_stats *stats) {
+static bool report_balance(const fct_bake_stats *stats) {
     double out = stats->power_absorbed + stats->power_escaped, gap = fabs(out / stats->power_emitted - 1);
     printf("emitted %.3f, absorbed %.3f, escaped %.3f: closed within %.2f %%\n", stats->power_emitted,
            stats->power_absorbed, stats->power_escaped, 100 * gap);
@@ -76,7 +76,7 @@ int main(void) {
     bool good = result == FCT_OK;
     if (good) {
         fct_bake_stats stats = fct_bake_get_stats(bake);
-        good = report(&stats);
+        good = report_balance(&stats);
         printf("room.ply: %u triangles of %u\n", simplified.faces_after, simplified.faces_before);
     }
     fct_mesh_release(&env, &small);

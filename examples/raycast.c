@@ -36,7 +36,7 @@ static void fill_sphere(fct_mesh *mesh) {
         }
 }
 
-static uint32_t shoot(const fct_bvh *bvh) {
+static uint32_t shoot_rays(const fct_bvh *bvh) {
     fct_ray *rays = malloc(RAYS * sizeof *rays);
     fct_hit *hits = malloc(RAYS * sizeof *hits);
     uint32_t hit_count = 0;
@@ -70,7 +70,7 @@ int main(void) {
     if (!failed) {
         fct_closest nearest;
         const float point[3] = {2, 0, 0};
-        failed = shoot(bvh) != RAYS || !fct_bvh_closest_point(bvh, point, INFINITY, &nearest, NULL);
+        failed = shoot_rays(bvh) != RAYS || !fct_bvh_closest_point(bvh, point, INFINITY, &nearest, NULL);
         if (!failed)
             printf("nearest to (2, 0, 0): (%.3f, %.3f, %.3f) on face %u, %.3f away\n", nearest.point[0],
                    nearest.point[1], nearest.point[2], nearest.face, nearest.distance);

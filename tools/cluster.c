@@ -29,9 +29,9 @@ static const struct argp_option cluster_options_table[] = {
      "rounds: merge all mutually cheapest pairs at once (default); greedy: merge the cheapest pair first", 0},
     {"cost", KEY_COST, "COST", 0,
      "increment: the growth of the total error (default); mean: the mean error of the union", 0},
-    {"fit", KEY_FIT, "W", 0, "Weight of the distance to the plane (default: depends on --cost)", 0},
+    {"fit", KEY_FIT, "W", 0, "Weight of the distance to the plane (default 1e4, with --cost mean 1e6)", 0},
     {"direction", KEY_DIRECTION, "W", 0, "Weight of the deviation of normals (default 1)", 0},
-    {"shape", KEY_SHAPE, "W", 0, "Weight of irregular borders (default: depends on --cost)", 0},
+    {"shape", KEY_SHAPE, "W", 0, "Weight of irregular borders (default .002, with --cost mean 1)", 0},
     {"fit-measure", KEY_FIT_MEASURE, "MEASURE", 0,
      "Measure the distance to the plane over the area (default) or over the points, the corners of the faces",
      0},
@@ -179,9 +179,9 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
         limits.max_memory = find_memory_left(t);
         uint64_t least = known ? fct_tree_build_need(faces, vertices, &def).in_parts : 0;
         if (limits.max_memory < least)
-            return tool_fail(t, TOOL_MEMORY, "%s: --max-memory %zu: a tree of %u faces takes at least %llu",
-                             input, t->max_memory, faces,
-                             (unsigned long long)(least + (t->max_memory - limits.max_memory)));
+            return tool_fail(
+                t, TOOL_MEMORY, "%s: --max-memory %zu: a tree of %u faces needs at least %llu bytes", input,
+                t->max_memory, faces, (unsigned long long)(least + (t->max_memory - limits.max_memory)));
         limits.temporary_folder = options->temporary;
         t->items = faces;
         t->unit = "faces";

@@ -137,7 +137,7 @@ static int set_attribute_weights(tool *t, simplify_options *o, const fct_mesh *m
             *weights[i] = 0;
         else if (!arrays[i])
             return tool_fail(t, TOOL_DATA,
-                             "%s: expected a %s on its vertices, as --attributes asks, found none",
+                             "%s: expected the attribute %s, which --attributes names, found none",
                              t->inputs[0], attribute_names[i]);
         else if (o->weights[i] >= 0)
             *weights[i] = o->weights[i];

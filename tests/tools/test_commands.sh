@@ -168,7 +168,7 @@ expect 0 simplify sphere.off --max-error .01 -o fine.obj --json
 check "it stops at the error" test "$(value stopped_because)" = error
 holds "$(value max_cost) <= .01 && $(value faces_after) < 960"
 expect 65 simplify sphere.off --faces 10 --attributes color -o x.ply
-says "expected a color"
+says "expected the attribute color"
 expect 0 simplify - --faces 20 -o - <small.ply
 check "a PLY on standard output" test "$(head -c 3 out)" = ply
 leftovers

@@ -59,7 +59,7 @@ parts() {
     check "the same bytes" cmp parts.fct again.fct
     expect 73 cluster sheet.ply -o again.fct --max-memory 100M --temporary nowhere
     expect 75 cluster sheet.ply -o again.fct --max-memory 20M
-    says "takes at least"
+    says "needs at least"
     check "nothing is left" test -z "$(ls folder)"
     check "the old file" cmp parts.fct again.fct
     # An edge that all faces share takes more than the estimate.

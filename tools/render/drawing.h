@@ -32,4 +32,15 @@ typedef struct drawing {
     const double *eye; /* 3 */
 } drawing;
 
+typedef struct drawing_source {
+    const char *path;
+    drawing_subject subject;
+    uint32_t count; /* of clusters or boxes */
+    fct_tree_def tree;
+} drawing_source;
+
+/* Loads a mesh, a .fct or a scene. Returns an exit code. Release the drawing in any case. */
+int drawing_load(tool *t, const drawing_source *source, drawing *out);
+void drawing_release(tool *t, drawing *d);
+
 #endif

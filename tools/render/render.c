@@ -7,7 +7,6 @@
 #include "tools/kit/command.h"
 #include "tools/kit/options.h"
 #include "tools/render/camera.h"
-#include "tools/render/load.h"
 #include "tools/render/shade.h"
 
 enum {

@@ -1,9 +1,9 @@
-/* tools/render/load.c: see load.h.
+/* tools/render/drawing.c: see drawing.h. From a file to a drawing.
  *
  * A mesh is drawn as it is. A hierarchy or a scene becomes parts: trees with a transform. Their faces are
  * copied one part after another, in the order of the trees, so that a cluster is a range of faces.
  */
-#include "tools/render/load.h"
+#include "tools/render/drawing.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -173,22 +173,22 @@ static cut make_cut(const loader *l, uint32_t number, uint32_t node) {
 }
 
 /* The order of the heap: larger relief, then lower part, then lower node. */
-static bool precedes(const cut *a, const cut *b) {
+static bool precedes_cut(const cut *a, const cut *b) {
     if (a->relief != b->relief) return a->relief > b->relief;
     return a->part != b->part ? a->part < b->part : a->node < b->node;
 }
 
 static void sift_cut_down(cut *heap, uint32_t count, uint32_t i) {
     for (uint32_t child; (child = 2 * i + 1) < count; i = child) {
-        if (child + 1 < count && precedes(heap + child + 1, heap + child)) ++child;
-        if (!precedes(heap + child, heap + i)) return;
+        if (child + 1 < count && precedes_cut(heap + child + 1, heap + child)) ++child;
+        if (!precedes_cut(heap + child, heap + i)) return;
         cut swap = heap[i];
         heap[i] = heap[child], heap[child] = swap;
     }
 }
 
 static void sift_cut_up(cut *heap, uint32_t i) {
-    while (i && precedes(heap + i, heap + (i - 1) / 2)) {
+    while (i && precedes_cut(heap + i, heap + (i - 1) / 2)) {
         cut swap = heap[i];
         heap[i] = heap[(i - 1) / 2], heap[(i - 1) / 2] = swap;
         i = (i - 1) / 2;
