@@ -330,6 +330,29 @@ static void a_picture_is_read_back_as_it_was(void **state) {
     remove(path);
 }
 
+/* Behind nothing, row y of H shows the mix of top and bottom at (y + 1/2) / H. */
+static void the_background_runs_from_top_to_bottom(void **state) {
+    (void)state;
+    enum { W = 2, H = 4 };
+    const char *path = "test_background.png";
+    float image[4 * W * H] = {0};
+    const picture_background background = {{.1F, .9F, 0}, {.5F, .3F, 1}, false};
+    assert_int_equal(picture_save(&test_tool, path, W, H, image, &background), TOOL_DONE);
+    png_image png = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_file(&png, path));
+    png.format = PNG_FORMAT_RGB;
+    unsigned char bytes[3 * W * H];
+    assert_true(png_image_finish_read(&png, NULL, bytes, 0, NULL));
+    for (int i = 0; i < W * H; ++i)
+        for (int k = 0; k < 3; ++k) {
+            double down = (i / W + .5) / H;
+            double x = (1 - down) * (double)background.top[k] + down * (double)background.bottom[k];
+            double srgb = x <= .0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - .055;
+            assert_true(fabs(bytes[3 * i + k] - 255 * srgb) < 1);
+        }
+    remove(path);
+}
+
 static void backgrounds_are_parsed(void **state) {
     (void)state;
     picture_background b;
@@ -357,6 +380,7 @@ int main(void) {
         cmocka_unit_test(memory_that_runs_out_is_told),
         cmocka_unit_test(tone_curves_rise_and_stay_in_range),
         cmocka_unit_test(a_picture_is_read_back_as_it_was),
+        cmocka_unit_test(the_background_runs_from_top_to_bottom),
         cmocka_unit_test(backgrounds_are_parsed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -246,6 +246,8 @@ static void surfaces_lie_on_the_zero_level(void **state) {
 
 static void statues_are_closed_and_stand_on_the_ground(void **state) {
     (void)state;
+    /* Recorded from these very meshes: a changed field shows as a changed volume. */
+    const double volumes[MAKE_STATUES + 1] = {.0586, .0817, .2126, .1182, .0499, .02945};
     for (int statue = 0; statue <= MAKE_STATUES; ++statue) {
         make_mesh m = {.t = &test_tool};
         if (statue < MAKE_STATUES)
@@ -254,7 +256,7 @@ static void statues_are_closed_and_stand_on_the_ground(void **state) {
             make_vase(&m, 6000);
         assert_ratio((double)m.face_count, 6000, statue < MAKE_STATUES ? .12 : .001);
         assert_closed(&m);
-        assert_true(mesh_volume(&m, 0, m.face_count) > .003);
+        assert_ratio(mesh_volume(&m, 0, m.face_count), volumes[statue], .02);
         double low = 9, high = -9;
         for (size_t v = 0; v < m.vertex_count; ++v)
             low = fmin(low, m.positions[3 * v + 1]), high = fmax(high, m.positions[3 * v + 1]);
