@@ -226,13 +226,12 @@ fct_result fct_anchors_create(const fct_env *env, const fct_elements *set, const
                   .surface = surface,
                   .def = def,
                   .longest = v3_norm(extent) / LONGEST_REACH};
-    g.scratch = fct_allocate(env, most, sizeof *g.scratch);
-    g.next = fct_allocate(env, most, sizeof *g.next);
-    g.vertices = fct_allocate(env, most, sizeof *g.vertices);
-    g.groups = fct_allocate(env, most, sizeof *g.groups);
-    g.chunk_rays = fct_allocate_zero(env, chunks, sizeof *g.chunk_rays);
-    bool allocated = g.scratch && g.next && g.vertices && g.groups && g.chunk_rays;
-    fct_result result = allocated ? place_anchors(env, &g, out) : fct_fail_memory(env, "anchors");
+    const fct_array arrays[] = {FCT_ARRAY(g.scratch, most), FCT_ARRAY(g.next, most),
+                                FCT_ARRAY(g.vertices, most), FCT_ARRAY(g.groups, most),
+                                FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "anchors");
+    if (result != FCT_OK) return result;
+    result = place_anchors(env, &g, out);
     if (result == FCT_OK) {
         double inverse = 0;
         for (size_t c = 0; c < chunks; ++c) out->rays += g.chunk_rays[c];
@@ -240,8 +239,7 @@ fct_result fct_anchors_create(const fct_env *env, const fct_elements *set, const
         out->turn = inverse > 0 ? TURN_REACH * out->count / inverse : 1;
         fct_anchors_order(out);
     }
-    void *owned[] = {g.scratch, g.next, g.vertices, g.groups, g.chunk_rays};
-    for (size_t i = 0; i < sizeof owned / sizeof *owned; ++i) fct_release(env, owned[i]);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     if (result != FCT_OK) fct_anchors_release(env, out);
     return result;
 }

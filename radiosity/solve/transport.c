@@ -301,15 +301,10 @@ static fct_result split_by_direct(gathering *g, double epsilon) {
 static fct_result gather_and_solve(gathering *g, double tolerance) {
     const fct_env *env = g->set->env;
     size_t count = g->leaf_count, chunks = fct_chunk_count(count, LEAF_GRAIN);
-    fct_result result = FCT_ERROR_MEMORY;
-    g->hits = fct_allocate(env, count * g->rays, sizeof *g->hits);
-    g->chunk_rays = fct_allocate_zero(env, chunks, sizeof *g->chunk_rays);
-    g->bare = fct_allocate(env, count, sizeof *g->bare);
-    g->irradiance = fct_allocate(env, 3 * count, sizeof *g->irradiance);
-    if (!g->hits || !g->chunk_rays || !g->bare || !g->irradiance) {
-        fct_fail_memory(env, "the solution");
-        goto done;
-    }
+    const fct_array arrays[] = {FCT_ARRAY(g->hits, count * g->rays), FCT_ARRAY_ZERO(g->chunk_rays, chunks),
+                                FCT_ARRAY(g->bare, count), FCT_ARRAY(g->irradiance, 3 * count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the solution");
+    if (result != FCT_OK) return result;
     result = fct_parallel_for_progress(env, "direct light", count, LEAF_GRAIN, direct_chunk, g);
     if (result != FCT_OK) goto done;
     result = fct_parallel_for_progress(env, "gathering", count, LEAF_GRAIN, hit_chunk, g);
@@ -318,10 +313,7 @@ static fct_result gather_and_solve(gathering *g, double tolerance) {
     for (size_t l = 0; l < count; ++l) store_leaf(g, g->leaves[l]);
     if ((result = iterate_leaves(g, tolerance)) == FCT_OK) balance_power(g);
 done:
-    fct_release(env, g->hits);
-    fct_release(env, g->chunk_rays);
-    fct_release(env, g->bare);
-    fct_release(env, g->irradiance);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 

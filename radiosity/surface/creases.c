@@ -194,43 +194,28 @@ static void list_corners(work *w) {
     w->begin[0] = 0;
 }
 
-static fct_result allocate_work(const fct_env *env, work *w) {
+enum { ARRAYS = 7, SCRATCH = 4 };
+
+static void list_arrays(work *w, fct_array out[ARRAYS]) {
     size_t vertices = w->mesh->vertex_count, faces = w->mesh->face_count;
-    w->first = fct_allocate(env, vertices, sizeof *w->first);
-    w->normals = fct_allocate(env, faces, 3 * sizeof *w->normals);
-    w->begin = fct_allocate(env, vertices + 1, sizeof *w->begin);
-    w->corners = fct_allocate(env, faces, 3 * sizeof *w->corners);
-    w->flags = fct_allocate(env, faces, 3 * sizeof *w->flags);
-    w->taken = fct_allocate_zero(env, vertices, sizeof *w->taken);
-    w->added = fct_allocate(env, vertices, sizeof *w->added);
-    if (!w->first || !w->normals || !w->begin || !w->corners || !w->flags || !w->taken || !w->added)
-        return fct_fail_memory(env, "the vertices of a surface");
-    return FCT_OK;
+    const fct_array arrays[ARRAYS] = {
+        FCT_ARRAY(w->first, vertices),     FCT_ARRAY(w->normals, 3 * faces),
+        FCT_ARRAY(w->begin, vertices + 1), FCT_ARRAY(w->corners, 3 * faces),
+        FCT_ARRAY(w->flags, 3 * faces),    FCT_ARRAY_ZERO(w->taken, vertices),
+        FCT_ARRAY(w->added, vertices),
+    };
+    memcpy(out, arrays, sizeof arrays);
 }
 
-static fct_result allocate_scratch(const fct_env *env, work *w) {
-    size_t threads = fct_env_threads(env);
-    w->keys = fct_allocate(env, threads * w->largest, 2 * sizeof *w->keys);
-    w->values = fct_allocate(env, threads * w->largest, 2 * sizeof *w->values);
-    w->parents = fct_allocate(env, threads * w->largest, sizeof *w->parents);
-    w->open = fct_allocate(env, threads * w->largest, sizeof *w->open);
-    if (!w->keys || !w->values || !w->parents || !w->open)
-        return fct_fail_memory(env, "the vertices of a surface");
-    return FCT_OK;
-}
-
-static void release_work(const fct_env *env, work *w) {
-    fct_release(env, w->first);
-    fct_release(env, w->normals);
-    fct_release(env, w->begin);
-    fct_release(env, w->corners);
-    fct_release(env, w->flags);
-    fct_release(env, w->taken);
-    fct_release(env, w->added);
-    fct_release(env, w->keys);
-    fct_release(env, w->values);
-    fct_release(env, w->parents);
-    fct_release(env, w->open);
+/* Scratch space of all threads. */
+static void list_scratch(work *w, size_t threads, fct_array out[SCRATCH]) {
+    const fct_array arrays[SCRATCH] = {
+        FCT_ARRAY(w->keys, 2 * threads * w->largest),
+        FCT_ARRAY(w->values, 2 * threads * w->largest),
+        FCT_ARRAY(w->parents, threads * w->largest),
+        FCT_ARRAY(w->open, threads * w->largest),
+    };
+    memcpy(out, arrays, sizeof arrays);
 }
 
 /* Numbers the added vertices in the order of positions, and allocates the surface. */
@@ -261,19 +246,22 @@ fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, con
         return fct_fail(env, FCT_ERROR_MEMORY, "a surface of %u triangles has too many corners",
                         mesh->face_count);
     work w = {.mesh = mesh, .out = out};
-    fct_result result = allocate_work(env, &w);
-    if (result != FCT_OK) goto done;
+    fct_array arrays[ARRAYS], scratch[SCRATCH];
+    list_arrays(&w, arrays);
+    fct_result result = fct_allocate_all(env, arrays, ARRAYS, "the vertices of a surface");
+    if (result != FCT_OK) return result;
     result = fct_weld(env, mesh->vertex_count, mesh->positions, w.first);
     if (result != FCT_OK) goto done;
     fct_parallel_for(env, mesh->face_count, GRAIN, compute_normals, &w);
     list_corners(&w);
-    result = allocate_scratch(env, &w);
+    list_scratch(&w, fct_env_threads(env), scratch);
+    result = fct_allocate_all(env, scratch, SCRATCH, "the vertices of a surface");
     if (result != FCT_OK) goto done;
     fct_parallel_for(env, mesh->vertex_count, GRAIN, group_positions, &w);
     result = make_room(env, &w, source_faces, face_places);
-    if (result != FCT_OK) goto done;
-    fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_positions, &w);
+    if (result == FCT_OK) fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_positions, &w);
+    fct_release_all(env, scratch, SCRATCH);
 done:
-    release_work(env, &w);
+    fct_release_all(env, arrays, ARRAYS);
     return result;
 }

@@ -5,38 +5,41 @@
 
 #include "base/env.h"
 
+enum { ARRAYS = 7 };
+
+/* The arrays beside the mesh. */
+static void list_arrays(fct_surface *s, size_t vertices, size_t faces, fct_array out[ARRAYS]) {
+    const fct_array arrays[ARRAYS] = {
+        FCT_ARRAY_ZERO(s->normals, 3 * vertices), FCT_ARRAY_ZERO(s->sample_points, 3 * vertices),
+        FCT_ARRAY_ZERO(s->offsets, vertices),     FCT_ARRAY_ZERO(s->areas, vertices),
+        FCT_ARRAY(s->places, vertices),           FCT_ARRAY_ZERO(s->flat, vertices),
+        FCT_ARRAY(s->face_places, faces),
+    };
+    memcpy(out, arrays, sizeof arrays);
+}
+
 fct_result fct_surface_allocate(const fct_env *env, uint32_t vertex_count, uint32_t face_count,
                                 fct_surface *out) {
     *out = (fct_surface){0};
     fct_result result =
         fct_mesh_create(env, vertex_count, face_count, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, &out->mesh);
     if (result != FCT_OK) return result;
-    size_t vertices = vertex_count;
-    out->normals = fct_allocate_zero(env, vertices, 3 * sizeof *out->normals);
-    out->sample_points = fct_allocate_zero(env, vertices, 3 * sizeof *out->sample_points);
-    out->offsets = fct_allocate_zero(env, vertices, sizeof *out->offsets);
-    out->areas = fct_allocate_zero(env, vertices, sizeof *out->areas);
-    out->places = fct_allocate(env, vertices, sizeof *out->places);
-    out->flat = fct_allocate_zero(env, vertices, sizeof *out->flat);
-    out->face_places = fct_allocate(env, face_count, sizeof *out->face_places);
-    if (!out->normals || !out->sample_points || !out->offsets || !out->areas || !out->places || !out->flat ||
-        !out->face_places) {
-        fct_surface_release(env, out);
-        return fct_fail_memory(env, "a surface");
+    fct_array arrays[ARRAYS];
+    list_arrays(out, vertex_count, face_count, arrays);
+    result = fct_allocate_all(env, arrays, ARRAYS, "a surface");
+    if (result != FCT_OK) {
+        fct_mesh_release(env, &out->mesh);
+        return result;
     }
-    memset(out->places, 0xff, vertices * sizeof *out->places);
+    memset(out->places, 0xff, vertex_count * sizeof *out->places);
     return FCT_OK;
 }
 
 void fct_surface_release(const fct_env *env, fct_surface *surface) {
+    fct_array arrays[ARRAYS];
+    list_arrays(surface, 0, 0, arrays);
+    fct_release_all(env, arrays, ARRAYS);
     fct_mesh_release(env, &surface->mesh);
-    fct_release(env, surface->normals);
-    fct_release(env, surface->sample_points);
-    fct_release(env, surface->offsets);
-    fct_release(env, surface->areas);
-    fct_release(env, surface->places);
-    fct_release(env, surface->flat);
-    fct_release(env, surface->face_places);
     *surface = (fct_surface){0};
 }
 

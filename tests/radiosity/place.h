@@ -1,4 +1,4 @@
-/* tests/radiosity/place.h: small scenes for the tests of light. */
+/* tests/radiosity/place.h: meshes and materials for small scenes. */
 #ifndef FCT_TESTS_RADIOSITY_PLACE_H
 #define FCT_TESTS_RADIOSITY_PLACE_H
 
@@ -21,7 +21,7 @@ static inline void place_mesh(fct_scene *scene, const fct_mesh *mesh, uint32_t m
     assert_int_equal(fct_scene_add_object(scene, "part", mesh, NULL, transform, material, NULL), FCT_OK);
 }
 
-/* The parallelogram of corner o and sides u, v as n x n x 2 triangles, front towards u x v. */
+/* A parallelogram with corner o and sides u, v, as n x n x 2 triangles; its front faces u x v. */
 static inline fct_mesh make_sheet(const fct_env *env, uint32_t n, v3 o, v3 u, v3 v) {
     fct_mesh mesh = make_grid(env, n);
     for (size_t i = 0; i < mesh.vertex_count; ++i) {
@@ -38,7 +38,7 @@ static inline void place_sheet(const fct_env *env, fct_scene *scene, uint32_t ma
     fct_mesh_release(env, &mesh);
 }
 
-/* A regular polygon of n corners about c in the plane z = c.z, front up or down. */
+/* A regular polygon with n corners around c in the plane z = c.z; its front faces up or down. */
 static inline fct_mesh make_disk(const fct_env *env, uint32_t n, v3 c, double radius, bool up) {
     fct_mesh mesh;
     assert_int_equal(fct_mesh_create(env, n + 1, n, 0, &mesh), FCT_OK);
@@ -53,7 +53,7 @@ static inline fct_mesh make_disk(const fct_env *env, uint32_t n, v3 c, double ra
     return mesh;
 }
 
-/* The unit sphere with waves of the given height, n rings. */
+/* The unit sphere of n rings with waves of the given height. */
 static inline fct_mesh make_bumpy(const fct_env *env, uint32_t n, double height) {
     fct_mesh mesh = make_sphere(env, n);
     for (size_t i = 0; i < mesh.vertex_count; ++i) {

@@ -1,4 +1,4 @@
-/* The solver against closed forms (docs/radiosity.md lists them) and its own invariants. */
+/* Whole bakes against closed forms (docs/radiosity.md lists them); every bake must also balance its power. */
 #include "support.h"
 
 #include "base/math/vec.h"
@@ -44,7 +44,7 @@ static void add(fixture *f, const char *name, fct_mesh *mesh, const float transf
     fct_mesh_release(&f->env, mesh);
 }
 
-/* The square of side 1 about the origin of its plane, facing +z, under a transform. */
+/* A square of side 1 around the origin, facing +z, under a transform. */
 static void add_square(fixture *f, const char *name, uint32_t n, const float transform[12], uint32_t id) {
     fct_mesh square = make_grid(&f->env, n);
     for (uint32_t v = 0; v < square.vertex_count; ++v)
@@ -76,7 +76,7 @@ static void end(fixture *f, fct_bake *b) {
     fct_scene_destroy(f->scene);
 }
 
-/* Mean of channel 1 over the lit mesh of an instance, by area, and the root mean square distance from
+/* Area-weighted mean of channel 1 over an instance's output; *rms (may be NULL): RMS difference to
  * `expected`. */
 static double mean_radiosity(fixture *f, fct_bake *b, uint32_t instance, double expected, double *rms) {
     fct_mesh mesh;
@@ -135,8 +135,8 @@ static void furnace_of_a_scanned_head_is_even(void **state) {
     end(&f, b);
 }
 
-/* Every face twice, in the same place: rays meet one of the two, and power is counted once (bake() checks the
- * balance). */
+/* Every face exists twice in the same place. Rays hit one of the two, and the balance counts the power once.
+ */
 static void coincident_faces_share_one_light(void **state) {
     (void)state;
     fixture f;
@@ -221,7 +221,8 @@ static void concentric_spheres_exchange(void **state) {
     end(&f, b);
 }
 
-/* Receiver of reflectance r, E = B / r is the form factor from the receiver to a lamp of e = 1. */
+/* The receiver has reflectance .5 and the lamp emits 1, so B / .5 is the form factor from receiver to lamp.
+ */
 static void expect_form_factor(fixture *f, double expected, double tolerance) {
     fct_bake *b = bake(f, FCT_FINAL_GATHER);
     double mean = mean_radiosity(f, b, 0, 0, NULL) / .5;
@@ -265,9 +266,7 @@ static void blocked_squares(void **state) {
     expect_form_factor(&f, .099506, .02);
 }
 
-/* A long room cut in two by a wall 4 cm thick that stands on its one floor: light in one part, none in the
- * other. */
-/* The blocker's shadow splits elements after the links are made; without a lamp there are no links at all. */
+/* The blocker's shadow splits elements after the links exist. Without a lamp there are no links at all. */
 static void the_bare_solution_lights_elements_newer_than_its_links(void **state) {
     (void)state;
     for (int lit = 0; lit < 2; ++lit) {
@@ -288,6 +287,7 @@ static void the_bare_solution_lights_elements_newer_than_its_links(void **state)
     }
 }
 
+/* A wall 4 cm thick cuts a room with one floor into a bright and a dark part. */
 static void no_light_leaks_under_a_wall(void **state) {
     (void)state;
     if (SANITIZED) skip();
@@ -336,7 +336,7 @@ static void no_light_leaks_under_a_wall(void **state) {
     end(&f, b);
 }
 
-/* A lamp that nearly touches a wall lights it like an infinite plane would: E = e, and no value runs away. */
+/* A lamp that nearly touches a wall gives E = e like an infinite plane; no value exceeds that by much. */
 static void lamp_near_a_wall_is_stable(void **state) {
     (void)state;
     if (SANITIZED) skip();

@@ -1,11 +1,11 @@
-/* Bakes that cannot end well, and bakes that must not depend on who does the work. */
+/* Bakes without memory, cancelled bakes, extreme scenes, and equal bytes for every number of threads. */
 #include "support.h"
 
 #include "facetree/radiosity.h"
 
 static fct_env plain;
 
-/* A lamp over a floor with a box-like step between them: a few elements of every kind. */
+/* A lamp over a two-sided floor with a square between them: few elements, but all kinds. */
 static fct_scene *small_scene(void) {
     plain = fct_env_default();
     fct_scene *scene;
@@ -36,7 +36,7 @@ static fct_bake_def coarse(void) {
     return def;
 }
 
-/* Bakes, lights everything and a probe; whatever fails is returned. */
+/* Bakes, lights all instances and a probe. Returns the first error. */
 static fct_result bake_all(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                            fct_mesh *mesh) {
     static const float point[3] = {.2F, .2F, 0}, normal[3] = {0, 0, 1};
@@ -123,7 +123,7 @@ static void threads_do_not_show(void **state) {
     fct_scene_destroy(scene);
 }
 
-/* Nothing shines: nothing is lit, and that is no failure. */
+/* A scene without emission is valid and dark. */
 static void darkness_is_a_result(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -166,7 +166,7 @@ static void senseless_options_are_refused(void **state) {
     fct_scene_destroy(scene);
 }
 
-/* Where areas are beyond a float an error is told, not darkness or a search without end. */
+/* A scene whose areas exceed a float fails with a message; it is not silently dark, and it ends. */
 static void sizes_that_floats_cannot_tell_are_refused(void **state) {
     (void)state;
     static const struct {

@@ -1,4 +1,5 @@
-/* Direct light of lamps: closed forms, brute force over triangles, shadows, and odd places to stand. */
+/* Direct light of lamps against closed forms and sums over triangles, with shadows and receivers in odd
+ * places. */
 #include "place.h"
 #include "radiosity/light/lamp.h"
 #include "radiosity/light/lamp_cut.h"
@@ -19,7 +20,7 @@ static fixture begin(void) {
     return f;
 }
 
-/* A far square that is most of the scene's area, so that no lamp counts as too large. */
+/* A far square with most of the scene's area, so that no emitter is too large for a lamp. */
 static void add_ground(fixture *f) {
     uint32_t grey = place_material(f->scene, .5, 0, false);
     place_sheet(&f->env, f->scene, grey, 1, v3_make(-50, -50, -60), v3_make(100, 0, 0), v3_make(0, 100, 0));
@@ -146,7 +147,7 @@ static void blocked_squares(void **state) {
     end(&f);
 }
 
-/* All triangles one by one. */
+/* Sum of Lambert's formula over all triangles. */
 static double brute_light(const fct_mesh *mesh, bool two_sided, v3 x, v3 n) {
     double sum = 0;
     for (size_t t = 0; t < mesh->face_count; ++t) {
@@ -159,8 +160,8 @@ static double brute_light(const fct_mesh *mesh, bool two_sided, v3 x, v3 n) {
     return sum;
 }
 
-/* Dense lamps at all distances and angles against every triangle. Where part of the lamp is below the horizon
- * or the receiver is grazed, the error is measured against what a receiver that faces the lamp gets. */
+/* Dense lamps at all distances and angles against the sum over their triangles. The error is relative to the
+ * light of a receiver that faces the lamp, because grazing receivers get little. */
 static void dense_lamps(void **state) {
     (void)state;
     const double distances[] = {1.3, 1.6, 2.5, 5, 12, 40};
@@ -187,7 +188,7 @@ static void dense_lamps(void **state) {
     }
 }
 
-/* One triangle, from where its far formula begins to serve. */
+/* One triangle at distances where the far formula begins. */
 static void single_triangle(void **state) {
     (void)state;
     fixture f = begin();
@@ -210,7 +211,7 @@ static void single_triangle(void **state) {
     end(&f);
 }
 
-/* The same lamp under every kind of transform sends what its world-space twin sends. */
+/* A lamp under every kind of transform equals a lamp whose mesh is transformed. */
 static void transformed_lamps(void **state) {
     (void)state;
     const float transforms[3][12] = {
@@ -246,7 +247,7 @@ static void transformed_lamps(void **state) {
     }
 }
 
-/* A lamp 0.1 mm under a ceiling, and one 0.1 mm off and facing it. */
+/* A lamp 0.1 mm below a ceiling, facing down or facing the ceiling. */
 static void lamp_close_to_a_wall(void **state) {
     (void)state;
     for (int facing = 0; facing < 2; ++facing) {
@@ -274,7 +275,7 @@ static void lamp_close_to_a_wall(void **state) {
     }
 }
 
-/* Receivers on a convex lamp get nothing from it, even along smooth normals. */
+/* Receivers on a convex lamp get no light from it, even with smooth normals. */
 static void receiver_on_the_lamp(void **state) {
     (void)state;
     fixture f = begin();
@@ -293,8 +294,8 @@ static void receiver_on_the_lamp(void **state) {
     end(&f);
 }
 
-/* A row of coloured lamps, the brighter half of them, and all blue ones, behind a wall: none matters alone,
- * so they share rays, and the mean is the sum of the open ones. */
+/* A row of coloured minor lamps; a wall hides the brighter half and all blue ones. They share rays, and the
+ * mean is the light of the open ones. */
 static void many_lamps_share_rays(void **state) {
     (void)state;
     fixture f = begin();
@@ -390,8 +391,8 @@ static void equal_seeds_equal_light(void **state) {
     end(&f);
 }
 
-/* The weights of points that (u, v) choose have the cut's light as their mean, from near and far, also where
- * a part of the lamp is below the horizon; the estimate is about the light or more. */
+/* The mean weight of the points that (u, v) choose is the cut's light, near and far and across the horizon.
+ * The estimate is about the light or more. */
 static void points_have_the_light_as_mean(void **state) {
     (void)state;
     for (int shape = 0; shape < 3; ++shape) {
@@ -436,7 +437,8 @@ static void points_have_the_light_as_mean(void **state) {
     }
 }
 
-/* A lamp half hidden sends its fraction with any number of rays, and fixed rays are exactly so many. */
+/* The mean visible fraction does not depend on the number of rays. FCT_LAMPS_FIXED sends exactly that number.
+ */
 static void fractions_are_unbiased(void **state) {
     (void)state;
     fixture f = begin();
@@ -463,7 +465,7 @@ static void fractions_are_unbiased(void **state) {
     end(&f);
 }
 
-/* Every allocation may fail; nothing leaks. */
+/* Each allocation in turn fails; nothing leaks. */
 static void memory_runs_out(void **state) {
     (void)state;
     fixture f = begin();

@@ -62,7 +62,9 @@ static void far_links_equal_the_kernel(void **state) {
         /* in direction a from the normal, facing down */
         v3 c = v3_make(r * sin(a) - .5, -.5, r * cos(a));
         place_sheet(&plain, f.scene, f.bright, 1, c, v3_make(0, 1, 0), v3_make(1, 0, 0));
-        refine(&f, 1, 10);
+        /* flow 1.2e-3, times an uncertainty of .5 %: fine enough without a split */
+        refine(&f, 1e-4, .01);
+        assert_int_equal(f.set.count, f.set.view.volume_count + 2);
         double projected = cos(a), expected = cos(a) * projected / (3.14159265358979 * r * r + projected);
         assert_near(receive(&f), expected, 1e-3);
         double e[3];
@@ -103,8 +105,9 @@ static void visibility_is_the_seen_fraction(void **state) {
     }
 }
 
-/* Form factor from square i to square j by midpoints; o: corner, u, v: sides. */
-static double integrate(v3 oi, v3 ui, v3 vi, v3 oj, v3 uj, v3 vj) {
+/* Form factor from square i to square j by midpoints; o: corner, u, v: sides. half: the plane half-way up
+ * blocks x < 0. */
+static double integrate(v3 oi, v3 ui, v3 vi, v3 oj, v3 uj, v3 vj, bool half) {
     enum { N = 24 };
     v3 ni = v3_unit(v3_cross(ui, vi)), nj = v3_unit(v3_cross(uj, vj));
     double sum = 0;
@@ -114,30 +117,38 @@ static double integrate(v3 oi, v3 ui, v3 vi, v3 oj, v3 uj, v3 vj) {
             v3 y = v3_mad(v3_mad(oj, (b % N + .5) / N, uj), (b / N + .5) / N, vj);
             v3 r = v3_sub(y, x);
             double r2 = v3_norm2(r), p = v3_dot(r, ni), q = -v3_dot(r, nj);
+            if (half && x.x + y.x < 0) continue;
             if (p > 0 && q > 0) sum += p * q / (3.14159265358979 * r2 * r2);
         }
     return sum * v3_norm(v3_cross(uj, vj)) / pow(N, 4);
 }
 
-/* Near pairs: the mean over 16 point pairs is right on average over many pairs. */
+/* Near pairs: the mean over 16 point pairs is right on average over many pairs, also if half of them are
+ * blocked. */
 static void near_links_equal_the_integral(void **state) {
     (void)state;
-    double sum = 0, expected = 0;
-    for (int k = 0; k < 24; ++k) {
-        fixture f = begin();
-        v3 oi = v3_make(-.5, -.5, 0), x = v3_make(1, 0, 0), y = v3_make(0, 1, 0);
-        v3 oj = v3_make(-.5 + .02 * k, -.4 - .01 * k, 1.05 + .01 * k);
-        place_sheet(&plain, f.scene, f.dark, 1, oi, x, y);
-        place_sheet(&plain, f.scene, f.bright, 1, oj, y, x);
-        refine(&f, 100, 10);
-        int near = 0;
-        for (size_t i = 0; i < f.links.count; ++i) near += f.links.items[i].near;
-        assert_true(near > 0);
-        sum += receive(&f);
-        expected += integrate(oi, x, y, oj, y, x);
-        end(&f);
+    for (int half = 0; half < 2; ++half) {
+        double sum = 0, expected = 0;
+        for (int k = 0; k < 24; ++k) {
+            fixture f = begin();
+            double h = 1.05 + .01 * k;
+            v3 oi = v3_make(-.5, -.5, 0), x = v3_make(1, 0, 0), y = v3_make(0, 1, 0);
+            v3 oj = v3_make(-.5 + .02 * k, -.4 - .01 * k, h);
+            place_sheet(&plain, f.scene, f.dark, 1, oi, x, y);
+            place_sheet(&plain, f.scene, f.bright, 1, oj, y, x);
+            if (half)
+                place_sheet(&plain, f.scene, f.dark, 1, v3_make(-20, -10, h / 2), v3_make(20, 0, 0),
+                            v3_make(0, 20, 0));
+            refine(&f, 100, 10);
+            int near = 0;
+            for (size_t i = 0; i < f.links.count; ++i) near += f.links.items[i].near;
+            assert_true(near > 0);
+            sum += receive(&f);
+            expected += integrate(oi, x, y, oj, y, x, half);
+            end(&f);
+        }
+        assert_near(sum, expected, half ? .1 : .03);
     }
-    assert_near(sum, expected, .03);
 }
 
 /* With small epsilon, parallel and perpendicular squares reach their closed forms. */
@@ -188,12 +199,12 @@ static void rows_above_one_are_scaled(void **state) {
     for (size_t i = 0; i < f.links.count; ++i) {
         fct_link *l = &f.links.items[i];
         l->near = 1, l->rays = 16;
-        l->weight = f.set.items[l->source].radiosity[1] > 0 && l->receiver != l->source ? 2.5F : 0;
+        l->weight = f.set.items[l->source].radiosity[1] > 0 && l->receiver != l->source ? 1.6F : 0;
         used += l->weight > 0;
     }
     assert_int_equal(used, 1);
     assert_near(receive(&f), 1, 1e-6);
-    assert_near(f.links.rows[leaf], 2.5, 1e-6);
+    assert_near(f.links.rows[leaf], 1.6, 1e-6);
     end(&f);
 }
 
@@ -201,6 +212,7 @@ enum { UNKNOWNS = 12 };
 typedef struct dense {
     fct_elements set;
     double matrix[UNKNOWNS][UNKNOWNS], irradiance[UNKNOWNS][3];
+    double change; /* of the last sweep, relative */
 } dense;
 
 static void gather_dense(void *user, size_t begin, size_t end, fct_change *sum) {
@@ -217,12 +229,16 @@ static void gather_dense(void *user, size_t begin, size_t end, fct_change *sum) 
 
 static void publish_dense(void *user) {
     dense *d = user;
+    double change = 0, norm = 0;
     for (int i = 0; i < UNKNOWNS; ++i)
         for (int c = 0; c < 3; ++c) {
             fct_element *e = &d->set.items[i];
+            double old = e->emission[c] + e->reflectance[c] * e->irradiance[c];
             e->irradiance[c] = d->irradiance[i][c];
             e->radiosity[c] = e->emission[c] + e->reflectance[c] * e->irradiance[c];
+            change += e->area * pow(e->radiosity[c] - old, 2), norm += e->area * pow(e->radiosity[c], 2);
         }
+    d->change = sqrt(change / norm);
 }
 
 /* b = e + R F b by Gaussian elimination; the iteration's error is below tolerance |B|, and it needs about as
@@ -276,6 +292,7 @@ static void iteration_equals_a_dense_solve(void **state) {
         assert_true(done.converged && sqrt(error / norm) <= tolerance);
         double sweeps = log(tolerance) / log(rho);
         assert_true(done.sweeps <= sweeps + 8 && done.sweeps >= .6 * sweeps);
+        assert_near(done.change, d.change, 1e-6);
         assert_true(done.change <= tolerance * (1 - rho) / rho * (1 + 1e-6));
         def.most = 2;
         assert_int_equal(fct_iterate(&d.set, &def, &done), FCT_OK);

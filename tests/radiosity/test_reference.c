@@ -1,4 +1,4 @@
-/* The path tracer against closed forms that need no solver. */
+/* The path tracer against closed forms. */
 #include "place.h"
 #include "radiosity/rivals/reference.h"
 
@@ -31,7 +31,7 @@ static void turn_inside_out(fct_mesh *mesh) {
     }
 }
 
-/* The middle of a face of the sphere of radius 1 from inside, and the normal there. */
+/* The centroid and normal of a face of an inside-out sphere. */
 static v3 inner_spot(const fct_mesh *mesh, size_t face, v3 *normal) {
     v3 p[3];
     for (size_t k = 0; k < 3; ++k)
@@ -112,7 +112,7 @@ static void disk_lamp(void **state) {
     }
 }
 
-/* A one-sided lamp seen from behind is black; so is the back of a bright wall. */
+/* The back of a one-sided lamp is black. */
 static void backs_are_black(void **state) {
     (void)state;
     for (int two = 0; two < 2; ++two) {
@@ -129,7 +129,7 @@ static void backs_are_black(void **state) {
     }
 }
 
-/* A mirrored, sheared instance of an inside-out ball is a furnace still. */
+/* A mirrored, sheared instance of an inside-out ball is still a furnace. */
 static void transformed_furnace(void **state) {
     (void)state;
     fct_scene *scene = begin();
@@ -152,7 +152,7 @@ static bool cancel(void *user, const char *phase, double done) {
     return --((canceller *)user)->left > 0;
 }
 
-/* Many points, whatever the threads: the same bits; other seeds, other noise about the same mean. */
+/* The number of threads does not change a bit; another seed changes the noise but not the mean. */
 static void threads_and_seeds(void **state) {
     (void)state;
     fct_scene *scene = disk_and_blocker(.3, false);

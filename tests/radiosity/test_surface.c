@@ -1,4 +1,4 @@
-/* Output surfaces: no T-junctions, sizes, creases, footholds, refinement. */
+/* Surfaces: no T-junctions, sizes of edges, creases, refinement. */
 #include "place.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/split.h"
@@ -19,7 +19,7 @@ static fct_surface build(const fct_scene *scene, uint32_t instance, double max_e
     return s;
 }
 
-/* The unit cube, 8 vertices, 12 triangles, outward. */
+/* The unit cube with 8 vertices and 12 outward triangles. */
 static fct_mesh make_cube(void) {
     static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
                                        2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
@@ -53,7 +53,7 @@ static double total_area(const fct_surface *s) {
     return area;
 }
 
-/* On a closed surface every side of a face, by positions, is met by as many running the other way. */
+/* Every edge (by positions) has as many faces in one direction as in the other. */
 static void assert_closed(const fct_surface *s) {
     uint32_t *first = fct_allocate(&plain, s->mesh.vertex_count, sizeof *first);
     assert_int_equal(fct_weld(&plain, s->mesh.vertex_count, s->mesh.positions, first), FCT_OK);
@@ -72,7 +72,7 @@ static void assert_closed(const fct_surface *s) {
     fct_memory_release(&plain, first);
 }
 
-/* What holds for every surface. */
+/* Invariants of every surface. */
 static void assert_sound(const fct_scene *scene, uint32_t instance, const fct_surface *s) {
     fct_scene_view view = fct_scene_get(scene);
     const fct_instance *placed = view.instances + instance;
@@ -137,7 +137,7 @@ static void cube_is_split_evenly(void **state) {
     fct_mesh_release(&plain, &cube);
 }
 
-/* Neighbours of very different sizes still agree on every edge, and so do unwelded ones. */
+/* Neighbours of very different sizes agree on every edge, welded or not. */
 static void splits_conform(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -167,7 +167,7 @@ static void splits_conform(void **state) {
     fct_mesh_release(&plain, &ball);
 }
 
-/* A dense smooth model passes through: the same vertices and triangles in the same order. */
+/* A dense smooth model is unchanged: the same vertices and triangles in the same order. */
 static void dense_models_pass(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -194,7 +194,7 @@ static void dense_models_pass(void **state) {
     fct_mesh_release(&plain, &ball);
 }
 
-/* A floor under a box: fine where they touch, coarse far off. */
+/* A floor under a box is fine near the contact and coarse far from it. */
 static void finer_near_contacts(void **state) {
     (void)state;
     fct_scene *scene = begin();
@@ -219,7 +219,7 @@ static void finer_near_contacts(void **state) {
     fct_mesh_release(&plain, &cube);
 }
 
-/* A hub of many faces, an edge of many faces, degenerate and unused things: quick and without NaN. */
+/* A hub of many faces, an edge of many faces, degenerate faces: fast and without NaN. */
 static void odd_meshes(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -247,8 +247,8 @@ static void odd_meshes(void **state) {
     }
 }
 
-/* Two thirds of a steep cone: the mean normal lies behind the outer faces, another direction does not. A
- * third of a screw of faces that turns over has none, and comes apart. */
+/* Two thirds of a steep cone: the mean normal is behind the outer faces, but another direction is in front of
+ * all. A screw of faces that turns over has no such direction, and each face gets a vertex of its own. */
 static void fronts_are_found(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -289,7 +289,7 @@ static bool crosses(void *user, uint32_t a, uint32_t b) {
     return (at(x->surface, a).x - h) * (at(x->surface, b).x - h) < 0;
 }
 
-/* Edges of the top alone: what its rim shares with the other sides must be split there too. */
+/* Marks edges of the top only; the other sides must split the shared rim too. */
 static bool on_top(void *user, uint32_t a, uint32_t b) {
     const border *x = user;
     return x->surface->normals[3 * (size_t)a + 2] > .5F && x->surface->normals[3 * (size_t)b + 2] > .5F;
