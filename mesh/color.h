@@ -5,15 +5,20 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "base/math/elementary.h"
+
 static inline float fct_linear_from_srgb(double s) {
-    return (float)(s <= .04045 ? s / 12.92 : pow((s + .055) / 1.055, 2.4));
+    if (s <= .04045) return (float)(s / 12.92);
+    double x = (s + .055) / 1.055, root = fct_root(x, 5);
+    return (float)(x * x * (root * root)); /* x^2.4 */
 }
 
 /* Clamps to [0, 1] first. */
 static inline uint8_t fct_srgb_byte(double linear) {
     double x = linear < 0 ? 0 : linear < 1 ? linear : 1;
-    double s = x <= .0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - .055;
-    return (uint8_t)(255 * s + .5);
+    if (x <= .0031308) return (uint8_t)(255 * 12.92 * x + .5);
+    double power = sqrt(sqrt(fct_root(x * x * x * (x * x), 3))); /* x^(1/2.4) = x^(5/12) */
+    return (uint8_t)(255 * (1.055 * power - .055) + .5);
 }
 
 #endif

@@ -7,6 +7,7 @@
  */
 #include "mesh/triangulate.h"
 
+#include "base/math/elementary.h"
 #include "base/math/vec.h"
 
 /* Twice the signed area of the triangle a b c. */
@@ -99,7 +100,7 @@ static int fan_is_right(const fct_polygon_scratch *s, uint32_t count) {
         const double *o = s->flat[0], *a = s->flat[i], *b = s->flat[i + 1];
         double t = turn(o, a, b);
         if (!(t > 0)) return 0;
-        if (count > 4) turned += atan2(t, (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]));
+        if (count > 4) turned += fct_atan2(t, (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]));
     }
     return turned < 6.28;
 }

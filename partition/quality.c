@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/math/eigen.h"
+#include "base/math/elementary.h"
 #include "base/parallel.h"
 #include "base/union_find.h"
 #include "cluster/tree/node.h"
@@ -98,7 +99,7 @@ static double fit_box(const judge *j, const piece *range, const v3 axes[3]) {
     double low[2 * TURNS + 1], high[2 * TURNS + 1], best = INFINITY;
     v3 along[2 * TURNS + 1], p[3];
     for (int t = 0; t < TURNS; ++t) {
-        double c = cos(pi * t / (2 * TURNS)), s = sin(pi * t / (2 * TURNS));
+        double c = fct_cos(pi * t / (2 * TURNS)), s = fct_sin(pi * t / (2 * TURNS));
         along[2 * t] = v3_mad(v3_scale(axes[2], c), s, axes[1]);
         along[2 * t + 1] = v3_mad(v3_scale(axes[1], c), -s, axes[2]);
     }

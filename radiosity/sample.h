@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "base/math/elementary.h"
 #include "base/math/vec.h"
 
 #define FCT_PI 3.14159265358979323846
@@ -86,7 +87,7 @@ static inline v3 fct_cosine_direction(v3 n, double u, double v) {
     } else {
         radius = b, angle = b != 0 ? FCT_PI / 2 - FCT_PI / 4 * (a / b) : 0;
     }
-    double x = radius * cos(angle), y = radius * sin(angle), z2 = 1 - radius * radius;
+    double x = radius * fct_cos(angle), y = radius * fct_sin(angle), z2 = 1 - radius * radius;
     v3 s, t;
     v3_frame(n, &s, &t);
     return v3_mad(v3_mad(v3_scale(n, sqrt(z2 > 0 ? z2 : 0)), x, s), y, t);

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/math/elementary.h"
 #include "base/math/round.h"
 #include "scene/transform.h"
 
@@ -374,7 +375,7 @@ static void set_default_camera(fct_scene *scene) {
     }
     double radius = fmax(.5 * sqrt(square), 1e-30);
     scene->camera.vertical_fov = 40;
-    double distance = radius / sin(20 * 3.14159265358979323846 / 180); /* half of the angle */
+    double distance = radius / fct_sin(20 * 3.14159265358979323846 / 180); /* half of the angle */
     v3_store(scene->camera.position, v3_mad(v3_load(scene->camera.target), distance, toward));
     scene->camera.up[1] = 1;
 }

@@ -1,5 +1,5 @@
-/* base/math/elementary.c: see elementary.h. Each function reduces its argument to a short interval about a point where it
- * is known, and sums the Taylor series until the next term is below 2^-56 of the sum.
+/* base/math/elementary.c: see elementary.h. Each function reduces its argument to a short interval about a
+ * point where it is known, and sums the Taylor series until the next term is below 2^-56 of the sum.
  */
 #include "base/math/elementary.h"
 
@@ -25,8 +25,12 @@ static double sum_cosine(double z) {
 
 /* x minus the nearest multiple of pi / 2; *quadrant is the multiple modulo 4. */
 static double reduce_angle(double x, int *quadrant) {
-    /* pi / 2 in three parts. The first two have 33 bits, so that a product with a multiple below 2^20 is exact. */
+    /* pi / 2 in three parts. The first two have 33 bits, so that a product with a multiple below 2^20 is
+     * exact. */
     const double first = 0x1.921fb544p+0, second = 0x1.0b4611a6p-34, third = 0x1.3198a2e037073p-69;
+    *quadrant = 0;
+    if (!(fabs(x) < INFINITY)) return x - x; /* not a number */
+    if (fabs(x) > 1e5) x = fmod(x, 6.283185307179586);
     double n = floor(x * 0.63661977236758134 + 0.5);
     *quadrant = (int)((int64_t)n & 3);
     return ((x - n * first) - n * second) - n * third;

@@ -1,13 +1,14 @@
 /* base/math/elementary.h: elementary functions with the same result on every processor.
  *
- * The C library picks its sine, arc cosine or power by the processor, and the versions with fused multiply-add differ from
- * the others in the last bit. These functions use additions, multiplications, divisions and square roots only, which
- * IEEE 754 defines exactly. Errors are at most 4 units in the last place within the stated ranges.
+ * The C library picks its sine, arc cosine or power by the processor, and the versions with fused
+ * multiply-add differ from the others in the last bit. These functions use additions, multiplications,
+ * divisions and square roots only, which IEEE 754 defines exactly. Errors are at most 4 units in the last
+ * place within the stated ranges.
  */
 #ifndef FCT_BASE_ELEMENTARY_H
 #define FCT_BASE_ELEMENTARY_H
 
-/* |x| <= 1e5; the absolute error is below 1e-15. */
+/* The absolute error is below 1e-15 for |x| <= 1e5, and 1e-16 |x| beyond. */
 double fct_sin(double x);
 double fct_cos(double x);
 

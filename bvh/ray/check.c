@@ -9,6 +9,7 @@
  */
 #include <string.h>
 
+#include "base/math/elementary.h"
 #include "bvh/near/triangle.h"
 #include "bvh/ray/embree.h"
 #include "bvh/ray/traverse.h"
@@ -162,7 +163,7 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         met = met || (measure_rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
-            double rim = measure_rim_distance(e, p, radius * cos(angle), radius * sin(angle), &at);
+            double rim = measure_rim_distance(e, p, radius * fct_cos(angle), radius * fct_sin(angle), &at);
             if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }

@@ -2,6 +2,7 @@
  *
  * A hash of the seed and the ray's number decides everything about a ray, so each can be made again alone.
  */
+#include "base/math/elementary.h"
 #include "bvh/model.h"
 
 #include <float.h>
@@ -28,7 +29,7 @@ static uint32_t random_below(random_source *s, uint32_t count) {
 static v3 random_direction(random_source *s) {
     double z = 2 * random_uniform(s) - 1, phi = 6.283185307179586 * random_uniform(s),
            r = sqrt(fmax(0, 1 - z * z));
-    return v3_make(r * cos(phi), r * sin(phi), z);
+    return v3_make(r * fct_cos(phi), r * fct_sin(phi), z);
 }
 
 /* A face, and a point inside it. Unscaled. */
@@ -113,13 +114,13 @@ static void make_ray_of_kind(const fct_bvh *bvh, random_source *s, uint64_t kind
     }
     case 7: { /* from far away */
         tangent = random_direction(s);
-        double far = size * exp2(2 + 18 * random_uniform(s));
+        double far = size * fct_exp2(2 + 18 * random_uniform(s));
         set_ray(ray, v3_mad(at.point, -far, tangent), tangent, 0, INFINITY);
         break;
     }
     case 8: /* with a very long or very short direction */
         tangent = v3_sub(at.point, origin);
-        set_ray(ray, origin, v3_scale(tangent, bvh->scale * exp2(floor(120 * random_uniform(s) - 60))), 0,
+        set_ray(ray, origin, v3_scale(tangent, bvh->scale * fct_exp2(floor(120 * random_uniform(s) - 60))), 0,
                 INFINITY);
         break;
     case 9: { /* between two points of the surface */

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/math/eigen.h"
+#include "base/math/elementary.h"
 #include "base/parallel.h"
 #include "cluster/file/file.h"
 
@@ -144,7 +145,7 @@ static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
     fault = sums_fault(c, &t);
     if (fault) return fault;
     if (!(c->cone_angle >= 0 && c->cone_angle < 3.1416F)) return "a cone of no angle";
-    if (v3_norm2(cone) > 0 && acos(fmax(t.narrowest, -1)) > (double)c->cone_angle + 1e-7)
+    if (v3_norm2(cone) > 0 && fct_acos(fmax(t.narrowest, -1)) > (double)c->cone_angle + 1e-7)
         return "a face outside its cone of normals";
     return plane_fault(c, &box, &t, diagonal);
 }

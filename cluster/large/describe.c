@@ -9,6 +9,7 @@
  */
 #include <string.h>
 
+#include "base/math/elementary.h"
 #include "cluster/large/lookup.h"
 #include "cluster/shape/box.h"
 #include "cluster/shape/cone.h"
@@ -214,7 +215,7 @@ static bool fit_box(describer *d, uint32_t node, const float samples[][9]) {
 /* --- Cones of large clusters --- */
 
 static double angle_between(v3 a, v3 b) {
-    return 2 * asin(fmin(0.5 * v3_norm(v3_sub(a, b)), 1));
+    return 2 * fct_asin(fmin(0.5 * v3_norm(v3_sub(a, b)), 1));
 }
 
 static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
@@ -256,7 +257,7 @@ static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
         push_children(d, p, child, stack, &top);
     }
     widest = fmin(widest + slack, pi);
-    double chord = 2 * sin(0.5 * widest);
+    double chord = 2 * fct_sin(0.5 * widest);
     c->cone_angle = fct_cone_angle(nextafterf((float)(chord * chord), 5));
     return true;
 }

@@ -11,6 +11,7 @@
 
 #include <string.h>
 
+#include "base/math/elementary.h"
 #include "base/math/simd.h"
 #include "base/parallel.h"
 
@@ -105,7 +106,7 @@ static void bound_parts(void *user, size_t begin, size_t end, size_t chunk, uint
         part *p = &j->parts[i];
         for (int k = 0; k < 8; ++k) p->box[k] = k % 4 < 3 ? INFINITY : 0;
         p->count = work->records[p->slot].count, p->height = work->heights[p->slot];
-        p->excess = (float)p->height - (p->count > 1 ? (float)log2(p->count) : 0);
+        p->excess = (float)p->height - (p->count > 1 ? (float)fct_log2(p->count) : 0);
         uint32_t stack[STACK], depth = 0;
         stack[depth++] = work->nodes[p->slot];
         while (depth > 0) {
@@ -127,7 +128,7 @@ static bool fits(const joiner *j, const summary *s, uint32_t begin, uint32_t end
     if (end - begin == 1) return (int)j->parts[begin].height < height_left;
     int bits = 64 - __builtin_clzll(s->weight);
     if (s->excess + (float)(bits + 3) < (float)height_left) return true; /* log2 is less than that */
-    return ceil((double)s->excess + log2((double)s->weight) + 1e-5) + 2 < height_left;
+    return ceil((double)s->excess + fct_log2((double)s->weight) + 1e-5) + 2 < height_left;
 }
 
 /* The cheapest cut of boxes in a row: the first *cut + 1 go left. */
@@ -392,7 +393,7 @@ static fct_result join_parts(joiner *j) {
         if (work->nodes[f] != FCT_NONE) j->parts[i++].slot = f;
     fct_parallel_for(env, j->part_count, GRAIN, bound_parts, j);
     group all = {summarize(j->parts, 0, j->part_count), 0, j->part_count, 0, 0, false};
-    all.height_left = (int)(3 * log2((double)all.of.weight));
+    all.height_left = (int)(3 * fct_log2((double)all.of.weight));
     split_all(j, &all);
     fct_result result = fct_progress(env, "clusters", work->merge_count / (double)work->face_count);
     if (result != FCT_OK) return result;

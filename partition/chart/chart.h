@@ -2,6 +2,7 @@
 #ifndef FCT_CLUSTER_CHART_H
 #define FCT_CLUSTER_CHART_H
 
+#include "base/math/elementary.h"
 #include "base/math/vec.h"
 #include "cluster/tree/node.h"
 #include "facetree/partition.h"
@@ -40,8 +41,8 @@ static inline double fct_angle(v3 a, v3 b) {
     v3 u = v3_unit(a), v = v3_unit(b);
     if (v3_norm2(u) == 0 || v3_norm2(v) == 0) return 0;
     double chord = v3_norm(v3_sub(u, v));
-    return chord < 1.4142 ? 2 * asin(0.5 * chord)
-                          : FCT_HALF_TURN - 2 * asin(fmin(0.5 * v3_norm(v3_add(u, v)), 1));
+    return chord < 1.4142 ? 2 * fct_asin(0.5 * chord)
+                          : FCT_HALF_TURN - 2 * fct_asin(fmin(0.5 * v3_norm(v3_add(u, v)), 1));
 }
 
 /* Whether the face at a place has a vertex twice. */

@@ -8,6 +8,7 @@
 #include <float.h>
 
 #include "base/math/eigen.h"
+#include "base/math/elementary.h"
 #include "base/math/round.h"
 #include "partition/meshlet/ball.h"
 #include "partition/meshlet/meshlet.h"
@@ -130,7 +131,7 @@ static void try_frames(const patch *p, v3 normal, double *least, v3 best[3]) {
     if (!(v3_norm2(normal) > 0)) return;
     v3_frame(normal, &t, &b);
     for (int turn = 0; turn < TURNS; ++turn) {
-        double angle = 0.5 * 3.14159265358979323846 * turn / TURNS, c = cos(angle), s = sin(angle);
+        double angle = 0.5 * 3.14159265358979323846 * turn / TURNS, c = fct_cos(angle), s = fct_sin(angle);
         v3 frame[3] = {v3_mad(v3_scale(t, c), s, b), v3_mad(v3_scale(b, c), -s, t), normal};
         double middle[3], half[3], area = measure_frame(p, frame, middle, half);
         if (!(area < *least)) continue;

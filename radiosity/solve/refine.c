@@ -8,6 +8,7 @@
  */
 #include "radiosity/solve/refine.h"
 
+#include "base/math/elementary.h"
 #include "radiosity/solve/oracle.h"
 
 /* First rays of a link. With one ray, a chance zero stops refinement and the result is 12 % too dark; with 4
@@ -93,7 +94,7 @@ static uint32_t sample_link(const fct_elements *set, fct_link *link, const fct_p
 /* True if every normal of one element turns away from the ball of the other. */
 static bool pair_faces_away(const fct_element *i, const fct_element *j, const fct_pair *pair) {
     if (pair->overlap) return false;
-    double angle = asin(fmin((i->radius + j->radius) / pair->distance, 1));
+    double angle = fct_asin(fmin((i->radius + j->radius) / pair->distance, 1));
     return fct_faces_away(i, pair->toward, angle) || fct_faces_away(j, v3_scale(pair->toward, -1), angle);
 }
 

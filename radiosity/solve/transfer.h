@@ -10,6 +10,7 @@
 #ifndef FCT_RADIOSITY_TRANSFER_H
 #define FCT_RADIOSITY_TRANSFER_H
 
+#include "base/math/elementary.h"
 #include "radiosity/solve/element.h"
 
 /* sum A_k |n_k.u| over its Cauchy-Schwarz bound, for the estimate of the projected area. The bound is 1.03 to
@@ -40,7 +41,7 @@ static inline bool fct_faces_away(const fct_element *e, v3 u, double angle) {
     double length = v3_norm(e->vector);
     if (e->cone >= FCT_ELEMENT_OPEN_CONE || length <= 0) return false;
     double cosine = v3_dot(e->vector, u) / length;
-    return acos(fmin(fmax(cosine, -1), 1)) - e->cone - angle > FCT_ELEMENT_OPEN_CONE;
+    return fct_acos(fmin(fmax(cosine, -1), 1)) - e->cone - angle > FCT_ELEMENT_OPEN_CONE;
 }
 
 /* pi times the radiant intensity along u: P.u with P = sum b_k S_k, but at least the mean radiosity times the

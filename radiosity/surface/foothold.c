@@ -4,6 +4,8 @@
 #include <float.h>
 #include <math.h>
 
+#include "base/math/elementary.h"
+
 /* Least cosine between a vertex normal and the normals of its faces. With 0, rays along the normal's horizon
  * start inside the surface. */
 #define MIN_FRONT .02
@@ -30,7 +32,7 @@ static void load_corner(const fct_corners *mesh, uint32_t corner, v3 p[3]) {
 /* Unit normal of a corner's face (zero if degenerate), and the angle at the corner in radians. */
 static v3 measure_corner(const v3 p[3], double *angle) {
     v3 a = v3_sub(p[1], p[0]), b = v3_sub(p[2], p[0]), cross = v3_cross(a, b);
-    *angle = atan2(v3_norm(cross), v3_dot(a, b));
+    *angle = fct_atan2(v3_norm(cross), v3_dot(a, b));
     return v3_unit(cross);
 }
 

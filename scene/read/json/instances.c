@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/math/elementary.h"
 #include "scene/read/json/models.h"
 #include "scene/transform.h"
 
@@ -26,8 +27,8 @@ static fct_result read_rotation(fct_document *d, const json_t *value, double qua
         v3 unit = v3_unit(v3_load(axis));
         if (!(v3_norm(unit) > 0)) return fct_json_fail(&d->json, "the axis has no length");
         double half = degrees * (3.14159265358979323846 / 360);
-        quaternion[0] = sin(half) * unit.x, quaternion[1] = sin(half) * unit.y;
-        quaternion[2] = sin(half) * unit.z, quaternion[3] = cos(half);
+        quaternion[0] = fct_sin(half) * unit.x, quaternion[1] = fct_sin(half) * unit.y;
+        quaternion[2] = fct_sin(half) * unit.z, quaternion[3] = fct_cos(half);
     }
     if (result != FCT_OK) return result;
     double square = 0;
