@@ -51,12 +51,12 @@ static fct_result write_dual(const fct_env *env, fct_lists *lists, fct_dual *out
         w.places[i] = out->edge_count;
         out->edge_count += count;
     }
-    out->edges = fct_allocate(env, out->edge_count, 2 * sizeof *out->edges);
-    out->lengths = fct_allocate(env, out->edge_count, sizeof *out->lengths);
-    bool complete = out->edges && out->lengths;
-    if (complete) fct_parallel_for(env, faces, GRAIN, write_edges, &w);
+    const fct_array arrays[] = {FCT_ARRAY(out->edges, 2 * (size_t)out->edge_count),
+                                FCT_ARRAY(out->lengths, out->edge_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the dual graph");
+    if (result == FCT_OK) fct_parallel_for(env, faces, GRAIN, write_edges, &w);
     fct_release(env, w.places);
-    return complete ? FCT_OK : fct_fail_memory(env, "the dual graph");
+    return result;
 }
 
 fct_result fct_dual_build(const fct_env *env, const fct_mesh *mesh, fct_dual *out) {

@@ -16,6 +16,7 @@
 #include "base/math/simd.h"
 #include "base/math/vec.h"
 #include "base/parallel.h"
+#include "base/sift.h"
 #include "base/sort.h"
 
 enum { GRAIN = 1 << 13, SEVERAL = 0x80000000u };
@@ -98,32 +99,26 @@ static void place_sides(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-static void sift_down(uint64_t *keys, size_t at, size_t count) {
-    uint64_t key = keys[at];
-    for (size_t child; (child = 2 * at + 1) < count; at = child) {
-        if (child + 1 < count && keys[child + 1] > keys[child]) ++child;
-        if (keys[child] <= key) break;
-        keys[at] = keys[child];
-    }
-    keys[at] = key;
+static bool less_keys(const void *keys, size_t i, size_t j) {
+    return ((const uint64_t *)keys)[i] < ((const uint64_t *)keys)[j];
 }
 
-/* Keys differ. By insertion, or by a heap where there are many. */
+static void swap_keys(void *keys, size_t i, size_t j) {
+    uint64_t *k = keys, key = k[i];
+    k[i] = k[j], k[j] = key;
+}
+
+/* Keys differ. */
 static void sort_bucket(uint64_t *keys, size_t count) {
-    if (count <= FEW) {
-        for (size_t i = 1; i < count; ++i) {
-            uint64_t key = keys[i];
-            size_t j = i;
-            for (; j > 0 && keys[j - 1] > key; --j) keys[j] = keys[j - 1];
-            keys[j] = key;
-        }
+    if (count > FEW) {
+        fct_sift_sort(keys, count, less_keys, swap_keys);
         return;
     }
-    for (size_t i = count / 2; i-- > 0;) sift_down(keys, i, count);
-    for (size_t i = count; --i > 0;) {
-        uint64_t key = keys[0];
-        keys[0] = keys[i], keys[i] = key;
-        sift_down(keys, 0, i);
+    for (size_t i = 1; i < count; ++i) {
+        uint64_t key = keys[i];
+        size_t j = i;
+        for (; j > 0 && keys[j - 1] > key; --j) keys[j] = keys[j - 1];
+        keys[j] = key;
     }
 }
 
@@ -245,13 +240,11 @@ static void find_connections(void *user, size_t begin, size_t end, size_t chunk,
 
 static fct_result sort_connections(const fct_env *env, builder *b) {
     uint32_t count = b->connection_count;
-    uint64_t *keys = fct_allocate(env, count, sizeof *keys);
-    uint32_t *order = fct_allocate(env, count, sizeof *order);
-    b->sorted = fct_allocate(env, count, sizeof *b->sorted);
-    fct_result result = FCT_OK;
-    if (!keys || !order || !b->sorted) {
-        result = fct_fail_memory(env, "the dual graph");
-    } else {
+    uint64_t *keys;
+    uint32_t *order;
+    const fct_array arrays[] = {FCT_ARRAY(keys, count), FCT_ARRAY(order, count), FCT_ARRAY(b->sorted, count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the dual graph");
+    if (result == FCT_OK) {
         for (uint32_t i = 0; i < count; ++i) {
             keys[i] = (uint64_t)b->connections[i].from << 32 | b->connections[i].to;
             order[i] = i;
@@ -418,33 +411,30 @@ static fct_result fill_lists(const fct_env *env, builder *b) {
         if (result != FCT_OK) return result;
     }
     memset(lists->neighbors + room, 0, FCT_LISTS_SLACK * sizeof *lists->neighbors);
-    lists->starts = fct_allocate(env, faces, sizeof *lists->starts);
-    lists->counts = fct_allocate(env, faces, sizeof *lists->counts);
-    lists->perimeters = fct_allocate(env, faces, sizeof *lists->perimeters);
+    if (room > UINT32_MAX) return fct_fail_memory(env, "the dual graph");
     lists->entry_count = (uint32_t)room;
-    lists->lengths = fct_allocate(env, room, sizeof *lists->lengths);
-    if (room > UINT32_MAX || !lists->starts || !lists->counts || !lists->perimeters || !lists->lengths)
-        return fct_fail_memory(env, "the dual graph");
+    const fct_array arrays[] = {FCT_ARRAY(lists->starts, faces), FCT_ARRAY(lists->counts, faces),
+                                FCT_ARRAY(lists->perimeters, faces), FCT_ARRAY(lists->lengths, room)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the dual graph");
+    if (result != FCT_OK) return result;
     fct_parallel_for(env, faces, GRAIN, write_lists, b);
     return fct_progress(env, "dual graph", 1);
 }
 
 fct_result fct_lists_build(const fct_env *env, const fct_mesh *mesh, double scale, fct_lists *out) {
     size_t faces = mesh->face_count, vertices = mesh->vertex_count, chunks = fct_chunk_count(vertices, GRAIN);
-    *out = (fct_lists){.face_count = mesh->face_count};
+    *out = (fct_lists){0};
+    if (4 * faces > UINT32_MAX) return fct_fail_memory(env, "the dual graph");
+    out->face_count = mesh->face_count;
     builder b = {.mesh = mesh, .scale = scale, .lists = out, .alone = fct_env_threads(env) == 1};
-    out->neighbors = fct_allocate(env, 3 * faces + FCT_LISTS_SLACK, sizeof *out->neighbors);
-    b.begins = fct_allocate_zero(env, vertices + 1, sizeof *b.begins);
-    b.sides = fct_allocate(env, 3 * faces + FEW, sizeof *b.sides);
-    b.boundary = fct_allocate(env, chunks, sizeof *b.boundary);
-    b.nonmanifold = fct_allocate(env, chunks, sizeof *b.nonmanifold);
-    b.places = fct_allocate(env, chunks + 1, sizeof *b.places);
-    fct_result result;
-    if (4 * faces > UINT32_MAX || !out->neighbors || !b.begins || !b.sides || !b.boundary || !b.nonmanifold ||
-        !b.places)
-        result = fct_fail_memory(env, "the dual graph");
-    else
-        result = sort_sides(env, &b);
+    const fct_array arrays[] = {FCT_ARRAY(out->neighbors, 3 * faces + FCT_LISTS_SLACK),
+                                FCT_ARRAY_ZERO(b.begins, vertices + 1),
+                                FCT_ARRAY(b.sides, 3 * faces + FEW),
+                                FCT_ARRAY(b.boundary, chunks),
+                                FCT_ARRAY(b.nonmanifold, chunks),
+                                FCT_ARRAY(b.places, chunks + 1)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the dual graph");
+    if (result == FCT_OK) result = sort_sides(env, &b);
     if (result == FCT_OK) result = fill_lists(env, &b);
     fct_release(env, (void *)b.begins);
     fct_release(env, b.sides);

@@ -165,15 +165,13 @@ fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fct_mesh_r
     if (corners > UINT32_MAX) return fct_fail_memory(env, "an inspection of more than 2^32 corners");
     fct_result result = fct_progress(env, "inspect", 0);
     if (result != FCT_OK) return result;
-    sides s = {mesh, fct_allocate(env, corners, sizeof(uint64_t)),
-               fct_allocate(env, corners, sizeof(uint32_t))};
-    unions u = {fct_allocate(env, corners, sizeof(uint32_t)),
-                fct_allocate(env, mesh->face_count, sizeof(uint32_t)),
-                fct_allocate(env, vertices, sizeof(uint32_t)), fct_allocate_zero(env, vertices, 1)};
-    if (!s.keys || !s.values || !u.corners || !u.faces || !u.loops || !u.on_boundary) {
-        result = fct_fail_memory(env, "an inspection");
-        goto done;
-    }
+    sides s = {.mesh = mesh};
+    unions u;
+    const fct_array arrays[] = {FCT_ARRAY(s.keys, corners),    FCT_ARRAY(s.values, corners),
+                                FCT_ARRAY(u.corners, corners), FCT_ARRAY(u.faces, mesh->face_count),
+                                FCT_ARRAY(u.loops, vertices),  FCT_ARRAY_ZERO(u.on_boundary, vertices)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "an inspection");
+    if (result != FCT_OK) goto done;
     measure(mesh, &found);
     fct_sets_create(u.corners, corners);
     fct_sets_create(u.faces, mesh->face_count);
@@ -187,12 +185,7 @@ fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fct_mesh_r
     result = count_duplicates(env, &s, &found);
     if (result == FCT_OK) result = fct_progress(env, "inspect", 1);
 done:
-    fct_release(env, s.keys);
-    fct_release(env, s.values);
-    fct_release(env, u.corners);
-    fct_release(env, u.faces);
-    fct_release(env, u.loops);
-    fct_release(env, u.on_boundary);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     if (result == FCT_OK) *report = found;
     return result;
 }

@@ -1,9 +1,17 @@
 /* mesh/load.c: the reader for a file's ending. */
+#include "mesh/load.h"
+
 #include <string.h>
 #include <strings.h>
 
 #include "base/io/file.h"
-#include "mesh/parse.h"
+#include "mesh/glb/read.h"
+#include "mesh/om/read.h"
+#include "mesh/ply/read.h"
+#include "mesh/soup.h"
+#include "mesh/text/obj_read.h"
+#include "mesh/text/off_read.h"
+#include "mesh/text/stl_read.h"
 
 typedef struct format {
     const char *ending;

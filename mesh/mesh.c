@@ -1,14 +1,28 @@
-/* mesh/mesh.c: create, release, copy, extract and validate. */
+/* mesh/mesh.c: creates, releases, copies, extracts and validates meshes. */
+#include "mesh/mesh.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "base/env.h"
-#include "facetree/mesh.h"
-#include "mesh/soup.h"
+#include "base/key.h"
 
 void fct_memory_release(const fct_env *env, void *memory) {
     fct_release(env, memory);
+}
+
+void fct_names_release(const fct_env *env, char **names, uint32_t count) {
+    if (!names) return;
+    for (uint32_t i = 0; i < count; ++i) fct_release(env, names[i]);
+    fct_release(env, names);
+}
+
+char *fct_copy_text(const fct_env *env, const char *text, size_t length) {
+    char *copy = fct_allocate(env, length + 1, 1);
+    if (!copy) return NULL;
+    memcpy(copy, text, length);
+    copy[length] = 0;
+    return copy;
 }
 
 void fct_mesh_release(const fct_env *env, fct_mesh *mesh) {
@@ -28,30 +42,19 @@ fct_result fct_mesh_create(const fct_env *env, uint32_t vertex_count, uint32_t f
                            fct_mesh *out) {
     *out = (fct_mesh){.vertex_count = vertex_count, .face_count = face_count};
     size_t vertices = vertex_count, faces = face_count;
-    struct request {
-        unsigned flag;
-        void *place;
-        size_t count, size;
-    } requests[] = {
-        {0, &out->positions, vertices, 3 * sizeof(float)},
-        {0, &out->triangles, faces, 3 * sizeof(uint32_t)},
-        {FCT_MESH_COLORS, &out->colors, vertices, 3 * sizeof(float)},
-        {FCT_MESH_NORMALS, &out->normals, vertices, 3 * sizeof(float)},
-        {FCT_MESH_TEXCOORDS, &out->texcoords, faces, 6 * sizeof(float)},
-        {FCT_MESH_FACE_COLORS, &out->face_colors, faces, 3 * sizeof(float)},
-        {FCT_MESH_MATERIALS, &out->materials, faces, sizeof(uint32_t)},
-        {FCT_MESH_SOURCE_FACES, &out->source_faces, faces, sizeof(uint32_t)},
+    const fct_array all[] = {
+        FCT_ARRAY(out->positions, 3 * vertices),
+        FCT_ARRAY(out->triangles, 3 * faces),
+        FCT_ARRAY_IF(arrays & FCT_MESH_COLORS, out->colors, 3 * vertices),
+        FCT_ARRAY_IF(arrays & FCT_MESH_NORMALS, out->normals, 3 * vertices),
+        FCT_ARRAY_IF(arrays & FCT_MESH_TEXCOORDS, out->texcoords, 6 * faces),
+        FCT_ARRAY_IF(arrays & FCT_MESH_FACE_COLORS, out->face_colors, 3 * faces),
+        FCT_ARRAY_IF(arrays & FCT_MESH_MATERIALS, out->materials, faces),
+        FCT_ARRAY_IF(arrays & FCT_MESH_SOURCE_FACES, out->source_faces, faces),
     };
-    for (size_t i = 0; i < sizeof requests / sizeof *requests; ++i) {
-        if (requests[i].flag && !(arrays & requests[i].flag)) continue;
-        void *memory = fct_allocate(env, requests[i].count, requests[i].size);
-        if (!memory) {
-            fct_mesh_release(env, out);
-            return fct_fail_memory(env, "a mesh");
-        }
-        memcpy(requests[i].place, &memory, sizeof memory);
-    }
-    return FCT_OK;
+    fct_result result = fct_allocate_all(env, all, FCT_LENGTH(all), "a mesh");
+    if (result != FCT_OK) *out = (fct_mesh){0};
+    return result;
 }
 
 static unsigned arrays_of(const fct_mesh *mesh) {
@@ -166,9 +169,7 @@ static size_t first_not_finite(const float *values, size_t count) {
         size_t end = begin + 4096 < count ? begin + 4096 : count;
         uint32_t largest = 0;
         for (size_t i = begin; i < end; ++i) {
-            uint32_t bits;
-            memcpy(&bits, values + i, sizeof bits);
-            bits &= 0x7fffffff;
+            uint32_t bits = fct_float_bits(values[i]) & 0x7fffffff;
             largest = bits > largest ? bits : largest;
         }
         if (largest < 0x7f800000) continue;

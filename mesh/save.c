@@ -5,8 +5,11 @@
 #include <strings.h>
 
 #include "base/io/file.h"
-#include "mesh/soup.h"
-#include "mesh/write.h"
+#include "mesh/glb/write.h"
+#include "mesh/mesh.h"
+#include "mesh/om/write.h"
+#include "mesh/ply/write.h"
+#include "mesh/text/write.h"
 
 typedef fct_result writer(const fct_sink *sink, FILE *stream);
 
@@ -19,23 +22,6 @@ static writer *find_writer(const char *ending) {
     for (size_t i = 0; i < sizeof formats / sizeof *formats; ++i)
         if (!strcasecmp(formats[i].ending, ending)) return formats[i].write;
     return NULL;
-}
-
-void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
-    const fct_mesh *m = sink->mesh;
-    const struct {
-        unsigned flag;
-        bool there;
-        const char *name;
-    } all[] = {{FCT_MESH_COLORS, m->colors, "colours"},
-               {FCT_MESH_NORMALS, m->normals, "normals"},
-               {FCT_MESH_TEXCOORDS, m->texcoords, "texture coordinates"},
-               {FCT_MESH_FACE_COLORS, m->face_colors, "face colours"},
-               {FCT_MESH_MATERIALS, m->materials, "materials"}};
-    char text[128] = "";
-    for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
-        if ((arrays & all[i].flag) && all[i].there) strcat(strcat(text, *text ? ", " : ""), all[i].name);
-    if (*text) fct_note(sink->env, FCT_MESSAGE_NOTE, "%s: this format has no place for %s", sink->name, text);
 }
 
 typedef struct job {

@@ -5,20 +5,6 @@
 
 #include "mesh/triangulate.h"
 
-void fct_names_release(const fct_env *env, char **names, uint32_t count) {
-    if (!names) return;
-    for (uint32_t i = 0; i < count; ++i) fct_release(env, names[i]);
-    fct_release(env, names);
-}
-
-char *fct_copy_text(const fct_env *env, const char *text, size_t length) {
-    char *copy = fct_allocate(env, length + 1, 1);
-    if (!copy) return NULL;
-    memcpy(copy, text, length);
-    copy[length] = 0;
-    return copy;
-}
-
 void fct_soup_release(const fct_env *env, fct_soup *soup) {
     fct_release(env, soup->positions);
     fct_release(env, soup->colors);
@@ -107,19 +93,17 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
         uint32_t count = soup->starts[i + 1] - soup->starts[i];
         widest = count > widest ? count : widest;
     }
-    fct_polygon_scratch scratch = {.flat = fct_allocate(env, widest, sizeof *scratch.flat),
-                                   .next = fct_allocate(env, widest, sizeof(uint32_t)),
-                                   .previous = fct_allocate(env, widest, sizeof(uint32_t)),
-                                   .reflex = fct_allocate(env, widest, 1)};
-    uint32_t *local = fct_allocate(env, widest, 3 * sizeof(uint32_t));
+    fct_polygon_scratch scratch;
+    uint32_t *local;
+    const fct_array lists[] = {FCT_ARRAY(scratch.flat, widest), FCT_ARRAY(scratch.next, widest),
+                               FCT_ARRAY(scratch.previous, widest), FCT_ARRAY(scratch.reflex, widest),
+                               FCT_ARRAY(local, 3 * (size_t)widest)};
     unsigned arrays = FCT_MESH_SOURCE_FACES | (soup->texcoords ? FCT_MESH_TEXCOORDS : 0) |
                       (soup->polygon_colors ? FCT_MESH_FACE_COLORS : 0) |
                       (soup->materials ? FCT_MESH_MATERIALS : 0);
-    fct_result result = FCT_OK;
     fct_mesh faces = {0};
-    if (!scratch.flat || !scratch.next || !scratch.previous || !scratch.reflex || !local)
-        result = fct_fail_memory(env, "triangulation");
-    else
+    fct_result result = fct_allocate_all(env, lists, FCT_LENGTH(lists), "triangulation");
+    if (result == FCT_OK)
         result = fct_mesh_create(env, 0, (uint32_t)(soup->corner_count - 2 * (size_t)soup->polygon_count),
                                  arrays, &faces);
     if (result == FCT_OK) {
@@ -127,11 +111,7 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
         fct_release(env, faces.positions);
         *out = faces;
     }
-    fct_release(env, scratch.flat);
-    fct_release(env, scratch.next);
-    fct_release(env, scratch.previous);
-    fct_release(env, scratch.reflex);
-    fct_release(env, local);
+    fct_release_all(env, lists, FCT_LENGTH(lists));
     return result;
 }
 

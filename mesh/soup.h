@@ -1,16 +1,26 @@
-/* mesh/soup.h: what every reader hands over: polygons as lists of vertex indices, in the file's order.
+/* mesh/soup.h: the input and the output of every reader.
  *
- * A reader fills a soup with arrays from fct_allocate; fct_soup_mesh checks it, cuts polygons into triangles
- * and moves the arrays into a mesh. A soup of triangles alone (starts == NULL) is moved without a copy.
+ * A reader gets an fct_source and fills an empty fct_soup: polygons as lists of vertex indices, in the order
+ * of the file. If the reader fails, the caller releases the soup. A reader allocates at most a small multiple
+ * of the file's size, whatever counts the file declares. fct_soup_mesh checks the soup, triangulates its
+ * polygons and moves the arrays into a mesh. It moves a soup of triangles (starts == NULL) without a copy.
  */
 #ifndef FCT_MESH_SOUP_H
 #define FCT_MESH_SOUP_H
 
-#include "base/env.h"
-#include "facetree/mesh.h"
+#include "mesh/mesh.h"
 
-/* More vertices or faces than this are refused, so that ids fit an int and FCT_NONE stays free. */
-#define FCT_MESH_LIMIT ((uint64_t)INT32_MAX - 1)
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A file in memory. */
+typedef struct fct_source {
+    const fct_env *env;
+    const char *name; /* begins every message */
+    const void *data;
+    size_t size;
+} fct_source;
 
 typedef struct fct_soup {
     uint32_t vertex_count, polygon_count;
@@ -33,12 +43,7 @@ void fct_soup_release(const fct_env *env, fct_soup *soup);
  * Polygons have at least three corners. `name` begins every message. Errors: DATA, MEMORY. */
 fct_result fct_soup_mesh(const fct_env *env, const char *name, fct_soup *soup, fct_mesh *out);
 
-/* fct_mesh_validate with a name before its messages (NULL: none). */
-fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *mesh);
-
-/* A copy of `length` bytes of text with a zero behind, or NULL. */
-char *fct_copy_text(const fct_env *env, const char *text, size_t length);
-
-void fct_names_release(const fct_env *env, char **names, uint32_t count);
-
+#ifdef __cplusplus
+}
+#endif
 #endif

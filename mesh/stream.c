@@ -16,7 +16,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "mesh/ply/read.h"
+#include "mesh/mesh.h"
+#include "mesh/ply/bind.h"
 #include "mesh/ply/value.h"
 
 enum { ROWS = 8192, HEADER_MOST = 1 << 24 };

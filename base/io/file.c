@@ -74,25 +74,20 @@ void fct_file_close(const fct_env *env, fct_file *file) {
     *file = (fct_file){0};
 }
 
-static fct_result fail_output(const fct_env *env, const char *path, int error) {
-    return fct_fail(env, FCT_ERROR_OUTPUT, "%s: cannot be written: %s", path,
-                    error ? strerror(error) : "the stream failed");
-}
-
 /* Flushes `stream` after produce and tells what became of it all. */
 static fct_result finish(const fct_env *env, const char *path, FILE *stream, fct_result result) {
     if (result != FCT_OK) return result;
     errno = 0;
-    if (fflush(stream) || ferror(stream)) return fail_output(env, path, errno);
+    if (fflush(stream) || ferror(stream)) return fct_output_fail(env, path, errno);
     return FCT_OK;
 }
 
 static fct_result write_directly(const fct_env *env, const char *path,
                                  fct_result (*produce)(void *user, FILE *stream), void *user) {
     FILE *stream = fopen(path, "wbe");
-    if (!stream) return fail_output(env, path, errno);
+    if (!stream) return fct_output_fail(env, path, errno);
     fct_result result = finish(env, path, stream, produce(user, stream));
-    if (fclose(stream) && result == FCT_OK) result = fail_output(env, path, errno);
+    if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
     return result;
 }
 
@@ -108,14 +103,14 @@ fct_result fct_file_write_atomic(const fct_env *env, const char *path,
     int descriptor = dup(output.descriptor);
     FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "wb");
     if (!stream) {
-        result = fail_output(env, path, errno);
+        result = fct_output_fail(env, path, errno);
         if (descriptor >= 0) close(descriptor);
         fct_output_abandon(&output);
         return result;
     }
     setvbuf(stream, NULL, _IOFBF, 1 << 18);
     result = finish(env, path, stream, produce(user, stream));
-    if (fclose(stream) && result == FCT_OK) result = fail_output(env, path, errno);
+    if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
     if (result == FCT_OK) return fct_output_finish(&output);
     fct_output_abandon(&output);
     return result;

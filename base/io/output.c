@@ -6,17 +6,16 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/io/file.h"
-
 /* The disk is set to work whenever so much has been written, instead of at the end. */
 #define PORTION ((uint64_t)64 << 20)
 
-static fct_result fail_output(const fct_env *env, const char *path, int error) {
+fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
     return fct_fail(env, FCT_ERROR_OUTPUT, "%s: cannot be written: %s", path,
                     error ? strerror(error) : "the stream failed");
 }
@@ -71,9 +70,9 @@ static fct_result create(const fct_env *env, const char *path, fct_output *out) 
     bool standard = !strcmp(path, "-"), exists = !standard && stat(path, &status) == 0;
     *out = (fct_output){.env = env, .descriptor = -1};
     if ((size_t)snprintf(out->path, sizeof out->path, "%s", path) >= sizeof out->path)
-        return fail_output(env, path, ENAMETOOLONG);
-    if (exists && S_ISDIR(status.st_mode)) return fail_output(env, path, EISDIR);
-    if (exists && access(path, W_OK)) return fail_output(env, path, errno);
+        return fct_output_fail(env, path, ENAMETOOLONG);
+    if (exists && S_ISDIR(status.st_mode)) return fct_output_fail(env, path, EISDIR);
+    if (exists && access(path, W_OK)) return fct_output_fail(env, path, errno);
     if (standard || (exists && !S_ISREG(status.st_mode))) {
         out->spooled = true;
         out->descriptor = create_spool();
@@ -81,7 +80,7 @@ static fct_result create(const fct_env *env, const char *path, fct_output *out) 
         if (!exists || !realpath(path, out->target)) strcpy(out->target, out->path);
         out->descriptor = create_beside(out->target, out->temporary, sizeof out->temporary);
     }
-    if (out->descriptor < 0) return fail_output(env, path, errno);
+    if (out->descriptor < 0) return fct_output_fail(env, path, errno);
     if (exists && !out->spooled) (void)!fchmod(out->descriptor, status.st_mode & 07777);
     return FCT_OK;
 }
@@ -91,9 +90,9 @@ fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, 
     if (result != FCT_OK) return result;
     /* Some file systems cannot reserve; they tell of a full disk when it is full. */
     if (size && fallocate(out->descriptor, 0, 0, (off_t)size) && (errno == ENOSPC || errno == EFBIG))
-        result = fail_output(env, path, errno);
+        result = fct_output_fail(env, path, errno);
     else if (ftruncate(out->descriptor, (off_t)size))
-        result = fail_output(env, path, errno);
+        result = fct_output_fail(env, path, errno);
     if (result != FCT_OK) fct_output_abandon(out);
     return result;
 }
@@ -103,7 +102,7 @@ fct_result fct_output_write(fct_output *output, uint64_t offset, const void *dat
     for (size_t done = 0; done < size;) {
         ssize_t got = pwrite(output->descriptor, from + done, size - done, (off_t)(offset + done));
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) return fail_output(output->env, output->path, got ? errno : ENOSPC);
+        if (got <= 0) return fct_output_fail(output->env, output->path, got ? errno : ENOSPC);
         done += (size_t)got;
     }
     output->pending += size;
@@ -118,7 +117,7 @@ fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data
     for (size_t done = 0; done < size;) {
         ssize_t got = pread(output->descriptor, to + done, size - done, (off_t)(offset + done));
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) return fail_output(output->env, output->path, got ? errno : EIO);
+        if (got <= 0) return fct_output_fail(output->env, output->path, got ? errno : EIO);
         done += (size_t)got;
     }
     return FCT_OK;
@@ -128,7 +127,7 @@ fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data
 static fct_result copy_spool(fct_output *output) {
     bool standard = !strcmp(output->path, "-");
     FILE *to = standard ? stdout : fopen(output->path, "wbe");
-    if (!to) return fail_output(output->env, output->path, errno);
+    if (!to) return fct_output_fail(output->env, output->path, errno);
     char block[1 << 16];
     ssize_t got;
     fct_result result = FCT_OK;
@@ -139,14 +138,15 @@ static fct_result copy_spool(fct_output *output) {
         offset += got;
     }
     if (got || fflush(to) || ferror(to))
-        result = fail_output(output->env, standard ? "standard output" : output->path, errno);
-    if (!standard && fclose(to) && result == FCT_OK) result = fail_output(output->env, output->path, errno);
+        result = fct_output_fail(output->env, standard ? "standard output" : output->path, errno);
+    if (!standard && fclose(to) && result == FCT_OK)
+        result = fct_output_fail(output->env, output->path, errno);
     return result;
 }
 
 static fct_result take_name(const fct_output *output) {
     if (fsync(output->descriptor) || rename(output->temporary, output->target))
-        return fail_output(output->env, output->path, errno);
+        return fct_output_fail(output->env, output->path, errno);
     synchronise_folder(output->target);
     return FCT_OK;
 }

@@ -16,6 +16,9 @@ typedef struct fct_output {
     char path[PATH_MAX], target[PATH_MAX], temporary[PATH_MAX];
 } fct_output;
 
+/* Fails with "PATH: cannot be written: ..." and OUTPUT. error: an errno, or 0 for a stream's error flag. */
+fct_result fct_output_fail(const fct_env *env, const char *path, int error);
+
 /* Opens a new file of `size` bytes, all zero, whose space is taken at once where the file system can. "-" is
  * standard output; a symbolic link is followed; a target that is no regular file is written in the end, by
  * way of a temporary file. Errors: OUTPUT. */

@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "mesh/parse.h"
+#include "mesh/soup.h"
 
 enum { FCT_GLB_ABSENT = -1 };
 

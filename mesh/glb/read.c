@@ -6,6 +6,8 @@
  * asks. Cameras, lights, skins and animations are left out. What is placed is bounded by the size of the
  * file, so that a short file of many references cannot exhaust the memory.
  */
+#include "mesh/glb/read.h"
+
 #include <math.h>
 #include <string.h>
 

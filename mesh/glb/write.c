@@ -6,13 +6,14 @@
  * and aligned to four bytes; the JSON is made first, for the file begins with its length.
  */
 #define _GNU_SOURCE
+#include "mesh/glb/write.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/env.h"
 #include "base/math/vec.h"
-#include "mesh/write.h"
 
 /* The vertices as they are written and the corners' indices into them. */
 typedef struct layout {
@@ -52,15 +53,13 @@ static fct_result split_vertices(const fct_sink *sink, layout *l) {
     size_t most = (size_t)m->vertex_count + 3 * (size_t)m->face_count;
     if (most >= FCT_NONE) return fct_fail(env, FCT_ERROR_DATA, "%s: too many vertices for GLB", sink->name);
     l->vertex_count = m->vertex_count;
-    l->origins = fct_allocate(env, most, sizeof(uint32_t));
-    l->texcoords = fct_allocate_zero(env, most, 2 * sizeof(float));
-    l->corners = fct_allocate(env, m->face_count, 3 * sizeof(uint32_t));
-    uint32_t *next = fct_allocate(env, most, sizeof(uint32_t));
-    unsigned char *used = fct_allocate_zero(env, m->vertex_count, 1);
-    fct_result result = FCT_OK;
-    if (!l->origins || !l->texcoords || !l->corners || !next || !used) {
-        result = fct_fail_memory(env, "texture coordinates");
-    } else {
+    uint32_t *next;
+    unsigned char *used;
+    const fct_array arrays[] = {FCT_ARRAY(l->origins, most), FCT_ARRAY_ZERO(l->texcoords, 2 * most),
+                                FCT_ARRAY(l->corners, 3 * (size_t)m->face_count), FCT_ARRAY(next, most),
+                                FCT_ARRAY_ZERO(used, m->vertex_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "texture coordinates");
+    if (result == FCT_OK) {
         for (uint32_t v = 0; v < m->vertex_count; ++v) l->origins[v] = v, next[v] = FCT_NONE;
         for (size_t i = 0; i < 3 * (size_t)m->face_count; ++i)
             l->corners[i] = place_corner(m->texcoords + 2 * i, m->triangles[i], l, next, used);
@@ -73,9 +72,10 @@ static fct_result split_vertices(const fct_sink *sink, layout *l) {
 /* Counting sort of the faces by material. */
 static fct_result order_faces(const fct_sink *sink, layout *l) {
     const fct_mesh *m = sink->mesh;
-    l->order = fct_allocate(sink->env, m->face_count, sizeof(uint32_t));
-    l->firsts = fct_allocate_zero(sink->env, (size_t)m->material_count + 2, sizeof(uint32_t));
-    if (!l->order || !l->firsts) return fct_fail_memory(sink->env, "materials");
+    const fct_array arrays[] = {FCT_ARRAY(l->order, m->face_count),
+                                FCT_ARRAY_ZERO(l->firsts, (size_t)m->material_count + 2)};
+    fct_result result = fct_allocate_all(sink->env, arrays, FCT_LENGTH(arrays), "materials");
+    if (result != FCT_OK) return result;
     /* firsts[i + 1] counts up from where material i begins to where it ends, which is where i + 1 begins. */
     for (uint32_t f = 0; f < m->face_count; ++f) ++l->firsts[m->materials[f] + 2];
     for (uint32_t i = 2; i <= m->material_count; ++i) l->firsts[i] += l->firsts[i - 1];

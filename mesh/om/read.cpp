@@ -21,7 +21,7 @@ extern "C" {
 #include "base/env.h"
 #include "mesh/color.h"
 }
-#include "mesh/parse.h"
+#include "mesh/om/read.h"
 
 namespace {
 

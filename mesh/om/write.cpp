@@ -17,7 +17,7 @@ extern "C" {
 #include "base/sort.h"
 #include "mesh/color.h"
 }
-#include "mesh/write.h"
+#include "mesh/om/write.h"
 
 namespace {
 

@@ -1,8 +1,9 @@
 /* mesh/ply/bind.c: see ply_read.h. */
+#include "mesh/ply/bind.h"
+
 #include <string.h>
 
 #include "mesh/color.h"
-#include "mesh/ply/read.h"
 #include "mesh/ply/value.h"
 
 /* Groups of properties that are used when all of them are there; a later group with the same destination wins

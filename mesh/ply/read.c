@@ -7,14 +7,15 @@
  * allocated. Elements and properties without a meaning here are passed over; triangle strips (with -1 between
  * strips) become triangles that keep the winding.
  */
+#include "mesh/ply/read.h"
+
 #include <limits.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
 #include "base/parallel.h"
-#include "mesh/parse.h"
-#include "mesh/ply/read.h"
+#include "mesh/ply/bind.h"
 #include "mesh/ply/value.h"
 
 typedef struct reader {

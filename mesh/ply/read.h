@@ -1,42 +1,10 @@
-/* mesh/ply/read.h: what the parts of the PLY reader share: where the values of a record go. */
+/* mesh/ply/read.h: the reader of PLY. */
 #ifndef FCT_MESH_PLY_READ_H
 #define FCT_MESH_PLY_READ_H
 
-#include "mesh/parse.h"
-#include "mesh/ply/header.h"
+#include "mesh/soup.h"
 
-typedef enum fct_ply_kind { FCT_PLY_OTHER, FCT_PLY_VERTICES, FCT_PLY_FACES, FCT_PLY_STRIPS } fct_ply_kind;
-
-/* Scalar property number `property` of an element goes to to[record * stride]. */
-typedef struct fct_ply_column {
-    size_t property;
-    float *to;
-    size_t stride;
-    bool color; /* integers are sRGB */
-} fct_ply_column;
-
-enum { FCT_PLY_COLUMNS = 16, FCT_PLY_NOWHERE = -1 };
-
-typedef struct fct_ply_target {
-    fct_ply_kind kind;
-    fct_ply_column columns[FCT_PLY_COLUMNS];
-    size_t column_count;
-    ptrdiff_t indices, texcoords, material; /* property numbers or NOWHERE */
-} fct_ply_target;
-
-/* What the element's name says. */
-fct_ply_kind fct_ply_kind_of(const fct_ply_element *element);
-
-/* Finds out what the element's properties are for, and allocates what one value (or three) for each of its
- * records needs. *vertex_texcoords receives V x 2 where texture coordinates lie at vertices. The count has
- * been checked against the size of the file. Errors: DATA, MEMORY. */
-fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const fct_ply_element *element,
-                        fct_soup *soup, float **vertex_texcoords, fct_ply_target *out);
-
-/* Fills to[...] of every column for records [begin, end); record i begins at base + i * size and its property
- * k at offsets[k] in it. as_double: values are doubles of this machine, whatever their declared type. */
-void fct_ply_fill_columns(const fct_ply_target *target, const fct_ply_property *properties,
-                          const unsigned char *base, size_t size, const size_t *offsets, bool swap,
-                          bool as_double, size_t begin, size_t end);
+/* Errors: DATA, MEMORY. */
+fct_result fct_read_ply(const fct_source *source, fct_soup *out);
 
 #endif

@@ -5,11 +5,12 @@
  * floats] [red green blue radiosity_r ...] [material_index], with the names in "comment facetree material
  * NAME" lines.
  */
+#include "mesh/ply/write.h"
+
 #include <string.h>
 
 #include "base/env.h"
 #include "mesh/color.h"
-#include "mesh/write.h"
 
 enum { ROWS = 4096, ROW_SIZE = 64 };
 

@@ -7,10 +7,11 @@
  * vertex agree. Lines, points and free-form surfaces are left out with a message, groups and smoothing
  * without one.
  */
+#include "mesh/text/obj_read.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "mesh/parse.h"
 #include "mesh/text/text.h"
 
 typedef struct counts {
@@ -332,7 +333,7 @@ static fct_result read_statement(reader *r) {
     return result;
 }
 
-static fct_result allocate_all(reader *r) {
+static fct_result allocate_mesh(reader *r) {
     const fct_env *env = r->t.env;
     const counts *c = &r->total;
     if (c->vertices > FCT_MESH_LIMIT || c->faces > FCT_MESH_LIMIT || c->corners > UINT32_MAX ||
@@ -343,16 +344,18 @@ static fct_result allocate_all(reader *r) {
     soup->vertex_count = (uint32_t)c->vertices;
     soup->polygon_count = (uint32_t)c->faces;
     soup->corner_count = c->corners;
-    bool ok = (soup->positions = fct_allocate(env, c->vertices, 3 * sizeof(float))) != NULL;
-    ok = ok && (soup->corners = fct_allocate(env, c->corners, sizeof(uint32_t)));
-    ok = ok && (r->texcoords = fct_allocate(env, c->texcoords, 2 * sizeof(float)));
-    ok = ok && (r->normals = fct_allocate(env, c->normals, 3 * sizeof(float)));
-    if (c->texcoords) ok = ok && (soup->texcoords = fct_allocate(env, c->corners, 2 * sizeof(float)));
-    if (c->normals) ok = ok && (r->corner_normals = fct_allocate(env, c->corners, sizeof(uint32_t)));
-    if (c->corners != 3 * c->faces)
-        ok = ok && (soup->starts = fct_allocate(env, c->faces + 1, sizeof(uint32_t)));
-    if (ok && soup->starts) soup->starts[0] = 0;
-    return ok ? FCT_OK : fct_fail_memory(env, "a mesh");
+    const fct_array arrays[] = {
+        FCT_ARRAY(soup->positions, 3 * c->vertices),
+        FCT_ARRAY(soup->corners, c->corners),
+        FCT_ARRAY(r->texcoords, 2 * c->texcoords),
+        FCT_ARRAY(r->normals, 3 * c->normals),
+        FCT_ARRAY_IF(c->texcoords, soup->texcoords, 2 * c->corners),
+        FCT_ARRAY_IF(c->normals, r->corner_normals, c->corners),
+        FCT_ARRAY_IF(c->corners != 3 * c->faces, soup->starts, c->faces + 1),
+    };
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "a mesh");
+    if (soup->starts) soup->starts[0] = 0;
+    return result;
 }
 
 static void finish_texcoords(reader *r) {
@@ -428,7 +431,7 @@ fct_result fct_read_obj(const fct_source *source, fct_soup *out) {
     reader r = {
         .t = {begin, begin + source->size, source->env, source->name, 1}, .soup = out, .material = FCT_NONE};
     count_statements(r.t, &r.total);
-    fct_result result = allocate_all(&r);
+    fct_result result = allocate_mesh(&r);
     for (uint64_t n = 0; result == FCT_OK && fct_text_skip_lines(&r.t, '#'); ++n) {
         if (n % 262144 == 0)
             result = fct_progress(source->env, "read", (double)(r.t.p - begin) / (double)source->size);

@@ -5,11 +5,12 @@
  * entry, which is passed over, for the map is not in the file. Components written with a point or an exponent
  * are linear floats, others sRGB bytes.
  */
+#include "mesh/text/off_read.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "mesh/color.h"
-#include "mesh/parse.h"
 #include "mesh/text/text.h"
 
 typedef struct reader {
@@ -179,18 +180,21 @@ static fct_result read_face(reader *r, uint32_t face) {
     return end_line(r);
 }
 
-static fct_result allocate_all(reader *r, size_t vertices, size_t faces) {
+static fct_result allocate_mesh(reader *r, size_t vertices, size_t faces) {
     const fct_env *env = r->t.env;
     fct_soup *soup = r->soup;
     soup->vertex_count = (uint32_t)vertices;
     soup->polygon_count = (uint32_t)faces;
-    bool ok = (soup->positions = fct_allocate(env, vertices, 3 * sizeof(float))) != NULL;
-    ok = ok && (soup->corners = fct_allocate(env, r->corner_capacity = 3 * faces, sizeof(uint32_t)));
-    ok = ok && (soup->starts = fct_allocate_zero(env, faces + 1, sizeof(uint32_t)));
-    if (r->has_colors) ok = ok && (soup->colors = fct_allocate(env, vertices, 3 * sizeof(float)));
-    if (r->has_normals) ok = ok && (soup->normals = fct_allocate(env, vertices, 3 * sizeof(float)));
-    if (r->has_texcoords) ok = ok && (r->texcoords = fct_allocate(env, vertices, 2 * sizeof(float)));
-    return ok ? FCT_OK : fct_fail_memory(env, "a mesh");
+    r->corner_capacity = 3 * faces;
+    const fct_array arrays[] = {
+        FCT_ARRAY(soup->positions, 3 * vertices),
+        FCT_ARRAY(soup->corners, r->corner_capacity),
+        FCT_ARRAY_ZERO(soup->starts, faces + 1),
+        FCT_ARRAY_IF(r->has_colors, soup->colors, 3 * vertices),
+        FCT_ARRAY_IF(r->has_normals, soup->normals, 3 * vertices),
+        FCT_ARRAY_IF(r->has_texcoords, r->texcoords, 2 * vertices),
+    };
+    return fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "a mesh");
 }
 
 static fct_result finish(reader *r) {
@@ -215,7 +219,7 @@ fct_result fct_read_off(const fct_source *source, fct_soup *out) {
     fct_result result = read_head(&r);
     if (result == FCT_OK) result = read_counts(&r, &vertices, &faces);
     if (result == FCT_OK) result = end_line(&r);
-    if (result == FCT_OK) result = allocate_all(&r, (size_t)vertices, (size_t)faces);
+    if (result == FCT_OK) result = allocate_mesh(&r, (size_t)vertices, (size_t)faces);
     for (int64_t i = 0; result == FCT_OK && i < vertices; ++i) {
         if (i % 65536 == 0)
             result = fct_progress(source->env, "read", (double)(r.t.p - begin) / (double)source->size);

@@ -2,10 +2,11 @@
  * numbered in the order of their first use, so that face f of the file is face f of the mesh. Facet normals
  * are left out: they follow from the winding.
  */
+#include "mesh/text/stl_read.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "mesh/parse.h"
 #include "mesh/text/text.h"
 
 typedef struct welder {

@@ -1,10 +1,11 @@
 /* mesh/text/write.c: OBJ, OFF and STL. */
+#include "mesh/text/write.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/env.h"
 #include "base/math/vec.h"
-#include "mesh/write.h"
 
 static void print_floats(FILE *stream, const float *values, int count) {
     for (int i = 0; i < count; ++i) fprintf(stream, " %.9g", (double)values[i]);

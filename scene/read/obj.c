@@ -12,8 +12,8 @@
 #include <string.h>
 
 #include "base/io/file.h"
-#include "mesh/parse.h"
-#include "mesh/soup.h"
+#include "mesh/load.h"
+#include "mesh/mesh.h"
 #include "mesh/text/text.h"
 #include "scene/read/path.h"
 

@@ -194,12 +194,14 @@ void against_brute_force(Soup &soup) {
         if (u != v) faces[std::minmax(u, v)].push_back((uint32_t)(i / 3));
     }
     uint32_t border = 0, nonmanifold = 0;
+    std::vector<double> perimeters(soup.triangles.size() / 3);
     for (auto &edge : faces) {
         const float *p = &soup.positions[3 * edge.first.first], *q = &soup.positions[3 * edge.first.second];
         double length =
             std::sqrt(std::pow((double)p[0] - (double)q[0], 2) + std::pow((double)p[1] - (double)q[1], 2) +
                       std::pow((double)p[2] - (double)q[2], 2));
         std::vector<uint32_t> sides = edge.second, chain = sides;
+        for (uint32_t f : sides) perimeters[f] += length;
         chain.erase(std::unique(chain.begin(), chain.end()), chain.end());
         border += chain.size() == 1;
         nonmanifold += chain.size() > 2;
@@ -222,6 +224,8 @@ void against_brute_force(Soup &soup) {
         assert_int_equal(dual.edges[2 * e + 1], pair.first.second);
         assert_true(std::fabs((double)dual.lengths[e++] - pair.second) < 1e-5 * (1 + pair.second));
     }
+    for (size_t f = 0; f < perimeters.size(); ++f)
+        assert_true(std::fabs((double)dual.perimeters[f] - perimeters[f]) < 1e-5 * (1 + perimeters[f]));
     shares_are_bounded(dual);
     fct_dual_release(&env, &dual);
 }

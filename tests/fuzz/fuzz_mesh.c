@@ -3,7 +3,7 @@
 
 #include "facetree/cluster.h"
 #include "fuzz/fuzz.h"
-#include "mesh/parse.h"
+#include "mesh/load.h"
 
 static void use(const fct_env *env, const fct_mesh *mesh) {
     fuzz_require(fct_mesh_validate(env, mesh) == FCT_OK, "a mesh that was read is valid");

@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "mesh/parse.h"
+#include "mesh/load.h"
 #include "support.h"
 
 /* A growing file in memory. */

@@ -1,0 +1,13 @@
+/* mesh/load.h: reads a mesh from memory. */
+#ifndef FCT_MESH_LOAD_H
+#define FCT_MESH_LOAD_H
+
+#include "base/env.h"
+#include "facetree/mesh.h"
+
+/* `format` is "obj", "ply", "off", "stl", "glb" or "om", in any case. `name` begins every message.
+ * Errors: DATA (also for an unknown format), MEMORY, CANCELLED. */
+fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
+                          const char *format, fct_mesh *out);
+
+#endif

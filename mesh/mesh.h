@@ -1,0 +1,19 @@
+/* mesh/mesh.h: what the files of mesh/ share about an fct_mesh. */
+#ifndef FCT_MESH_MESH_H
+#define FCT_MESH_MESH_H
+
+#include "base/env.h"
+#include "facetree/mesh.h"
+
+/* The most vertices, and the most faces, of a mesh: ids fit an int, and FCT_NONE is no id. */
+#define FCT_MESH_LIMIT ((uint64_t)INT32_MAX - 1)
+
+/* fct_mesh_validate whose messages begin with `name`. NULL: they begin with the element. */
+fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *mesh);
+
+/* A copy of text[0, length) with a final 0, or NULL without memory. */
+char *fct_copy_text(const fct_env *env, const char *text, size_t length);
+/* Releases `count` strings and the array. NULL is allowed. */
+void fct_names_release(const fct_env *env, char **names, uint32_t count);
+
+#endif

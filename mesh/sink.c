@@ -1,0 +1,23 @@
+/* mesh/sink.c: see sink.h. */
+#include "mesh/sink.h"
+
+#include <string.h>
+
+#include "base/env.h"
+
+void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
+    const fct_mesh *m = sink->mesh;
+    const struct {
+        unsigned flag;
+        bool there;
+        const char *name;
+    } all[] = {{FCT_MESH_COLORS, m->colors, "colours"},
+               {FCT_MESH_NORMALS, m->normals, "normals"},
+               {FCT_MESH_TEXCOORDS, m->texcoords, "texture coordinates"},
+               {FCT_MESH_FACE_COLORS, m->face_colors, "face colours"},
+               {FCT_MESH_MATERIALS, m->materials, "materials"}};
+    char text[128] = "";
+    for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
+        if ((arrays & all[i].flag) && all[i].there) strcat(strcat(text, *text ? ", " : ""), all[i].name);
+    if (*text) fct_note(sink->env, FCT_MESSAGE_NOTE, "%s: this format has no place for %s", sink->name, text);
+}

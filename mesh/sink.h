@@ -1,0 +1,30 @@
+/* mesh/sink.h: the input of every writer.
+ *
+ * A writer puts a checked mesh into a stream. It ignores errors of the stream, because its caller checks
+ * them. It runs in the C locale, so that printf writes decimal points.
+ */
+#ifndef FCT_MESH_SINK_H
+#define FCT_MESH_SINK_H
+
+#include <stdio.h>
+
+#include "facetree/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fct_sink {
+    const fct_env *env;
+    const char *name; /* of the file, for messages */
+    const fct_mesh *mesh;
+    const fct_mesh_save_def *def;
+} fct_sink;
+
+/* Sends one note that names the arrays of the mesh which the format cannot store. arrays: FCT_MESH_ bits. */
+void fct_note_left_out(const fct_sink *sink, unsigned arrays);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,10 @@
+/* mesh/text/obj_read.h: the reader of Wavefront OBJ. */
+#ifndef FCT_MESH_TEXT_OBJ_READ_H
+#define FCT_MESH_TEXT_OBJ_READ_H
+
+#include "mesh/soup.h"
+
+/* Errors: DATA, MEMORY. */
+fct_result fct_read_obj(const fct_source *source, fct_soup *out);
+
+#endif
