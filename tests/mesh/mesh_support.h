@@ -48,6 +48,25 @@ static inline void put_u8(bytes *b, unsigned x) {
     put(b, &byte, 1);
 }
 
+/* A GLB file with one JSON chunk and, if size > 0, one BIN chunk. */
+static inline bytes make_glb(const char *json, const void *binary, size_t size) {
+    bytes b = {.size = 0};
+    size_t length = strlen(json), padded = (length + 3) & ~(size_t)3;
+    put_text(&b, "glTF");
+    put_i32(&b, 2, false);
+    put_i32(&b, (int32_t)(20 + padded + (size ? 8 + size : 0)), false);
+    put_i32(&b, (int32_t)padded, false);
+    put_text(&b, "JSON");
+    put_text(&b, json);
+    while (b.size & 3) put_text(&b, " ");
+    if (size) {
+        put_i32(&b, (int32_t)size, false);
+        put(&b, "BIN", 4);
+        put(&b, binary, size);
+    }
+    return b;
+}
+
 /* The data lie at the end of a block of their size, so that a sanitizer sees every read beyond them. */
 static inline fct_result parse_bytes(recorder *r, const char *format, const void *data, size_t size,
                                      fct_mesh *mesh) {

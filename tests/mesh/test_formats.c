@@ -105,24 +105,6 @@ static void reads_binary_stl(void **state) {
     refuse("stl", "solid x\n", "expected 'facet' or 'endsolid', found the end of the file");
 }
 
-static bytes make_glb(const char *json, const void *binary, size_t size) {
-    bytes b = {.size = 0};
-    size_t length = strlen(json), padded = (length + 3) & ~(size_t)3;
-    put_text(&b, "glTF");
-    put_i32(&b, 2, false);
-    put_i32(&b, (int32_t)(20 + padded + (size ? 8 + size : 0)), false);
-    put_i32(&b, (int32_t)padded, false);
-    put_text(&b, "JSON");
-    put_text(&b, json);
-    while (b.size & 3) put_text(&b, " ");
-    if (size) {
-        put_i32(&b, (int32_t)size, false);
-        put(&b, "BIN", 4);
-        put(&b, binary, size);
-    }
-    return b;
-}
-
 /* One triangle at (0,0,0) (1,0,0) (0,1,0), indices as bytes, placed by two nodes, one of which mirrors. */
 #define GLB_JSON(nodes, attributes, accessor)                                                                \
     "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}]," nodes                       \
