@@ -10,7 +10,7 @@
 #include <sys/mman.h>
 #include <time.h>
 
-enum { PAGE = 1 << 12, LARGE = 1 << 22 };
+enum { PAGE = 1 << 12, LARGE = 1 << 22 }; /* bytes */
 
 static void *default_allocate(void *user, size_t size) {
     (void)user;
@@ -22,8 +22,8 @@ static void default_release(void *user, void *memory) {
     free(memory);
 }
 
-/* Large arrays are gone through in any order: with small pages every access costs a look at the page table
- * too. No more than a wish, that changes nothing but speed. */
+/* Random access to a large array in small pages costs a walk of the page table per access. A hint: it changes
+ * only the speed. */
 static void ask_for_huge_pages(void *memory, size_t bytes) {
 #ifdef MADV_HUGEPAGE
     uintptr_t begin = ((uintptr_t)memory + PAGE - 1) & ~(uintptr_t)(PAGE - 1);

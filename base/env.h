@@ -4,8 +4,8 @@
 
 #include "facetree/base.h"
 
-/* count * size bytes aligned to 64, or NULL on overflow or exhaustion. A zero request yields a valid pointer.
- */
+/* count * size bytes aligned to 64, or NULL if the product overflows or memory is exhausted. A request of 0
+ * bytes returns a valid pointer. */
 void *fct_allocate(const fct_env *env, size_t count, size_t size);
 void *fct_allocate_zero(const fct_env *env, size_t count, size_t size);
 /* NULL is allowed. */
@@ -32,19 +32,19 @@ fct_result fct_allocate_all(const fct_env *env, const fct_array *arrays, size_t 
 /* Releases all arrays of the table and sets every pointer to NULL. NULL pointers are allowed. */
 void fct_release_all(const fct_env *env, const fct_array *arrays, size_t count);
 
-/* Grows *array (capacity *capacity elements) to hold at least `needed`, by half at least; contents are kept.
- */
+/* Makes room for `needed` elements in *array, which holds *capacity. The capacity grows by at least half, and
+ * the contents stay. On failure nothing changes. Errors: MEMORY. */
 fct_result fct_grow(const fct_env *env, void **array, size_t *capacity, size_t needed, size_t size);
 
-/* Sends the message and returns `result`, so that a caller writes: return fct_fail(env, FCT_ERROR_DATA, ...).
- */
+/* Sends the message and returns `result`: return fct_fail(env, FCT_ERROR_DATA, ...). */
 fct_result fct_fail(const fct_env *env, fct_result result, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 fct_result fct_fail_memory(const fct_env *env, const char *what);
 void fct_note(const fct_env *env, fct_severity severity, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* FCT_OK, or FCT_ERROR_CANCELLED when the hook says stop. From the calling thread only. */
+/* Reports progress. Returns FCT_ERROR_CANCELLED if the hook returns false. Call it only in the thread that
+ * called the library. */
 fct_result fct_progress(const fct_env *env, const char *phase, double done);
 
 /* At least 1. */

@@ -1,5 +1,4 @@
-/* base/heap.h: an indexed 4-ary min-heap: items are ids below a capacity, ordered by
- * (key, id). */
+/* base/heap.h: a min-heap of ids below a capacity, ordered by (key, id). The key of an id can change. */
 #ifndef FCT_BASE_HEAP_H
 #define FCT_BASE_HEAP_H
 
@@ -12,24 +11,24 @@ typedef struct fct_heap_entry {
 
 typedef struct fct_heap {
     fct_heap_entry *entries;
-    uint32_t *places; /* id -> entry, FCT_NONE when the id is not in the heap */
+    uint32_t *places; /* id -> its entry; FCT_NONE: the id is not in the heap */
     uint32_t count, capacity;
 } fct_heap;
 
-/* An empty heap for ids below capacity. Errors: MEMORY; the heap is all zero then. */
+/* An empty heap for ids below capacity. Errors: MEMORY. On failure the heap is all zero. */
 fct_result fct_heap_create(const fct_env *env, uint32_t capacity, fct_heap *heap);
 /* Accepts a zeroed heap. */
 void fct_heap_release(const fct_env *env, fct_heap *heap);
 
-/* Puts the id in without keeping order; fct_heap_order must follow before any other call. */
+/* Adds an id that is not in the heap, without ordering. Call fct_heap_order before any other function. */
 void fct_heap_append(fct_heap *heap, uint32_t id, uint64_t key);
-/* Orders what was appended. O(count). */
+/* Orders the heap after appends. O(count). */
 void fct_heap_order(fct_heap *heap);
 /* Adds the id, or changes its key. O(log count). */
 void fct_heap_set(fct_heap *heap, uint32_t id, uint64_t key);
-/* Nothing happens to an id that is not in the heap. O(log count). */
+/* Removes the id if it is in the heap. O(log count). */
 void fct_heap_remove(fct_heap *heap, uint32_t id);
-/* Takes out and returns the least; FCT_NONE from an empty heap. O(log count). */
+/* Removes the least id and returns it. Returns FCT_NONE if the heap is empty. O(log count). */
 uint32_t fct_heap_pop(fct_heap *heap);
 
 #endif

@@ -1,13 +1,14 @@
-/* base/parallel.c: work shared between the calling thread and helpers, threads that the process keeps.
+/* base/parallel.c: the calling thread and helpers (threads that the process keeps) share the chunks of a job.
  *
- * The caller works through the chunks itself. Free helpers are offered the job and join in when the system
- * lets them run; when no chunk is left, the caller takes the offer back from those that have not begun. So it
- * waits for chunks that others work on, and never for a thread that is not let run.
+ * The caller offers the job to free helpers and works on chunks itself. When no chunk is left, it withdraws
+ * the offer from helpers that have not begun, so it never waits for a thread that does not run.
  *
- * A helper's state is one word: FREE or ASLEEP -> job (the caller offers) -> FREE (and takes back), or
- * job | AT_WORK (the helper begins) -> job | AT_WORK | AWAITED (the caller sleeps) -> FREE (the helper has
- * left the job). Any number of callers share the helpers, each starting what it misses. A child of fork() has
- * none.
+ *     FREE, ASLEEP --offer--> job --withdraw--> FREE             the state of a helper, one word
+ *                              |
+ *                              +--begin--> job | AT_WORK --end--> FREE
+ *                                              +--caller sleeps--> job | AT_WORK | AWAITED --end--> FREE
+ *
+ * All callers share the helpers and start missing ones. A child of fork() has none.
  */
 #include "base/parallel.h"
 
@@ -17,9 +18,8 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
-/* Who waits looks SPINS times, half a millisecond or so, and after KEEP of them, 20 to 50 microseconds, lets
- * others have the processor in between. To wake a sleeper takes 50 to 100 microseconds on a virtual machine.
- */
+/* A waiter polls SPINS times (about 0.5 ms), then sleeps. After KEEP polls (20 to 50 us) it also yields
+ * between polls. Waking a sleeper takes 50 to 100 us on a virtual machine. */
 enum { MOST_HELPERS = 255, KEEP = 1000, SPINS = 10000 };
 
 /* States, beside the address of a job, which is a multiple of 64. */
@@ -29,23 +29,23 @@ typedef struct job {
     size_t count, grain, chunk_count;
     fct_chunk_body *body;
     void *user;
-    _Alignas(64) atomic_size_t next; /* the first chunk that nobody has */
-    _Atomic uint32_t threads;        /* that have begun */
+    _Alignas(64) atomic_size_t next; /* the first chunk that no thread has taken */
+    _Atomic uint32_t threads;        /* threads that have begun */
 } job;
 
 typedef struct helper {
     _Alignas(64) _Atomic uintptr_t state;
     pthread_t thread;
-    pthread_mutex_t mutex; /* with `changed`: for those who sleep until the state changes */
+    pthread_mutex_t mutex; /* with `changed`: to sleep until the state changes */
     pthread_cond_t changed;
 } helper;
 
 static helper helpers[MOST_HELPERS];
 static _Atomic uint32_t helper_count;
-static pthread_mutex_t starting = PTHREAD_MUTEX_INITIALIZER; /* who adds helpers */
-static bool closed = true;                                   /* no more are to be added */
+static pthread_mutex_t starting = PTHREAD_MUTEX_INITIALIZER; /* held while helpers are added */
+static bool closed = true;                                   /* no helpers may be added */
 
-/* Works on the next chunk; false if there is none. */
+/* Works on the next chunk. Returns false if there is none. */
 static bool do_chunk(job *j, uint32_t thread) {
     size_t chunk = atomic_fetch_add_explicit(&j->next, 1, memory_order_relaxed);
     if (chunk >= j->chunk_count) return false;
@@ -55,7 +55,7 @@ static bool do_chunk(job *j, uint32_t thread) {
     return true;
 }
 
-static void notify(helper *h) {
+static void wake_helper(helper *h) {
     pthread_mutex_lock(&h->mutex);
     pthread_mutex_unlock(&h->mutex);
     pthread_cond_broadcast(&h->changed);
@@ -68,7 +68,7 @@ static void sleep_while(helper *h, uintptr_t state) {
     pthread_mutex_unlock(&h->mutex);
 }
 
-/* The first other state that is seen, or `state` if it lasts. */
+/* Returns the first other state, or `state` if it stays. */
 static uintptr_t spin_while(const helper *h, uintptr_t state) {
     for (int i = 0; i < SPINS; ++i) {
 #if defined(__x86_64__)
@@ -81,7 +81,7 @@ static uintptr_t spin_while(const helper *h, uintptr_t state) {
     return state;
 }
 
-static void *help(void *argument) {
+static void *run_helper(void *argument) {
     helper *h = argument;
     for (;;) {
         uintptr_t state = spin_while(h, FREE);
@@ -90,40 +90,40 @@ static void *help(void *argument) {
             if (atomic_compare_exchange_strong(&h->state, &state, ASLEEP)) sleep_while(h, ASLEEP);
             continue;
         }
-        if (!atomic_compare_exchange_strong(&h->state, &state, state | AT_WORK)) continue; /* taken back */
+        if (!atomic_compare_exchange_strong(&h->state, &state, state | AT_WORK)) continue; /* withdrawn */
         job *j = (job *)state;
         uint32_t thread = atomic_fetch_add_explicit(&j->threads, 1, memory_order_relaxed);
         while (do_chunk(j, thread)) {
         }
-        if (atomic_exchange(&h->state, FREE) & AWAITED) notify(h);
+        if (atomic_exchange(&h->state, FREE) & AWAITED) wake_helper(h);
     }
 }
 
-/* Offers a job, or LEAVING, to a helper; false if it is not free. */
-static bool offer(helper *h, uintptr_t what) {
+/* Gives a helper a job, or LEAVING. Returns false if the helper is not free. */
+static bool offer_job(helper *h, uintptr_t what) {
     uintptr_t state = atomic_load_explicit(&h->state, memory_order_relaxed);
     while (state == FREE || state == ASLEEP)
         if (atomic_compare_exchange_weak(&h->state, &state, what)) {
-            if (state == ASLEEP) notify(h);
+            if (state == ASLEEP) wake_helper(h);
             return true;
         }
     return false;
 }
 
-/* Signals are the business of the program's own threads, all but those that a thread's own instructions raise
- * and a profiler's. */
+/* Helpers block all signals except those that their own instructions raise and a profiler's, because signals
+ * belong to the threads of the program. */
 static bool start_thread(helper *h) {
     sigset_t blocked, before;
     sigfillset(&blocked);
     const int open[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGPROF};
     for (size_t i = 0; i < sizeof open / sizeof *open; ++i) sigdelset(&blocked, open[i]);
     if (pthread_sigmask(SIG_SETMASK, &blocked, &before)) return false;
-    bool started = pthread_create(&h->thread, NULL, help, h) == 0;
+    bool started = pthread_create(&h->thread, NULL, run_helper, h) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     return started;
 }
 
-/* Starts one more helper on a job. Where the system refuses, fewer work. */
+/* Starts one more helper with a job. If the system refuses, fewer threads work. */
 static bool add_helper(uintptr_t what, uint8_t *number) {
     pthread_mutex_lock(&starting);
     uint32_t i = atomic_load_explicit(&helper_count, memory_order_relaxed);
@@ -143,19 +143,19 @@ static bool add_helper(uintptr_t what, uint8_t *number) {
     return added;
 }
 
-/* Offers the job to as many helpers as are of use, and returns to how many. */
+/* Offers the job to at most one helper per chunk. Returns the number of helpers that took it. */
 static uint32_t call_helpers(const fct_env *env, job *j, uint8_t *called) {
     uint32_t wanted = fct_env_threads(env) - 1, count = 0;
     if (j->chunk_count <= wanted) wanted = (uint32_t)j->chunk_count - 1;
     uint32_t all = atomic_load_explicit(&helper_count, memory_order_acquire);
     for (uint32_t i = 0; i < all && count < wanted; ++i)
-        if (offer(helpers + i, (uintptr_t)j)) called[count++] = (uint8_t)i;
+        if (offer_job(helpers + i, (uintptr_t)j)) called[count++] = (uint8_t)i;
     while (count < wanted && add_helper((uintptr_t)j, called + count)) ++count;
     return count;
 }
 
-/* Takes the job back, or waits until the helper is done with it. */
-static void dismiss(helper *h, const job *j) {
+/* Withdraws the job, or waits until the helper has left it. */
+static void dismiss_helper(helper *h, const job *j) {
     uintptr_t state = (uintptr_t)j, busy = state | AT_WORK;
     if (atomic_compare_exchange_strong(&h->state, &state, FREE) || state != busy) return;
     if (spin_while(h, busy) != busy) return;
@@ -163,7 +163,7 @@ static void dismiss(helper *h, const job *j) {
 }
 
 static void dismiss_all(const uint8_t *called, uint32_t count, const job *j) {
-    for (uint32_t i = 0; i < count; ++i) dismiss(helpers + called[i], j);
+    for (uint32_t i = 0; i < count; ++i) dismiss_helper(helpers + called[i], j);
 }
 
 static void lock_pool(void) {
@@ -183,14 +183,14 @@ __attribute__((constructor)) static void open_pool(void) {
     closed = pthread_atfork(lock_pool, unlock_pool, unlock_child) != 0;
 }
 
-/* At the process's end, or when the library is unloaded. Who is at work for another thread may stay. */
+/* Runs when the process ends or the library is unloaded. A helper that works for another thread stays. */
 __attribute__((destructor)) static void close_pool(void) {
     pthread_mutex_lock(&starting);
     closed = true;
     pthread_mutex_unlock(&starting);
     uint32_t all = atomic_load_explicit(&helper_count, memory_order_acquire);
     bool leaving[MOST_HELPERS];
-    for (uint32_t i = 0; i < all; ++i) leaving[i] = offer(helpers + i, LEAVING);
+    for (uint32_t i = 0; i < all; ++i) leaving[i] = offer_job(helpers + i, LEAVING);
     for (uint32_t i = 0; i < all; ++i)
         if (leaving[i]) pthread_join(helpers[i].thread, NULL);
 }
@@ -214,7 +214,7 @@ void fct_parallel_for(const fct_env *env, size_t count, size_t grain, fct_chunk_
     dismiss_all(called, called_count, &j);
 }
 
-/* Every hundredth is told, whoever has come to it: several at once where the caller was long in a chunk. */
+/* Reports every hundredth of the chunks. After a long chunk of the caller, several reports follow at once. */
 fct_result fct_parallel_for_progress(const fct_env *env, const char *phase, size_t count, size_t grain,
                                      fct_chunk_body *body, void *user) {
     if (count == 0) return fct_progress(env, phase, 1);

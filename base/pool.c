@@ -1,5 +1,5 @@
-/* base/pool.c: see pool.h. First fit; the size of a part stands in the 64 bytes before it. Should a release
- * leave more gaps than there are places for, the smallest is forgotten until the pool is. */
+/* base/pool.c: see pool.h. An allocation takes the first gap that is large enough. The 64 bytes before it
+ * store its size. If a release makes more gaps than the list can hold, the smallest gap stays unused. */
 #include "base/pool.h"
 
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 
 enum { HEADER = 64 };
 
-static void *take(fct_pool *pool, uint32_t gap, size_t bytes) {
+static void *take_gap(fct_pool *pool, uint32_t gap, size_t bytes) {
     unsigned char *part = pool->block + pool->begins[gap];
     memcpy(part, &bytes, sizeof bytes);
     pool->begins[gap] += bytes;
@@ -23,11 +23,11 @@ static void *pool_allocate(void *user, size_t size) {
     fct_pool *pool = user;
     size_t bytes = ((size + 63) & ~(size_t)63) + HEADER;
     for (uint32_t i = 0; i < pool->gap_count; ++i)
-        if (pool->ends[i] - pool->begins[i] >= bytes) return take(pool, i, bytes);
+        if (pool->ends[i] - pool->begins[i] >= bytes) return take_gap(pool, i, bytes);
     return fct_allocate(pool->beneath, size, 1);
 }
 
-static void forget_smallest(fct_pool *pool) {
+static void drop_smallest_gap(fct_pool *pool) {
     uint32_t smallest = 0;
     for (uint32_t i = 1; i < pool->gap_count; ++i)
         if (pool->ends[i] - pool->begins[i] < pool->ends[smallest] - pool->begins[smallest]) smallest = i;
@@ -36,8 +36,8 @@ static void forget_smallest(fct_pool *pool) {
         pool->begins[i] = pool->begins[i + 1], pool->ends[i] = pool->ends[i + 1];
 }
 
-static void give_back(fct_pool *pool, size_t begin, size_t end) {
-    if (pool->gap_count == FCT_POOL_GAPS) forget_smallest(pool);
+static void add_gap(fct_pool *pool, size_t begin, size_t end) {
+    if (pool->gap_count == FCT_POOL_GAPS) drop_smallest_gap(pool);
     uint32_t at = pool->gap_count;
     for (; at > 0 && pool->begins[at - 1] > begin; --at)
         pool->begins[at] = pool->begins[at - 1], pool->ends[at] = pool->ends[at - 1];
@@ -62,7 +62,7 @@ static void pool_release(void *user, void *memory) {
     }
     size_t bytes, begin = (size_t)(part - pool->block) - HEADER;
     memcpy(&bytes, part - HEADER, sizeof bytes);
-    give_back(pool, begin, begin + bytes);
+    add_gap(pool, begin, begin + bytes);
 }
 
 void fct_pool_create(const fct_env *beneath, void *block, size_t size, fct_pool *out) {

@@ -1,6 +1,5 @@
-/* base/pool.h: an environment whose memory comes out of one block as long as there is room, and from the
- * environment beneath it after that. A computation that comes before a large array can so use the array's
- * memory. */
+/* base/pool.h: an environment that allocates from one block, and from another environment once the block is
+ * full. A computation can so use the memory of a large array that is filled later. */
 #ifndef FCT_BASE_POOL_H
 #define FCT_BASE_POOL_H
 
@@ -9,7 +8,7 @@
 enum { FCT_POOL_GAPS = 64 };
 
 typedef struct fct_pool {
-    fct_env env; /* the environment to use; all but memory is that of `beneath` */
+    fct_env env; /* the environment to use; like `beneath` except for memory */
     const fct_env *beneath;
     unsigned char *block;
     size_t size;
@@ -17,8 +16,8 @@ typedef struct fct_pool {
     size_t begins[FCT_POOL_GAPS], ends[FCT_POOL_GAPS]; /* free parts of the block, ascending */
 } fct_pool;
 
-/* The block, aligned to 64, stays the caller's and must outlive what is taken from it. The pool must not be
- * moved. */
+/* The block is aligned to 64, belongs to the caller, and must outlive all allocations from it. Do not move
+ * the pool, because its environment points to it. */
 void fct_pool_create(const fct_env *beneath, void *block, size_t size, fct_pool *out);
 
 #endif

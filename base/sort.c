@@ -1,6 +1,9 @@
-/* base/sort.c: see sort.h. Least significant byte first. Each pass counts the byte's values per chunk, turns
- * the counts into places in (value, chunk) order, and moves the pairs; chunks are fixed, so that the result
- * does not depend on threads. Bytes that are the same in all keys take no pass.
+/* base/sort.c: see sort.h. A radix sort from the least significant byte on. One pass per byte:
+ *   1. Count the values of the byte per chunk.
+ *   2. Turn the counts into places, in (value, chunk) order.
+ *   3. Move each pair to its place.
+ * The chunks do not depend on the threads, so neither does the result. A byte that is equal in all keys needs
+ * no pass.
  */
 #include "base/sort.h"
 
@@ -9,7 +12,8 @@
 #include "base/parallel.h"
 #include "base/sift.h"
 
-enum { DIGITS = 256, GRAIN = 1 << 16, SMALL = 48 };
+enum { DIGITS = 256, GRAIN = 1 << 16 };
+enum { SMALL = 48 }; /* at most so many pairs are sorted by insertion */
 
 typedef struct pass {
     const uint64_t *keys;
@@ -17,7 +21,7 @@ typedef struct pass {
     uint64_t *keys_out;
     uint32_t *values_out;
     uint32_t (*places)[DIGITS]; /* per chunk: counts, then places */
-    uint64_t *differing;        /* per chunk: bits in which its keys differ from the first key */
+    uint64_t *differing;        /* per chunk: the bits in which a key differs from the first key */
     unsigned shift;
 } pass;
 
@@ -72,8 +76,9 @@ static void counts_to_places(pass *p, size_t chunks) {
         }
 }
 
-/* By the bits from `low` on; values may be NULL. */
-static fct_result sort(const fct_env *env, uint64_t *keys, uint32_t *values, unsigned low, size_t count) {
+/* Sorts by the bits from `low` on. values may be NULL. */
+static fct_result sort_by_bits(const fct_env *env, uint64_t *keys, uint32_t *values, unsigned low,
+                               size_t count) {
     if (count <= SMALL) {
         sort_small(keys, values, low, count);
         return FCT_OK;
@@ -149,9 +154,9 @@ void fct_sort_in_place(uint64_t *keys, uint32_t *values, size_t count) {
 }
 
 fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count) {
-    return sort(env, keys, values, 0, count);
+    return sort_by_bits(env, keys, values, 0, count);
 }
 
 fct_result fct_sort_items(const fct_env *env, uint64_t *items, size_t count) {
-    return sort(env, items, NULL, 32, count);
+    return sort_by_bits(env, items, NULL, 32, count);
 }

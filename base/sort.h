@@ -4,11 +4,12 @@
 
 #include "base/env.h"
 
-/* Sorts count pairs by ascending key, equal keys in the order given; the same for every thread count.
- * O(count) for each byte in which the keys differ. Takes 12 bytes a pair while it runs. Errors: MEMORY. */
+/* Sorts count pairs by ascending key. Pairs with equal keys keep their order. O(count) per byte in which the
+ * keys differ. Allocates 12 bytes per pair. Errors: MEMORY. */
 fct_result fct_sort_pairs(const fct_env *env, uint64_t *keys, uint32_t *values, size_t count);
 
-/* Sorts items by their upper 32 bits, equal ones in the order given. As fct_sort_pairs, 8 bytes an item. */
+/* Sorts items by their upper 32 bits. Items with equal upper bits keep their order. Allocates 8 bytes per
+ * item. Errors: MEMORY. */
 fct_result fct_sort_items(const fct_env *env, uint64_t *items, size_t count);
 
 /* Sorts count pairs by (key, value) in place, without memory and on the calling thread. O(count log count).

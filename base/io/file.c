@@ -1,4 +1,4 @@
-/* base/io/file.c: see file.h. With output.c the only file that opens files. */
+/* base/io/file.c: see file.h. */
 #define _GNU_SOURCE
 #include "base/io/file.h"
 #include "base/io/output.h"
@@ -74,8 +74,8 @@ void fct_file_close(const fct_env *env, fct_file *file) {
     *file = (fct_file){0};
 }
 
-/* Flushes `stream` after produce and tells what became of it all. */
-static fct_result finish(const fct_env *env, const char *path, FILE *stream, fct_result result) {
+/* Flushes the stream after produce. Returns the first error of both. */
+static fct_result flush_stream(const fct_env *env, const char *path, FILE *stream, fct_result result) {
     if (result != FCT_OK) return result;
     errno = 0;
     if (fflush(stream) || ferror(stream)) return fct_output_fail(env, path, errno);
@@ -86,14 +86,14 @@ static fct_result write_directly(const fct_env *env, const char *path,
                                  fct_result (*produce)(void *user, FILE *stream), void *user) {
     FILE *stream = fopen(path, "wbe");
     if (!stream) return fct_output_fail(env, path, errno);
-    fct_result result = finish(env, path, stream, produce(user, stream));
+    fct_result result = flush_stream(env, path, stream, produce(user, stream));
     if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
     return result;
 }
 
 fct_result fct_file_write_atomic(const fct_env *env, const char *path,
                                  fct_result (*produce)(void *user, FILE *stream), void *user) {
-    if (!strcmp(path, "-")) return finish(env, "standard output", stdout, produce(user, stdout));
+    if (!strcmp(path, "-")) return flush_stream(env, "standard output", stdout, produce(user, stdout));
     struct stat status;
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
         return write_directly(env, path, produce, user);
@@ -109,7 +109,7 @@ fct_result fct_file_write_atomic(const fct_env *env, const char *path,
         return result;
     }
     setvbuf(stream, NULL, _IOFBF, 1 << 18);
-    result = finish(env, path, stream, produce(user, stream));
+    result = flush_stream(env, path, stream, produce(user, stream));
     if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
     if (result == FCT_OK) return fct_output_finish(&output);
     fct_output_abandon(&output);

@@ -1,6 +1,4 @@
-/* base/io/output.c: see output.h and, for whole files, file.h. The only file that writes files of the
- * library.
- */
+/* base/io/output.c: see output.h. */
 #define _GNU_SOURCE
 #include "base/io/output.h"
 
@@ -12,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* The disk is set to work whenever so much has been written, instead of at the end. */
+/* Bytes between requests to write to the disk, so that the disk works before the end. */
 #define PORTION ((uint64_t)64 << 20)
 
 fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
@@ -20,8 +18,8 @@ fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
                     error ? strerror(error) : "the stream failed");
 }
 
-/* Creates a new file beside `target` and writes its name into `temporary`. The process id and a count make
- * the name; O_EXCL makes it ours. */
+/* Creates a new file beside `target` and stores its name in `temporary`. The name has the process id and a
+ * count. O_EXCL fails if another process has created it. */
 static int create_beside(const char *target, char *temporary, size_t size) {
     for (int i = 0; i < 1000; ++i) {
         if ((size_t)snprintf(temporary, size, "%s.%ld-%d.tmp", target, (long)getpid(), i) >= size) {
@@ -34,7 +32,7 @@ static int create_beside(const char *target, char *temporary, size_t size) {
     return -1;
 }
 
-/* A file without a name, for what ends in a pipe or a device. */
+/* A nameless file, for a target that is a pipe or a device. */
 static int create_spool(void) {
     const char *folder = getenv("TMPDIR");
     char name[PATH_MAX];
@@ -48,8 +46,8 @@ static int create_spool(void) {
     return descriptor;
 }
 
-/* A rename is on the disk only when its folder is. Folders that cannot be synchronised (some network file
- * systems) are left alone. */
+/* A rename is on the disk only when the folder is. Some network file systems cannot synchronise folders, so
+ * failures are ignored. */
 static void synchronise_folder(const char *target) {
     char folder[PATH_MAX];
     snprintf(folder, sizeof folder, "%s", target);
@@ -64,8 +62,8 @@ static void synchronise_folder(const char *target) {
     close(descriptor);
 }
 
-/* Opens what `path` will be: a file beside it, or a spool. */
-static fct_result create(const fct_env *env, const char *path, fct_output *out) {
+/* Opens a file beside `path`, or a nameless one. */
+static fct_result create_output(const fct_env *env, const char *path, fct_output *out) {
     struct stat status;
     bool standard = !strcmp(path, "-"), exists = !standard && stat(path, &status) == 0;
     *out = (fct_output){.env = env, .descriptor = -1};
@@ -86,9 +84,9 @@ static fct_result create(const fct_env *env, const char *path, fct_output *out) 
 }
 
 fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, fct_output *out) {
-    fct_result result = create(env, path, out);
+    fct_result result = create_output(env, path, out);
     if (result != FCT_OK) return result;
-    /* Some file systems cannot reserve; they tell of a full disk when it is full. */
+    /* Some file systems cannot reserve space, and report a full disk only while writing. */
     if (size && fallocate(out->descriptor, 0, 0, (off_t)size) && (errno == ENOSPC || errno == EFBIG))
         result = fct_output_fail(env, path, errno);
     else if (ftruncate(out->descriptor, (off_t)size))
@@ -123,7 +121,7 @@ fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data
     return FCT_OK;
 }
 
-/* Copies the spool to a stream, a device or a pipe. */
+/* Copies the nameless file to standard output, a device or a pipe. */
 static fct_result copy_spool(fct_output *output) {
     bool standard = !strcmp(output->path, "-");
     FILE *to = standard ? stdout : fopen(output->path, "wbe");

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* One call moves at most this much: the kernel's own limit is just below 2 GB. */
+/* The most bytes of one read or write. The limit of the kernel is just below 2 GB. */
 enum { MOST = 1 << 30 };
 
 static fct_result fail_spool(const fct_spool *spool, const char *what, int error) {
@@ -24,7 +24,7 @@ static void folder_of(const char *path, char *folder, size_t size) {
     snprintf(folder, size, "%.*s", length ? length : 1, length ? path : ".");
 }
 
-/* Without a name from the start where the file system can do that, else with one for an instant. */
+/* Some file systems cannot create a nameless file. The file then has a name until unlink. */
 static int open_nameless(const char *folder) {
     int descriptor = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
     if (descriptor >= 0) return descriptor;

@@ -1,18 +1,17 @@
 /* base/math/eigen.c: symmetric 3x3 eigenproblem, eight at a time.
  *
- * The matrix is scaled to entries of at most 1 and its trace removed, so that near multiples of the identity
- * keep their digits. The eigenvalue that stands apart from the other two is the cubic's largest root, which
- * Newton's method finds in two steps, and its vector comes from the two most independent rows; the other
- * two are the exact answer of the 2x2 problem in the plane across that vector, which is sound for equal
- * values as well. Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961, for the cubic. No function
- * of the C library but the square root, so that the result is the same everywhere. Diagonal matrices go their
- * own way.
+ *   1. Scale the matrix to entries of at most 1 and subtract a third of its trace.
+ *   2. Find the eigenvalue farthest from the other two, the largest root of a cubic, with two Newton steps.
+ *   3. Take its vector from the two most independent rows.
+ *   4. Solve the 2x2 problem in the plane across that vector. This is exact for equal eigenvalues too.
+ * Diagonal matrices are treated apart. The only library function is the square root, so every machine gives
+ * the same bits. The cubic: Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961.
  */
 #include "base/math/eigen.h"
 
 #include "base/math/simd_d8.h"
 
-/* Eight vectors. */
+/* Eight vectors, one per lane. */
 typedef struct w3 {
     d8 x, y, z;
 } w3;
@@ -50,7 +49,8 @@ static inline d8 largest_entry(const d8 m[6]) {
     return most;
 }
 
-/* The unit vector that b - value I sends closest to zero, where value is a simple eigenvalue. */
+/* The unit eigenvector of the simple eigenvalue `value`: across the two most independent rows of b - value I.
+ */
 static inline w3 null_vector(const d8 b[6], d8 value) {
     w3 r0 = {d8_sub(b[0], value), b[1], b[2]}, r1 = {b[1], d8_sub(b[3], value), b[4]};
     w3 r2 = {b[2], b[4], d8_sub(b[5], value)};
@@ -75,12 +75,12 @@ static inline d8 largest_root(d8 r) {
     return c;
 }
 
-/* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]; of 0 where both are next to nothing.
- */
+/* Cosine and sine of half the angle of (x, y), which lies in (-pi, pi]. If x and y are below 2^-1000, the
+ * angle is 0. */
 static inline void half_angle(d8 x, d8 y, d8 *c, d8 *s) {
     d8 none = d8_set(0), one = d8_set(1), half = d8_set(0.5), largest = d8_max(d8_abs(x), d8_abs(y));
     d8 least = d8_set(0x1p-1000), known = d8_if_lt(least, largest, one, none);
-    d8 invert = d8_div(one, d8_max(largest, least)); /* for squares of tiny numbers have no digits */
+    d8 invert = d8_div(one, d8_max(largest, least)); /* because squares of tiny numbers lose their digits */
     x = d8_mul(x, invert), y = d8_mul(y, invert);
     d8 h = d8_div(one, d8_sqrt(mad(d8_mul(x, x), y, y)));
     d8 cosine = d8_mul(x, h), sine = d8_mul(y, h);
@@ -99,20 +99,20 @@ static inline void frame(w3 w, w3 *u, w3 *v) {
     *v = (w3){c, mad(sign, d8_mul(w.y, w.y), a), d8_mul(minus, w.y)};
 }
 
-/* Divides by the largest entry, which is returned. */
+/* Divides m by its largest entry and returns that entry. */
 static inline d8 normalize(d8 m[6]) {
     d8 largest = largest_entry(m), tiny = d8_set(0x1p-1000), one = d8_set(1);
-    d8 boost = d8_if_lt(largest, tiny, d8_set(0x1p500), one); /* for 1 / tiny is not a number with digits */
+    d8 boost = d8_if_lt(largest, tiny, d8_set(0x1p500), one); /* because 1 / tiny overflows */
     d8 invert = d8_div(one, d8_mul(largest, boost));
     for (int i = 0; i < 6; ++i) m[i] = d8_mul(d8_mul(m[i], boost), invert);
     return largest;
 }
 
-/* No lane diagonal. a: the matrix, scaled to entries of at most 1. By ascending eigenvalue. */
+/* Unit eigenvectors by ascending eigenvalue. No lane of a is diagonal, and its entries are at most 1. */
 static inline void solve(const d8 a[6], w3 vectors[3]) {
     d8 one = d8_set(1), b[6], third = d8_mul(d8_add(d8_add(a[0], a[3]), a[5]), d8_set(1.0 / 3));
     for (int i = 0; i < 6; ++i) b[i] = i == 0 || i == 3 || i == 5 ? d8_sub(a[i], third) : a[i];
-    normalize(b); /* the traceless part may be far below 1 */
+    normalize(b); /* the rest may be far below 1 */
     d8 diagonal = mad(mad(d8_mul(b[0], b[0]), b[3], b[3]), b[5], b[5]);
     d8 others = mad(mad(d8_mul(b[1], b[1]), b[2], b[2]), b[4], b[4]);
     d8 p = d8_sqrt(d8_mul(mad(diagonal, d8_set(2), others), d8_set(1.0 / 6))), reciprocal = d8_div(one, p);
@@ -125,14 +125,14 @@ static inline void solve(const d8 a[6], w3 vectors[3]) {
     frame(w, &u, &v);
     d8 uu = form(a, u, u), uv = form(a, u, v), vv = form(a, v, v), c, s;
     half_angle(d8_sub(uu, vv), d8_add(uv, uv), &c, &s);
-    /* of the two, the one with the greater value, turned so that both orders are right-handed */
+    /* the vector of the greater eigenvalue of the plane; its sign makes both frames right-handed */
     w3 greater = w3_scale(w3_mix(u, c, v, s), d8_set(-1)), lesser = w3_mix(v, c, u, d8_mul(s, d8_set(-1)));
     vectors[0] = w3_if_lt(r, none, w, lesser);
     vectors[1] = w3_if_lt(r, none, lesser, greater);
     vectors[2] = w3_if_lt(r, none, greater, w);
 }
 
-/* Sorted, for rounding may turn the order of two that are equal but for it. */
+/* Rounding may swap nearly equal eigenvalues, so the function sorts them. */
 static inline void find_values(const d8 a[6], d8 scale, const w3 vectors[3], d8 values[3]) {
     d8 f[3];
     for (int i = 0; i < 3; ++i) f[i] = d8_mul(scale, form(a, vectors[i], vectors[i]));
@@ -140,7 +140,7 @@ static inline void find_values(const d8 a[6], d8 scale, const w3 vectors[3], d8 
     values[0] = d8_min(low, rest), values[1] = d8_max(low, rest), values[2] = d8_max(high, f[2]);
 }
 
-/* Coordinate axes, by value and then by number. */
+/* Coordinate axes, ordered by (entry, axis). */
 static void solve_diagonal(const double entries[3], double values[3], v3 vectors[3]) {
     const v3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     int places[3] = {0, 1, 2};

@@ -1,4 +1,4 @@
-/* base/math/vec.h: 3-vectors in double (v3) and float arrays, symmetric 3x3 matrices as xx xy xz yy yz zz. */
+/* base/math/vec.h: vectors of three doubles (v3), and symmetric 3x3 matrices stored as xx xy xz yy yz zz. */
 #ifndef FCT_BASE_VEC_H
 #define FCT_BASE_VEC_H
 

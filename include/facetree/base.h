@@ -1,9 +1,7 @@
-/* facetree/base.h: what every part of the library shares: results, the environment a call runs in, the absent
- * id.
+/* facetree/base.h: results, the environment of a call, and the absent id.
  *
- * Every function that can fail returns an fct_result, leaves *out NULL (or untouched where it is a value) on
- * failure and hands one line of text to the environment's message hook. The library never prints, exits or
- * aborts.
+ * A function that can fail returns an fct_result. On failure it sets *out to NULL (or leaves it unchanged if
+ * it is a value) and passes one line of text to the message hook. The library never prints, exits or aborts.
  */
 #ifndef FACETREE_BASE_H
 #define FACETREE_BASE_H
@@ -22,17 +20,17 @@
 extern "C" {
 #endif
 
-/* The one absent id: no face, no node, no vertex. */
+/* The absent id of a face, node or vertex. */
 #define FCT_NONE UINT32_MAX
 
 typedef enum fct_result {
     FCT_OK = 0,
-    FCT_ERROR_DATA,      /* the input's content is wrong: malformed, out of range, not finite */
+    FCT_ERROR_DATA,      /* the input is malformed, out of range, or not finite */
     FCT_ERROR_INPUT,     /* a file is missing or cannot be read */
-    FCT_ERROR_OUTPUT,    /* a file cannot be written; an older one is left as it was */
-    FCT_ERROR_MEMORY,    /* the environment's allocator returned NULL, or a size does not fit */
+    FCT_ERROR_OUTPUT,    /* a file cannot be written; an older file stays unchanged */
+    FCT_ERROR_MEMORY,    /* the allocator returned NULL, or a size overflows */
     FCT_ERROR_CANCELLED, /* the progress hook returned false */
-    FCT_ERROR_INTERNAL   /* a wrapped library failed in a way that should not happen */
+    FCT_ERROR_INTERNAL   /* another library failed unexpectedly */
 } fct_result;
 
 /* A constant English phrase, never NULL. */
@@ -40,30 +38,32 @@ FCT_API const char *fct_result_text(fct_result result);
 
 typedef enum fct_severity { FCT_MESSAGE_ERROR, FCT_MESSAGE_WARNING, FCT_MESSAGE_NOTE } fct_severity;
 
-/* Where a call runs. Fill it with fct_env_default and change what you need; it must outlive every object made
- * with it, for objects keep a pointer to it. All hooks may be NULL, which means the default. */
+/* The environment of calls. Get it from fct_env_default and change what you need. It must outlive every
+ * object created with it, because objects keep a pointer to it. A hook that is NULL means the default. */
 typedef struct fct_env {
     uint32_t size;         /* sizeof(fct_env), set by fct_env_default */
     uint32_t thread_count; /* 0: one per processor */
 
-    /* Returns at least `size` bytes aligned to 64, or NULL. Called from one thread at a time for each object
-     * being built, but possibly from several user threads at once. Default: aligned_alloc and free. */
+    /* Returns at least `size` bytes aligned to 64, or NULL. Each call of the library uses the hook in the
+     * calling thread only, but your threads may call the library at the same time. Default: aligned_alloc and
+     * free. */
     void *(*allocate)(void *user, size_t size);
     void (*release)(void *user, void *memory);
     void *memory_user;
 
-    /* `done` is in [0, 1] for the named phase; false cancels. Called from the calling thread only. */
+    /* done in [0, 1] is the progress of the phase. Return false to cancel. Runs in the calling thread only.
+     */
     bool (*progress)(void *user, const char *phase, double done);
     void *progress_user;
 
-    /* One line without a line end. Called from the calling thread only. */
+    /* text is one line without a line end. Runs in the calling thread only. */
     void (*message)(void *user, fct_severity severity, const char *text);
     void *message_user;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);
 
-/* "major.minor.patch" of the library that is linked. */
+/* "major.minor.patch" of the linked library. */
 FCT_API const char *fct_version(void);
 
 /* The SIMD variant in use: "baseline" or "avx2". The library chooses it when it is loaded: AVX2 if the
@@ -74,7 +74,7 @@ FCT_API const char *fct_simd_variant(void);
  * support; the library then uses the best variant that the processor supports. */
 FCT_API fct_result fct_simd_check(const fct_env *env);
 
-/* An axis-aligned box; empty when lower > upper in any coordinate. */
+/* An axis-aligned box. It is empty if lower > upper in any coordinate. */
 typedef struct fct_bounds {
     float lower[3], upper[3];
 } fct_bounds;

@@ -132,6 +132,13 @@ static void diagonal_gives_axes(void **state) {
     fct_eigen3(flat, values, vectors);
     assert_true(values[0] == 0 && values[1] == 3 && values[2] == 3);
     assert_true(vectors[0].y == 1 && vectors[1].x == 1 && fabs(vectors[2].z) == 1);
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            if (i != k) {
+                double diagonal[3] = {2, 2, 2};
+                diagonal[i] = 1, diagonal[k] = 3;
+                check((const double[6]){diagonal[0], 0, 0, diagonal[1], 0, diagonal[2]}, 1e-15);
+            }
 }
 
 /* Whatever stands in the other lanes. */
