@@ -1,5 +1,5 @@
-/* dual/dual.c: the dual graph as pairs of neighbouring faces in (a, b) order: the upper half of the lists,
- * each sorted. */
+/* dual/dual.c: the dual graph as pairs of neighbouring faces, sorted by (a, b). The pairs are the entries of
+ * the lists whose neighbour has the greater id. */
 #include "facetree/dual.h"
 
 #include "base/parallel.h"
@@ -10,7 +10,7 @@ enum { GRAIN = 1 << 14 };
 typedef struct writer {
     const fct_lists *lists;
     fct_dual *dual;
-    uint32_t *places; /* per chunk: edges, then the first one's place */
+    uint32_t *places; /* per chunk: number of edges, then the place of its first edge */
 } writer;
 
 static void count_edges(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {

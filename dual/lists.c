@@ -1,12 +1,12 @@
-/* dual/lists.c: neighbours of every face, by a counting sort of sides and no hash table.
+/* dual/lists.c: the neighbours of every face, by a counting sort of sides.
  *
- * In: triangles. Out: lists. Sides are put into a bucket of their lower vertex, whatever order threads get
- * there. In a bucket of few sides each is compared with all others at once: where it meets just one, the two
- * faces note each other, each in the place of its side. A larger bucket, or one in which three faces meet or
- * a face folds onto itself, is sorted by (higher vertex, side), which brings the faces of a mesh edge
- * together in order of face id; where they are not two they become connections of their own, sorted by face.
- * Lists are then finished face by face, in place unless the face has connections. O(F), and O(v log v) for a
- * vertex of valence v.
+ *   1. Put each side into the bucket of its lower vertex, in any order.
+ *   2. In a bucket of at most FEW sides, compare each side with all others at once. If exactly two sides of
+ *      different faces match, each stores the face of the other.
+ *   3. Sort any other bucket by (higher vertex, side). The faces of a mesh edge are then adjacent, by face
+ * id. Edges with other than two plain sides become connections, sorted by face.
+ *   4. Finish the list of each face, in place unless the face has connections.
+ * O(F), plus O(v log v) per vertex of valence v.
  */
 #include "dual/lists.h"
 
@@ -22,7 +22,7 @@
 enum { GRAIN = 1 << 13, SEVERAL = 0x80000000u };
 enum { FEW = 16 }; /* sides in a bucket that is matched without sorting */
 
-/* One direction of a connection on an edge that is not two plain sides. */
+/* A neighbour across a mesh edge that has other than two plain sides. */
 typedef struct connection {
     uint32_t from, to;
     float length;
@@ -31,17 +31,17 @@ typedef struct connection {
 typedef struct builder {
     const fct_mesh *mesh;
     double scale;
-    bool alone;               /* one thread: counters need no lock */
-    _Atomic uint32_t *begins; /* per vertex, and one more: sides, then where its bucket begins */
+    bool alone;               /* one thread: counters need no atomic additions */
+    _Atomic uint32_t *begins; /* vertex_count + 1: sides per vertex, then the begin of its bucket */
     uint64_t *sides; /* higher vertex << 32 | 4 face + number, in buckets of the lower vertex; FEW more */
-    uint32_t *boundary, *nonmanifold, *places; /* per chunk of vertices; places: of connections */
+    uint32_t *boundary, *nonmanifold, *places; /* per chunk of vertices; places: first connection */
     uint32_t connection_count;
-    connection *connections, *sorted; /* sorted: by (from, to), in the order found */
+    connection *connections, *sorted; /* sorted: by (from, to) */
     fct_lists *lists; /* neighbors: per side its rank in the bucket, then the face across; FCT_NONE: none;
                          SEVERAL: see connections */
 } builder;
 
-/* Counts a side at its lower vertex; its rank there. */
+/* Counts a side at its lower vertex. Returns its rank in the bucket. */
 static inline uint32_t count_side(_Atomic uint32_t *counters, uint32_t u, uint32_t v, bool alone) {
     _Atomic uint32_t *counter = &counters[u < v ? u : v];
     if (u == v) return 0;
@@ -76,7 +76,7 @@ static inline size_t bucket_begin(const builder *b, size_t vertex) {
     return atomic_load_explicit(&b->begins[vertex], memory_order_relaxed);
 }
 
-/* A side from a vertex to itself meets none. */
+/* A side from a vertex to itself has no neighbour. */
 static inline void place_side(const builder *b, uint64_t *sides, uint32_t u, uint32_t v, uint32_t code,
                               uint32_t *rank) {
     if (u == v)
@@ -126,12 +126,12 @@ static inline uint32_t face_of(uint64_t side) {
     return (uint32_t)side >> 2;
 }
 
-/* Where the face across a side is noted. */
+/* The entry of the face across a side. */
 static inline uint32_t *across(const builder *b, uint64_t side) {
     return &b->lists->neighbors[(uint32_t)side - face_of(side)];
 }
 
-/* One past the sides of one mesh edge, and of one face on it. */
+/* The end of the sides of one mesh edge, and of one face on it. */
 static size_t group_end(const uint64_t *sides, size_t i, size_t end) {
     size_t last = i + 1;
     while (last < end && sides[last] >> 32 == sides[i] >> 32) ++last;
@@ -147,7 +147,8 @@ typedef struct tally {
     uint32_t boundary, nonmanifold, connections;
 } tally;
 
-/* A bucket of at most FEW sides, with `half` of half as many; false where faces do not meet in pairs. */
+/* Matches a bucket of at most FEW sides (FEW / 2 if `half`). Returns false if some faces do not meet in
+ * pairs. */
 static inline bool match_few(const builder *b, const uint64_t *bucket, uint32_t count, bool half, tally *t) {
     i8 low = i8_load_upper(bucket), high = half ? low : i8_load_upper(bucket + 8);
     uint32_t all = (1u << count) - 1, boundary = 0, several = 0;
@@ -194,7 +195,7 @@ static void match_sides(void *user, size_t begin, size_t end, size_t chunk, uint
         size_t count = bucket_begin(b, v + 1) - bucket_begin(b, v);
         uint64_t copy[FEW + 1] = {0};
         const uint64_t *few = bucket;
-        /* what is read behind the bucket must not be another chunk's, which may be sorting it */
+        /* match_few reads FEW sides; those of another chunk may be changing */
         if (count <= FEW && last - bucket <= FEW) few = memcpy(copy, bucket, count * sizeof *copy);
         bool done = count <= FEW / 2 ? match_few(b, few, (uint32_t)count, true, &t)
                     : count <= FEW   ? match_few(b, few, (uint32_t)count, false, &t)
@@ -210,8 +211,9 @@ static double side_length(const builder *b, size_t from, uint64_t side) {
     return v3_norm(v3_sub(q, p)) * b->scale;
 }
 
-/* A chain along one mesh edge: each face and the next share it; a face in the middle gives half to either. */
-static uint32_t connect(const builder *b, size_t vertex, size_t from, size_t end, uint32_t place) {
+/* Connects the faces of one mesh edge in a chain. A face inside the chain gives half of its sides to either
+ * neighbour. The shared length is the smaller share of the two faces. */
+static uint32_t connect_faces(const builder *b, size_t vertex, size_t from, size_t end, uint32_t place) {
     double length = side_length(b, vertex, b->sides[from]);
     for (size_t i = from, middle = run_end(b->sides, i, end); middle < end;) {
         size_t to = run_end(b->sides, middle, end);
@@ -234,7 +236,7 @@ static void find_connections(void *user, size_t begin, size_t end, size_t chunk,
     for (size_t v = begin; v < end; ++v)
         for (size_t from = bucket_begin(b, v), last = bucket_begin(b, v + 1), to; from < last; from = to) {
             to = group_end(b->sides, from, last);
-            if (*across(b, b->sides[from]) == SEVERAL) place = connect(b, v, from, to, place);
+            if (*across(b, b->sides[from]) == SEVERAL) place = connect_faces(b, v, from, to, place);
         }
 }
 
@@ -292,7 +294,7 @@ static fct_result sort_sides(const fct_env *env, builder *b) {
     return sort_connections(env, b);
 }
 
-/* The first sorted connection of a face that is not below `face`. */
+/* The first sorted connection of a face >= `face`. */
 static uint32_t first_connection(const builder *b, size_t face) {
     uint32_t low = 0, high = b->connection_count;
     while (low < high) {
@@ -310,8 +312,8 @@ typedef struct neighbor {
     float length;
 } neighbor;
 
-/* Puts a neighbour into a list in order, or adds to the one that is there. */
-static uint32_t insert(neighbor *list, uint32_t count, uint32_t face, float length) {
+/* Inserts a neighbour in order, or adds its length to the same neighbour. Returns the new count. */
+static uint32_t insert_neighbor(neighbor *list, uint32_t count, uint32_t face, float length) {
     uint32_t i = count;
     while (i > 0 && list[i - 1].face > face) --i;
     if (i > 0 && list[i - 1].face == face) {
@@ -323,17 +325,18 @@ static uint32_t insert(neighbor *list, uint32_t count, uint32_t face, float leng
     return count + 1;
 }
 
-/* The list of a face that has a border, the same neighbour twice or connections, of which those from number
- * `at` on are its own: behind all others if it has any. Returns one past its connections. */
+/* Writes the list of a face that has a boundary edge, one neighbour twice, or connections. Its connections
+ * begin at number `at`. With connections, its list stands behind the lists of all plain faces. Returns the
+ * first connection of later faces. */
 static uint32_t write_list(const builder *b, size_t f, uint32_t at, const float lengths[3]) {
     fct_lists *lists = b->lists;
     neighbor list[9];
     uint32_t count = 0, first = at, start = 3 * (uint32_t)f;
     for (uint32_t k = 0; k < 3; ++k)
         if (lists->neighbors[start + k] < SEVERAL)
-            count = insert(list, count, lists->neighbors[start + k], lengths[k]);
+            count = insert_neighbor(list, count, lists->neighbors[start + k], lengths[k]);
     for (; at < b->connection_count && b->sorted[at].from == f; ++at)
-        count = insert(list, count, b->sorted[at].to, b->sorted[at].length);
+        count = insert_neighbor(list, count, b->sorted[at].to, b->sorted[at].length);
     memset(lists->neighbors + start, 0, 3 * sizeof *lists->neighbors);
     if (at > first) {
         start = 3 * (lists->face_count + first);
@@ -345,7 +348,7 @@ static uint32_t write_list(const builder *b, size_t f, uint32_t at, const float 
     return at;
 }
 
-/* Lengths of the three sides of each of four faces. */
+/* Lengths of the three sides of four faces, one face per lane. */
 static inline void measure_sides(const builder *b, const uint32_t *triangles[4], float lengths[3][4],
                                  float perimeters[4]) {
     d4 corners[3][3], scale = d4_set(b->scale), sum = d4_set(0);
@@ -390,7 +393,7 @@ static void write_lists(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* The same neighbors with room for connections behind them. */
+/* Moves the neighbours to an array with room for connections. */
 static fct_result make_room(const fct_env *env, const builder *b, size_t room) {
     fct_lists *lists = b->lists;
     uint32_t *neighbors = fct_allocate(env, room + FCT_LISTS_SLACK, sizeof *neighbors);

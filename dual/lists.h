@@ -1,4 +1,4 @@
-/* dual/lists.h: the dual graph as one list of neighbours a face, in one flat array. */
+/* dual/lists.h: the dual graph as one list of neighbours per face, all in one array. */
 #ifndef FCT_DUAL_LISTS_H
 #define FCT_DUAL_LISTS_H
 
@@ -11,15 +11,15 @@ enum { FCT_LISTS_SLACK = 8 };
 typedef struct fct_lists {
     uint32_t face_count, entry_count;
     uint32_t *starts,
-        *counts;         /* face f has entries starts[f] to starts[f] + counts[f] - 1, no neighbour twice */
-    uint32_t *neighbors; /* entry_count, some of them unused, and FCT_LISTS_SLACK more that may be read */
-    float *lengths;      /* of the shared border */
-    float *perimeters;   /* as in fct_dual, and what follows too */
+        *counts; /* the entries of face f are [starts[f], starts[f] + counts[f]), each neighbour once */
+    uint32_t *neighbors; /* entry_count, some of them unused; FCT_LISTS_SLACK more may be read */
+    float *lengths;      /* entry_count, shared length */
+    float *perimeters;   /* this and the counts: as in fct_dual */
     uint32_t boundary_edges, nonmanifold_edges;
 } fct_lists;
 
-/* As fct_dual_build, each edge once at either end; lengths and perimeters times `scale`. Errors: MEMORY,
- * CANCELLED; then *out is all zero. */
+/* Builds the dual graph. Each edge is in the lists of both faces. Lengths and perimeters are multiplied by
+ * `scale`. Errors: MEMORY, CANCELLED. On failure *out is all zero. */
 #define fct_lists_build FCT_KERNEL(fct_lists_build)
 FCT_DECLARE_KERNEL(fct_result, fct_lists_build,
                    (const fct_env *env, const fct_mesh *mesh, double scale, fct_lists *out));
