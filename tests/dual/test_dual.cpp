@@ -18,6 +18,7 @@ extern "C" {
 
 #include <cmocka.h>
 
+#include "dual/lists.h"
 #include "facetree/dual.h"
 }
 
@@ -247,6 +248,30 @@ void random_soups(void **) {
     }
 }
 
+/* Lists hold each dual edge at both faces, in another unit of length. */
+void lists_scale_lengths(void **) {
+    fct_env env = fct_env_default();
+    Soup soup = torus(5, true);
+    fct_mesh mesh = soup.mesh();
+    fct_dual dual = build(soup);
+    fct_lists lists;
+    assert_int_equal(fct_lists_build(&env, &mesh, 2.5, &lists), FCT_OK);
+    std::map<std::pair<uint32_t, uint32_t>, double> found;
+    for (uint32_t f = 0; f < lists.face_count; ++f) {
+        assert_true(std::fabs((double)lists.perimeters[f] - 2.5 * (double)dual.perimeters[f]) < 1e-5);
+        for (uint32_t i = lists.starts[f]; i < lists.starts[f] + lists.counts[f]; ++i)
+            found[{f, lists.neighbors[i]}] = (double)lists.lengths[i];
+    }
+    assert_int_equal(found.size(), 2 * dual.edge_count);
+    for (uint32_t e = 0; e < dual.edge_count; ++e)
+        for (uint32_t k = 0; k < 2; ++k) {
+            double length = found[{dual.edges[2 * e + k], dual.edges[2 * e + 1 - k]}];
+            assert_true(std::fabs(length - 2.5 * (double)dual.lengths[e]) < 1e-5);
+        }
+    fct_lists_release(&env, &lists);
+    fct_dual_release(&env, &dual);
+}
+
 void *fail_nth(void *user, size_t size) {
     long *state = static_cast<long *>(user); /* counts down; alive */
     if (--state[0] == 0) return nullptr;
@@ -285,8 +310,9 @@ void survives_no_memory(void **) {
 } // namespace
 
 int main() {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(against_openmesh), cmocka_unit_test(pages_of_a_book),
-                                       cmocka_unit_test(odd_faces), cmocka_unit_test(random_soups),
-                                       cmocka_unit_test(survives_no_memory)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(against_openmesh),    cmocka_unit_test(pages_of_a_book),
+        cmocka_unit_test(odd_faces),           cmocka_unit_test(random_soups),
+        cmocka_unit_test(lists_scale_lengths), cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
