@@ -350,28 +350,21 @@ static fct_result run_pass(refit *r, uint32_t pass, size_t samples) {
 fct_result fct_simplify_refit(fct_simplifier *s) {
     refit r = {.s = s};
     size_t samples = (size_t)s->wedge_count + s->mesh->face_count;
-    r.corners = fct_allocate(s->env, s->wedge_count, sizeof *r.corners);
-    r.corner_weights = fct_allocate_zero(s->env, s->wedge_count, sizeof *r.corner_weights);
-    r.landings = fct_allocate(s->env, samples, sizeof *r.landings);
-    r.targets = fct_allocate(s->env, s->live_faces, sizeof *r.targets);
-    r.rings = fct_allocate(s->env, s->live_faces, 3 * sizeof *r.rings);
-    r.ring_ends = fct_allocate(s->env, s->point_count, sizeof *r.ring_ends);
-    r.systems = fct_allocate(s->env, s->point_count, sizeof *r.systems);
-    r.sums = fct_allocate(s->env, (size_t)s->wedge_count * s->channel_count, sizeof *r.sums);
-    r.weights = fct_allocate(s->env, s->channel_count ? s->wedge_count : 0, sizeof *r.weights);
-    void *arrays[] = {r.corners,   r.corner_weights, r.landings, r.targets, r.rings,
-                      r.ring_ends, r.systems,        r.sums,     r.weights};
-    fct_result result = FCT_OK;
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
-        if (!arrays[i]) result = FCT_ERROR_MEMORY;
-    if (result != FCT_OK)
-        fct_fail_memory(s->env, "the refit");
-    else {
-        prepare_samples(&r);
-        for (size_t i = 0; i < samples; ++i) r.landings[i] = (landing){.target = FCT_NONE};
-    }
+    const fct_array arrays[] = {FCT_ARRAY(r.corners, s->wedge_count),
+                                FCT_ARRAY_ZERO(r.corner_weights, s->wedge_count),
+                                FCT_ARRAY(r.landings, samples),
+                                FCT_ARRAY(r.targets, s->live_faces),
+                                FCT_ARRAY(r.rings, 3 * (size_t)s->live_faces),
+                                FCT_ARRAY(r.ring_ends, s->point_count),
+                                FCT_ARRAY(r.systems, s->point_count),
+                                FCT_ARRAY(r.sums, (size_t)s->wedge_count * s->channel_count),
+                                FCT_ARRAY(r.weights, s->channel_count ? s->wedge_count : 0)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the refit");
+    if (result != FCT_OK) return result;
+    prepare_samples(&r);
+    for (size_t i = 0; i < samples; ++i) r.landings[i] = (landing){.target = FCT_NONE};
     for (uint32_t pass = 0; pass < s->def->refit_passes && result == FCT_OK; ++pass)
         result = run_pass(&r, pass, samples);
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
+    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
     return result;
 }

@@ -105,15 +105,12 @@ static fct_result make_points(fct_simplifier *s) {
     if (result != FCT_OK) return result;
 
     uint32_t count = s->point_count;
-    s->positions = fct_allocate(s->env, count, 3 * sizeof *s->positions);
-    s->sources = fct_allocate(s->env, count, sizeof *s->sources);
-    s->point_parents = fct_allocate(s->env, count, sizeof *s->point_parents);
-    s->first_corners = fct_allocate(s->env, count, sizeof *s->first_corners);
-    s->last_corners = fct_allocate(s->env, count, sizeof *s->last_corners);
-    s->valences = fct_allocate_zero(s->env, count, sizeof *s->valences);
-    if (!s->positions || !s->sources || !s->point_parents || !s->first_corners || !s->last_corners ||
-        !s->valences)
-        return fct_fail_memory(s->env, "the points of a mesh");
+    const fct_array arrays[] = {
+        FCT_ARRAY(s->positions, 3 * (size_t)count), FCT_ARRAY(s->sources, count),
+        FCT_ARRAY(s->point_parents, count),         FCT_ARRAY(s->first_corners, count),
+        FCT_ARRAY(s->last_corners, count),          FCT_ARRAY_ZERO(s->valences, count)};
+    result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the points of a mesh");
+    if (result != FCT_OK) return result;
     find_frame(s);
     /* Downwards, so that the lowest vertex of a point is its source. */
     for (uint32_t v = mesh->vertex_count; v-- > 0;) {
@@ -133,11 +130,10 @@ static fct_result make_points(fct_simplifier *s) {
  * point are removed for good. */
 static fct_result make_rings(fct_simplifier *s) {
     size_t corners = 3 * (size_t)s->mesh->face_count;
-    s->triangles = fct_allocate(s->env, corners, sizeof *s->triangles);
-    s->next_corners = fct_allocate(s->env, corners, sizeof *s->next_corners);
-    s->side_edges = fct_allocate(s->env, corners, sizeof *s->side_edges);
-    if (!s->triangles || !s->next_corners || !s->side_edges)
-        return fct_fail_memory(s->env, "the corners of a mesh");
+    const fct_array arrays[] = {FCT_ARRAY(s->triangles, corners), FCT_ARRAY(s->next_corners, corners),
+                                FCT_ARRAY(s->side_edges, corners)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the corners of a mesh");
+    if (result != FCT_OK) return result;
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
         const uint32_t *in = s->mesh->triangles + 3 * (size_t)f;
         uint32_t *out = s->triangles + 3 * (size_t)f;
@@ -185,17 +181,12 @@ static fct_result make_wedges(fct_simplifier *s) {
         for (size_t c = 0; c < corners; ++c) s->corner_wedges[c] = class_of[mesh->triangles[c]];
     if (result != FCT_OK) goto done;
 
-    s->first_wedges = fct_allocate(s->env, s->point_count, sizeof *s->first_wedges);
-    s->wedge_parents = fct_allocate(s->env, s->wedge_count, sizeof *s->wedge_parents);
-    s->next_wedges = fct_allocate(s->env, s->wedge_count, sizeof *s->next_wedges);
-    s->wedge_uses = fct_allocate_zero(s->env, s->wedge_count, sizeof *s->wedge_uses);
-    s->wedge_classes = fct_allocate_zero(s->env, s->wedge_count, sizeof *s->wedge_classes);
-    s->class_parents = fct_allocate(s->env, s->class_count, sizeof *s->class_parents);
-    if (!s->first_wedges || !s->wedge_parents || !s->next_wedges || !s->wedge_uses || !s->wedge_classes ||
-        !s->class_parents) {
-        result = fct_fail_memory(s->env, "wedges");
-        goto done;
-    }
+    const fct_array arrays[] = {
+        FCT_ARRAY(s->first_wedges, s->point_count),       FCT_ARRAY(s->wedge_parents, s->wedge_count),
+        FCT_ARRAY(s->next_wedges, s->wedge_count),        FCT_ARRAY_ZERO(s->wedge_uses, s->wedge_count),
+        FCT_ARRAY_ZERO(s->wedge_classes, s->wedge_count), FCT_ARRAY(s->class_parents, s->class_count)};
+    result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "wedges");
+    if (result != FCT_OK) goto done;
     memset(s->first_wedges, 0xff, s->point_count * sizeof *s->first_wedges);
     for (uint32_t w = 0; w < s->wedge_count; ++w) s->wedge_parents[w] = w;
     for (uint32_t k = 0; k < s->class_count; ++k) s->class_parents[k] = k;
@@ -253,17 +244,13 @@ static void add_side(fct_simplifier *s, edge_builder *b, uint32_t a, uint32_t ot
 static fct_result make_edges(fct_simplifier *s) {
     size_t corners = 3 * (size_t)s->live_faces; /* an upper bound of the edge count */
     edge_builder b = {0};
-    b.marks = fct_allocate(s->env, s->point_count, sizeof *b.marks);
-    b.slots = fct_allocate(s->env, s->point_count, sizeof *b.slots);
-    b.apexes = fct_allocate(s->env, corners, sizeof *b.apexes);
-    b.faces = fct_allocate(s->env, corners, sizeof *b.faces);
-    s->edges = fct_allocate(s->env, corners, sizeof *s->edges);
-    s->edge_flags = fct_allocate_zero(s->env, corners, sizeof *s->edge_flags);
-    fct_result result = FCT_OK;
-    if (!b.marks || !b.slots || !b.apexes || !b.faces || !s->edges || !s->edge_flags) {
-        result = fct_fail_memory(s->env, "the edges of a mesh");
-        goto done;
-    }
+    const fct_array scratch[] = {FCT_ARRAY(b.marks, s->point_count), FCT_ARRAY(b.slots, s->point_count),
+                                 FCT_ARRAY(b.apexes, corners), FCT_ARRAY(b.faces, corners)};
+    const fct_array arrays[] = {FCT_ARRAY(s->edges, corners), FCT_ARRAY_ZERO(s->edge_flags, corners)};
+    fct_result result = fct_allocate_all(s->env, scratch, FCT_LENGTH(scratch), "the edges of a mesh");
+    if (result == FCT_OK)
+        result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the edges of a mesh");
+    if (result != FCT_OK) goto done;
     memset(b.marks, 0xff, s->point_count * sizeof *b.marks);
     for (uint32_t a = 0; a < s->point_count; ++a)
         for (uint32_t c = s->first_corners[a]; c != FCT_NONE; c = s->next_corners[c]) {
@@ -273,10 +260,7 @@ static fct_result make_edges(fct_simplifier *s) {
             if (z > a) add_side(s, &b, a, z, previous);
         }
 done:
-    fct_release(s->env, b.marks);
-    fct_release(s->env, b.slots);
-    fct_release(s->env, b.apexes);
-    fct_release(s->env, b.faces);
+    fct_release_all(s->env, scratch, FCT_LENGTH(scratch));
     return result;
 }
 
