@@ -187,20 +187,23 @@ static void linear_fields_are_reproduced(void **state) {
     fct_anchors_release(&plain, &t);
 }
 
-/* Two anchors: x = |p - p'| / reach + .7 |n - n'|, weights (1 / x - .98 / max x)^2. */
+/* Three anchors: x = |p - p'| / reach + .7 |n - n'|, weights (1 / x - .98 / max x)^2. */
 static void weights_fall_with_distance_and_turn(void **state) {
     (void)state;
-    const v3 up = {0, 0, 1}, turned = v3_unit(v3_make(.4, 0, 1));
-    fct_anchors t = make_anchors(2);
+    const v3 up = {0, 0, 1}, turned = v3_unit(v3_make(.4, 0, 1)), p = {.45, 0, 0};
+    fct_anchors t = make_anchors(3);
     for (int k = 0; k < 3; ++k) {
         set_anchor(&t.items[0], v3_make(0, 0, 0), up, k == 1 ? .5 : 1, 1);
         set_anchor(&t.items[1], v3_make(1, 0, 0), k == 2 ? turned : up, 1, 2);
+        set_anchor(&t.items[2], v3_make(.45, 2, 0), up, 1, 4);
         fct_anchors_order(&t);
-        double d1 = .45, x1 = d1 / (k == 1 ? .5 : 1), x2 = .55;
-        if (k == 2) x2 += .7 * v3_norm(v3_sub(turned, up));
-        double most = fmax(x1, x2), w1 = pow(1 / x1 - .98 / most, 2), w2 = pow(1 / x2 - .98 / most, 2);
-        double e = blend(&t, NULL, v3_make(d1, 0, 0), up, false, NULL);
-        assert_near(e, (w1 + 2 * w2) / (w1 + w2), 2e-3);
+        double x[3] = {.45 / (k == 1 ? .5 : 1), .55, 2}, sum = 0, weights = 0;
+        if (k == 2) x[1] += .7 * v3_norm(v3_sub(turned, up));
+        for (int i = 0; i < 3; ++i) {
+            double w = pow(1 / x[i] - .98 / 2, 2);
+            sum += w * (1 << i), weights += w;
+        }
+        assert_near(blend(&t, NULL, p, up, false, NULL), sum / weights, 2e-3);
     }
     fct_anchors_release(&plain, &t);
 }

@@ -59,6 +59,8 @@ static void rims_are_pulled_inwards(void **state) {
      */
     double edge = ((1 + sqrt(2)) + sqrt(2)) / 3;
     assert_near(at.offset, 2e-4 * edge + 8 * 0x1p-23 * 100, 1e-8);
+    at = fct_corner_foothold(&mesh, corners, 1, n, false);
+    assert_near(at.offset, 2e-4 * .5 * (1 + sqrt(2)) + 8 * 0x1p-23 * 100, 1e-8);
     at = fct_corner_foothold(&mesh, corners, 3, n, false);
     assert_same(at.sample, v3_make(100, 0, 0), 1e-9);
     assert_int_equal(at.face, 1); /* the widest angle */

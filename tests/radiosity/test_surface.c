@@ -341,6 +341,51 @@ static void refinement(void **state) {
     fct_mesh_release(&plain, &cube);
 }
 
+/* Two squares at an edge: below 40 degrees they share two vertices, above they do not. */
+static void creases_begin_at_forty_degrees(void **state) {
+    (void)state;
+    plain = fct_env_default();
+    for (int angle = 38; angle <= 42; angle += 4) {
+        double a = angle * FCT_PI / 180;
+        fct_mesh mesh;
+        assert_int_equal(fct_mesh_create(&plain, 6, 4, 0, &mesh), FCT_OK);
+        for (uint32_t v = 0; v < 6; ++v) {
+            v3 p = v < 2   ? v3_make(-1, v % 2, 0)
+                   : v < 4 ? v3_make(0, v % 2, 0)
+                           : v3_make(cos(a), v % 2, sin(a));
+            v3_store(mesh.positions + 3 * (size_t)v, p);
+        }
+        static const uint32_t faces[12] = {0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5};
+        memcpy(mesh.triangles, faces, sizeof faces);
+        fct_scene *scene = one_mesh(&mesh, NULL);
+        fct_surface s = build(scene, 0, 10);
+        assert_int_equal(s.mesh.vertex_count, angle < 40 ? 6 : 8);
+        assert_sound(scene, 0, &s);
+        fct_surface_release(&plain, &s);
+        fct_scene_destroy(scene);
+        fct_mesh_release(&plain, &mesh);
+    }
+}
+
+/* Edges 0-1 and 1-2 of a triangle are split: the shorter diagonal of the quadrilateral is from 0 to the
+ * midpoint of 1-2 (2.06 against 2.24), or the other one in a mirrored triangle. */
+static void splits_use_the_shorter_diagonal(void **state) {
+    (void)state;
+    plain = fct_env_default();
+    static const float tall[9] = {0, 0, 0, 4, 0, 0, 0, 1, 0}, wide[9] = {0, 1, 0, 4, 0, 0, 0, 0, 0};
+    static const uint32_t triangle[3] = {0, 1, 2};
+    const uint8_t marks = 3;
+    for (int k = 0; k < 2; ++k) {
+        fct_split split;
+        assert_int_equal(fct_split_edges(&plain, 3, k ? wide : tall, 1, triangle, &marks, &split), FCT_OK);
+        assert_int_equal(split.face_count, 3);
+        int parts_at_0 = 0;
+        for (int c = 0; c < 9; ++c) parts_at_0 += split.triangles[c] == 0;
+        assert_int_equal(parts_at_0, k ? 1 : 2);
+        fct_split_release(&plain, &split);
+    }
+}
+
 static void threads_do_not_matter(void **state) {
     (void)state;
     plain = fct_env_default();
@@ -411,6 +456,8 @@ int main(void) {
         cmocka_unit_test(finer_near_contacts),
         cmocka_unit_test(odd_meshes),
         cmocka_unit_test(refinement),
+        cmocka_unit_test(creases_begin_at_forty_degrees),
+        cmocka_unit_test(splits_use_the_shorter_diagonal),
         cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(fronts_are_found),
         cmocka_unit_test(memory_runs_out),
