@@ -1,4 +1,5 @@
-/* mesh/color.h: sRGB bytes and linear light (IEC 61966-2-1). Byte -> linear -> byte is the identity. */
+/* mesh/color.h: sRGB and linear light (IEC 61966-2-1). Converting a byte to linear and back returns the byte.
+ */
 #ifndef FCT_MESH_COLOR_H
 #define FCT_MESH_COLOR_H
 
@@ -13,7 +14,7 @@ static inline float fct_linear_from_srgb(double s) {
     return (float)(x * x * (root * root)); /* x^2.4 */
 }
 
-/* Clamps to [0, 1] first. */
+/* The nearest sRGB byte of a linear value, which is clamped to [0, 1]. */
 static inline uint8_t fct_srgb_byte(double linear) {
     double x = linear < 0 ? 0 : linear < 1 ? linear : 1;
     if (x <= .0031308) return (uint8_t)(255 * 12.92 * x + .5);

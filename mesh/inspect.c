@@ -1,10 +1,9 @@
-/* mesh/inspect.c: counts what a mesh holds.
+/* mesh/inspect.c: counts the elements and the defects of a mesh.
  *
- * Sides of faces are sorted by their vertex pair, so that the faces about an edge lie next to each other;
- * unions over faces, corners and boundary vertices give components, fans and loops. A side from a vertex to
- * itself (degenerate face) is no edge; an edge counts how many different faces have it. Cost: three radix
- * sorts of 3F keys and unions that are linear in practice. The same counts for every thread count, as they
- * are integers; the area is summed in face order.
+ * The sides of all faces are sorted by vertex pair, so the faces of an edge are adjacent. Disjoint sets of
+ * faces, corners and boundary vertices give components, fans and loops. A side from a vertex to itself is no
+ * edge. A face with two sides on an edge counts once there. Cost: three radix sorts of 3F keys. The area is
+ * summed in face order, so it does not depend on the threads.
  */
 #include <math.h>
 
@@ -44,8 +43,8 @@ typedef struct unions {
     unsigned char *on_boundary; /* V */
 } unions;
 
-/* Counts the edge whose sides are values[begin .. end) and joins what it joins. */
-static void look_at_edge(const sides *s, size_t begin, size_t end, unions *u, fct_mesh_report *report) {
+/* Counts the edge of the sides values[begin, end), and joins its faces, corners and boundary vertices. */
+static void count_edge(const sides *s, size_t begin, size_t end, unions *u, fct_mesh_report *report) {
     const uint32_t *t = s->mesh->triangles;
     uint32_t first = s->values[begin], faces = 1, before = first / 3, same_direction = 0;
     for (size_t i = begin + 1; i < end; ++i) {
@@ -74,14 +73,14 @@ static void count_edges(const sides *s, unions *u, fct_mesh_report *report) {
     for (size_t begin = 0, end; begin < count; begin = end) {
         uint64_t key = s->keys[begin];
         for (end = begin + 1; end < count && s->keys[end] == key;) ++end;
-        if ((uint32_t)key != (uint32_t)(key >> 32)) look_at_edge(s, begin, end, u, report);
+        if ((uint32_t)key != (uint32_t)(key >> 32)) count_edge(s, begin, end, u, report);
     }
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) report->components += u->faces[f] == f;
     for (uint32_t v = 0; v < s->mesh->vertex_count; ++v)
         report->boundary_loops += u->on_boundary[v] && fct_sets_find(u->loops, v) == v;
 }
 
-/* A vertex is manifold when all corners at it have been joined into one. `seen` is V of scratch. */
+/* A vertex is manifold if all its corners are in one set. seen: scratch, vertex_count. */
 static void count_vertices(const fct_mesh *mesh, unions *u, uint32_t *seen, fct_mesh_report *report) {
     enum { MANY = FCT_NONE - 1 };
     for (uint32_t v = 0; v < mesh->vertex_count; ++v) seen[v] = FCT_NONE;
@@ -102,8 +101,8 @@ static void count_vertices(const fct_mesh *mesh, unions *u, uint32_t *seen, fct_
     }
 }
 
-/* Sorts the faces by their three vertices in ascending order: by the largest first, then, keeping that order,
- * by the other two. */
+/* Sorts the faces by their vertices in ascending order: first by the largest vertex, then, stably, by the
+ * other two. Equal faces are then adjacent. */
 static fct_result count_duplicates(const fct_env *env, sides *s, fct_mesh_report *report) {
     const fct_mesh *mesh = s->mesh;
     size_t count = mesh->face_count;

@@ -1,4 +1,4 @@
-/* mesh/load.c: the reader for a file's ending. */
+/* mesh/load.c: selects the reader by the ending of the file name. */
 #include "mesh/load.h"
 
 #include <string.h>

@@ -63,7 +63,7 @@ static unsigned arrays_of(const fct_mesh *mesh) {
            (mesh->materials ? FCT_MESH_MATERIALS : 0u) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0u);
 }
 
-/* Copies the material names into out, which owns what is there when it fails. */
+/* Copies the material names. On failure out owns the names copied so far. */
 static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
     if (!mesh->material_names) {
         out->material_count = mesh->material_count;
@@ -101,7 +101,8 @@ fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out
     return result;
 }
 
-/* old vertex -> new vertex for the vertices of the listed faces, FCT_NONE for others; returns their count. */
+/* Numbers the vertices of the listed faces in ascending order, and sets others to FCT_NONE. Returns the
+ * count. */
 static uint32_t number_vertices(const fct_mesh *mesh, const uint32_t *faces, uint32_t count,
                                 uint32_t *numbers) {
     if (mesh->vertex_count) memset(numbers, 0xff, mesh->vertex_count * sizeof(uint32_t));
@@ -162,8 +163,8 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
     return result;
 }
 
-/* The first of `count` floats that is not finite, or count. Blocks are looked at as integers, which compilers
- * turn into vector code; only a block with a culprit is searched. */
+/* The first of `count` floats that is not finite, or count. Compares bits as integers per block, because
+ * compilers vectorise that, and searches only a block with such a float. */
 static size_t first_not_finite(const float *values, size_t count) {
     for (size_t begin = 0; begin < count; begin += 4096) {
         size_t end = begin + 4096 < count ? begin + 4096 : count;

@@ -1,4 +1,4 @@
-/* mesh/save.c: the writer for a file's ending, around which the file is replaced as a whole. */
+/* mesh/save.c: selects the writer by the ending of the file name, and replaces the file as a whole. */
 #define _GNU_SOURCE
 #include <locale.h>
 #include <string.h>
@@ -52,7 +52,7 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
                         "%s: unknown kind of file; .ply, .obj, .off, .stl, .om and .glb are known", path);
     fct_result result = fct_mesh_check(env, path, mesh);
     if (result != FCT_OK) return result;
-    /* printf writes a decimal comma where the program's locale has one. */
+    /* In some locales printf writes a decimal comma. */
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (!c) return fct_fail_memory(env, "a locale");
     locale_t before = uselocale(c);

@@ -38,7 +38,7 @@ static fct_result check_soup(const fct_env *env, const char *name, const fct_sou
     return FCT_OK;
 }
 
-/* Moves what belongs to vertices, and the material names. */
+/* Moves the arrays of vertices, and the material names. */
 static void move_shared(fct_soup *soup, fct_mesh *out) {
     out->vertex_count = soup->vertex_count;
     out->positions = soup->positions;

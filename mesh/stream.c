@@ -1,9 +1,8 @@
 /* mesh/stream.c: see stream.h.
  *
- * A PLY is read in place if its layout follows from its header and size alone: binary, records of vertices of
- * one size, and faces that are all triangles. Lists have at least three corners, so that where the file is as
- * long as if all had three, all have. Rows are read into a buffer and converted by the same code that reads
- * whole files.
+ * A PLY is read in place if its header and its size determine the layout: it is binary, vertex records have
+ * one size, and all faces are triangles. A face has at least three corners, so if the file has the size for
+ * three corners per face, each face has three. The code that reads whole files converts the rows.
  */
 #define _GNU_SOURCE
 #include "mesh/stream.h"
@@ -63,7 +62,7 @@ static fct_result read_bytes(const fct_stream *s, uint64_t offset, void *data, s
 
 /* --- Layout of a PLY --- */
 
-/* Size of the element's records and the offsets in them; 0 if they have no one size. */
+/* The size of a record, and the offsets in it. Returns 0 if the sizes of records differ. */
 static size_t record_size(const fct_ply_header *h, const fct_ply_element *element, size_t *offsets) {
     size_t size = 0;
     bool faces = fct_ply_kind_of(element) == FCT_PLY_FACES;
@@ -145,7 +144,7 @@ static fct_result open_tables(fct_stream *s, const fct_text *t) {
     return FCT_OK;
 }
 
-/* The text up to the end of the header; *end NULL: it has no end near enough. */
+/* Reads the text of the header. *end is NULL if the first part of the file has no end of a header. */
 static fct_result read_header(fct_stream *s, const char **end) {
     *end = NULL;
     for (size_t look = 4096; !*end && look <= HEADER_MOST; look *= 16) {
@@ -162,7 +161,7 @@ static fct_result read_header(fct_stream *s, const char **end) {
     return FCT_OK;
 }
 
-/* Opens a regular PLY file; *done tells whether it can be read in place. */
+/* Opens a regular PLY file. *done: it can be read in place. */
 static fct_result open_ply(fct_stream *s, bool *done) {
     struct stat status;
     const char *end;

@@ -1,8 +1,8 @@
 /* mesh/stream.h: a mesh file read range by range, for meshes that are larger than memory.
  *
- * Binary PLY files of triangles are read where they lie; any other file is loaded once and lies in a spool
- * from then on. Positions, triangles, colours of vertices and materials; other values are left out, as a
- * hierarchy file has no place for them. What is read is checked: indices, finite numbers.
+ * A binary PLY of triangles is read in place. Any other file is loaded once and copied to a temporary file.
+ * The stream has positions, triangles, vertex colours and materials, the arrays of a hierarchy file. Reading
+ * checks that indices are in range and floats are finite.
  */
 #ifndef FCT_MESH_STREAM_H
 #define FCT_MESH_STREAM_H
@@ -15,7 +15,7 @@ typedef struct fct_stream fct_stream;
 typedef struct fct_stream_info {
     uint32_t vertex_count, face_count;
     bool colors, materials;
-    uint32_t material_count;     /* of the names; without names the caller finds the greatest number */
+    uint32_t material_count;     /* of names; without names the caller takes the greatest number */
     char *const *material_names; /* or NULL */
 } fct_stream_info;
 

@@ -1,9 +1,8 @@
 /* mesh/triangulate.c: see triangulate.h.
  *
- * Input: one polygon, not necessarily flat or convex. Output: exactly count - 2 triangles that use its
- * corners and no other point, so that nothing is added and nothing lost; repeated corners give degenerate
- * triangles. The polygon is laid into the plane of its vector area (Newell) about its first corner, in
- * double. Cost: O(n) for convex polygons, O(n r) for r reflex corners.
+ * Input: one polygon of any shape. Output: exactly count - 2 triangles over its corners. Repeated corners
+ * give degenerate triangles. The corners are projected in double onto the plane of the polygon's vector area
+ * (Newell). Cost: O(n) for convex polygons, O(n r) for r reflex corners.
  */
 #include "mesh/triangulate.h"
 
@@ -15,8 +14,9 @@ static double turn(const double a[2], const double b[2], const double c[2]) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Lays the polygon into its plane, scaled to unit size; returns false when its vector area vanishes. */
-static int flatten(const float *positions, const uint32_t *corners, uint32_t count, double (*flat)[2]) {
+/* Projects the polygon onto its plane, scaled to unit size. Returns 0 if its vector area vanishes. */
+static int flatten_polygon(const float *positions, const uint32_t *corners, uint32_t count,
+                           double (*flat)[2]) {
     v3 origin = v3_load(positions + 3 * (size_t)corners[0]);
     double extent = 0;
     for (uint32_t i = 1; i < count; ++i) {
@@ -40,7 +40,7 @@ static int flatten(const float *positions, const uint32_t *corners, uint32_t cou
     return 1;
 }
 
-static uint32_t *fan(uint32_t apex, const uint32_t *next, uint32_t left, uint32_t *out) {
+static uint32_t *write_fan(uint32_t apex, const uint32_t *next, uint32_t left, uint32_t *out) {
     uint32_t i = next[apex];
     for (uint32_t k = 0; k + 2 < left; ++k) {
         *out++ = apex, *out++ = i, *out++ = next[i];
@@ -49,8 +49,8 @@ static uint32_t *fan(uint32_t apex, const uint32_t *next, uint32_t left, uint32_
     return out;
 }
 
-/* Whether no other reflex corner lies in the ear at i. Points that coincide with the ear's corners do not
- * count: bridges to holes repeat them. */
+/* Whether the corner is convex and no reflex corner lies in its triangle. Points equal to a corner of the
+ * triangle do not count, because bridges to holes repeat corners. */
 static int is_ear(const fct_polygon_scratch *s, uint32_t i, uint32_t left, uint64_t *budget) {
     uint32_t h = s->previous[i], j = s->next[i];
     const double *a = s->flat[h], *b = s->flat[i], *c = s->flat[j];
@@ -68,7 +68,7 @@ static int is_ear(const fct_polygon_scratch *s, uint32_t i, uint32_t left, uint6
     return 1;
 }
 
-static void mark(const fct_polygon_scratch *s, uint32_t i) {
+static void mark_reflex(const fct_polygon_scratch *s, uint32_t i) {
     s->reflex[i] = !(turn(s->flat[s->previous[i]], s->flat[i], s->flat[s->next[i]]) > 0);
 }
 
@@ -84,16 +84,16 @@ static void clip_ears(const fct_polygon_scratch *s, uint32_t count, uint64_t *bu
         uint32_t h = s->previous[i], j = s->next[i];
         *out++ = h, *out++ = i, *out++ = j;
         s->next[h] = j, s->previous[j] = h;
-        mark(s, h), mark(s, j);
+        mark_reflex(s, h), mark_reflex(s, j);
         --left;
         misses = 0;
-        i = s->next[j]; /* not at the cut itself: slivers would pile up about one corner */
+        i = s->next[j]; /* moves on, because slivers would otherwise collect at one corner */
     }
-    fan(i, s->next, left, out);
+    write_fan(i, s->next, left, out);
 }
 
-/* Whether the fan about corner 0 covers the polygon once: every triangle of it turns the same way and
- * together they span less than a full turn, which the sum of exterior turns of the ring confirms. */
+/* Whether the fan about corner 0 covers the polygon once: all its triangles turn the same way, and their
+ * angles at corner 0 sum to less than a full turn. */
 static int fan_is_right(const fct_polygon_scratch *s, uint32_t count) {
     double turned = 0;
     for (uint32_t i = 1; i + 1 < count; ++i) {
@@ -115,11 +115,11 @@ void fct_triangulate(const float *positions, const uint32_t *corners, uint32_t c
         s->next[i] = i + 1 < count ? i + 1 : 0;
         s->previous[i] = i ? i - 1 : count - 1;
     }
-    int flat = flatten(positions, corners, count, s->flat);
+    int flat = flatten_polygon(positions, corners, count, s->flat);
     if (!flat || fan_is_right(s, count)) {
-        fan(0, s->next, count, out);
+        write_fan(0, s->next, count, out);
         return;
     }
-    for (uint32_t i = 0; i < count; ++i) mark(s, i);
+    for (uint32_t i = 0; i < count; ++i) mark_reflex(s, i);
     clip_ears(s, count, budget, out);
 }

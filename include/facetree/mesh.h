@@ -1,8 +1,8 @@
 /* facetree/mesh.h: indexed triangle meshes: load, save, inspect.
  *
- * Ids are the input's: face f and vertex v keep their numbers through every later step. Polygons become
- * triangles in order; source_faces tells which polygon a triangle came from. Nothing is repaired: degenerate,
- * duplicate and non-manifold faces stay and are counted by fct_mesh_inspect.
+ * Face f and vertex v keep their numbers in every later step. Polygons become triangles in order, and
+ * source_faces gives the polygon of each triangle. Loading repairs nothing: degenerate, duplicate and
+ * non-manifold faces stay, and fct_mesh_inspect counts them.
  */
 #ifndef FACETREE_MESH_H
 #define FACETREE_MESH_H
@@ -13,26 +13,24 @@
 extern "C" {
 #endif
 
-/* Arrays of a mesh. Functions take `const fct_mesh *`, so a caller may point one at arrays of its own without
- * a copy; only a mesh that a facetree function filled (fct_mesh_create, fct_mesh_load, ...) goes to
- * fct_mesh_release. */
+/* The arrays of a mesh. Functions take `const fct_mesh *`, so a caller may point one at its own arrays. Call
+ * fct_mesh_release only for a mesh that a facetree function created. */
 typedef struct fct_mesh {
     uint32_t vertex_count;
     uint32_t face_count;
-    float *positions;    /* vertex_count x 3, finite */
-    uint32_t *triangles; /* face_count x 3, each < vertex_count */
-    float *colors;       /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
-    float *normals;      /* vertex_count x 3, or NULL */
-    float *texcoords;    /* face_count x 3 x 2, per corner, so that seams double no vertex, or NULL */
-    float *face_colors;  /* face_count x 3, linear, or NULL */
-    uint32_t *materials; /* face_count, index into material_names, or NULL */
-    uint32_t
-        *source_faces; /* face_count, polygon of the file each triangle came from, or NULL: the same number */
+    float *positions;       /* vertex_count x 3, finite */
+    uint32_t *triangles;    /* face_count x 3, each < vertex_count */
+    float *colors;          /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
+    float *normals;         /* vertex_count x 3, or NULL */
+    float *texcoords;       /* face_count x 3 x 2, per corner, so seams need no extra vertices, or NULL */
+    float *face_colors;     /* face_count x 3, linear, or NULL */
+    uint32_t *materials;    /* face_count, index into material_names, or NULL */
+    uint32_t *source_faces; /* face_count, polygon of each triangle, or NULL: the face number */
     uint32_t material_count;
     char **material_names; /* material_count strings, or NULL */
 } fct_mesh;
 
-/* Which optional arrays fct_mesh_create makes. */
+/* The optional arrays of fct_mesh_create. */
 enum {
     FCT_MESH_COLORS = 1,
     FCT_MESH_NORMALS = 2,
@@ -45,27 +43,27 @@ enum {
 /* Allocates the arrays (contents undefined). On failure *out is all zero. Errors: MEMORY. */
 FCT_API fct_result fct_mesh_create(const fct_env *env, uint32_t vertex_count, uint32_t face_count,
                                    unsigned arrays, fct_mesh *out);
-/* Frees every array and zeroes the struct; env must be the one the mesh was made with. */
+/* Releases all arrays and zeroes the struct. env is the environment that created the mesh. */
 FCT_API void fct_mesh_release(const fct_env *env, fct_mesh *mesh);
 /* A deep copy. Errors: MEMORY. */
 FCT_API fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out);
 
-/* The faces listed in `faces` (count of them, in that order) with the vertices they use, in order of vertex
- * id; all arrays come along. vertex_ids, if not NULL, receives an allocated array (out->vertex_count) of the
- * old vertex ids, to be freed by the caller through fct_memory_release. Errors: MEMORY. */
+/* Copies the `count` faces listed in `faces`, in that order, and their vertices in order of vertex id, with
+ * all arrays. vertex_ids, if not NULL, receives an array of the old vertex ids (out->vertex_count). The
+ * caller releases it with fct_memory_release. Errors: MEMORY. */
 FCT_API fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint32_t *faces,
                                     uint32_t count, fct_mesh *out, uint32_t **vertex_ids);
 FCT_API void fct_memory_release(const fct_env *env, void *memory);
 
-/* What a file or a mesh holds; counts of zero mean a clean closed manifold. */
+/* Counts of a mesh. All counts of defects are zero for a closed oriented manifold. */
 typedef struct fct_mesh_report {
-    uint32_t polygons;          /* faces before triangulation: runs of source_faces, the face count without */
-    uint32_t vertices, faces;   /* as in the mesh */
-    uint32_t edges;             /* distinct vertex pairs that are sides of a face */
-    uint32_t boundary_edges;    /* sides of exactly one face */
-    uint32_t boundary_loops;    /* connected sets of boundary edges */
-    uint32_t nonmanifold_edges; /* sides of three or more faces */
-    uint32_t misoriented_edges; /* shared by two faces that run along it in the same direction */
+    uint32_t polygons;              /* faces before triangulation */
+    uint32_t vertices, faces;       /* as in the mesh */
+    uint32_t edges;                 /* distinct vertex pairs that are sides of a face */
+    uint32_t boundary_edges;        /* sides of exactly one face */
+    uint32_t boundary_loops;        /* connected sets of boundary edges */
+    uint32_t nonmanifold_edges;     /* sides of three or more faces */
+    uint32_t misoriented_edges;     /* of two faces that use the edge in the same direction */
     uint32_t nonmanifold_vertices;  /* whose faces form more than one fan */
     uint32_t degenerate_faces;      /* repeated index or zero area */
     uint32_t duplicate_faces;       /* same three vertices as an earlier face, in any order */
@@ -76,25 +74,23 @@ typedef struct fct_mesh_report {
     double diagonal; /* of the bounds */
 } fct_mesh_report;
 
-/* Counts. O(F log F), parallel. Errors: MEMORY, CANCELLED. */
+/* Inspects the mesh. O(F), parallel. Errors: MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fct_mesh_report *report);
 
-/* Checks what the struct promises: indices in range, finite positions and attributes, F and V below 2^31 - 1,
- * a squared extent that a double can hold. Errors: DATA with the first offending element in the message. */
+/* Checks that indices are in range, positions and attributes are finite, and the counts are below 2^31 - 1.
+ * Errors: DATA. The message names the first wrong element. */
 FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
 
-/* Reads OBJ, PLY (ascii, both byte orders, tristrips), OFF, STL (corners with equal coordinates are one
- * vertex), OM and GLB (all meshes placed by their nodes; _RADIOSITY if there, else COLOR_0, as colours),
- * chosen by the name's ending. Byte colours are sRGB and become linear; float colours are taken as linear;
- * radiosity_r/g/b of a PLY win over both.
- * "-" reads a PLY from standard input. A mesh without faces is valid input here.
- * What a file has and a mesh has no place for (lines, groups, normals that differ by corner, ...) is told in
- * a message. docs/mesh.md says what is read of each format. Errors: INPUT, DATA (with file, line or element),
- * MEMORY, CANCELLED. */
+/* Reads OBJ, PLY (text, both byte orders, strips), OFF, STL (corners with equal coordinates become one
+ * vertex), OM and GLB (meshes placed by their nodes; colours from _RADIOSITY, else COLOR_0). The ending of
+ * the name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB and become
+ * linear. Float colours are linear. radiosity_r/g/b of a PLY replace its other colours. A mesh without faces
+ * is valid. Messages name the data that a mesh cannot store (lines, normals that differ by corner, ...).
+ * docs/mesh.md lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
 
-/* Counts of a file that can be clustered without being loaded (binary PLY of triangles): *known tells whether
- * it is one. Reads its header alone. Errors: INPUT, DATA, MEMORY. */
+/* The counts of a file that can be clustered without loading it (a binary PLY of triangles), from its header.
+ * *known is false for other files. Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bool *known,
                                         uint32_t *face_count, uint32_t *vertex_count);
 
@@ -106,12 +102,12 @@ typedef struct fct_mesh_save_def {
 } fct_mesh_save_def;
 FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
 
-/* Writes .ply (binary little endian; colours as sRGB bytes plus float radiosity_r/g/b), .obj, .off, .stl, .om
- * or .glb (unlit; COLOR_0 exposed, clamped, linear, plus float _RADIOSITY). Atomic: a temporary file beside
- * the target, fsync, rename. "-" writes a PLY to standard output. PLY keeps every array but source_faces, bit
- * for bit; arrays that another format has no place for are told in a note. GLB groups faces by material and
- * splits vertices where texture coordinates differ; OM keeps colours as bytes. def may be NULL. Errors:
- * OUTPUT, DATA (unknown ending, invalid mesh), MEMORY, CANCELLED. */
+/* Writes .ply (binary little endian; colours as sRGB bytes and float radiosity_r/g/b), .obj, .off, .stl, .om
+ * or .glb (unlit; COLOR_0 exposed, clamped and linear, and float _RADIOSITY). "-" writes a PLY to standard
+ * output. Replaces the target as a whole: temporary file, fsync, rename. PLY keeps every array except
+ * source_faces, bit for bit. A note names the arrays that the format cannot store. GLB groups faces by
+ * material and splits vertices whose texture coordinates differ. OM keeps colours as bytes. def may be NULL.
+ * Errors: OUTPUT, DATA (unknown ending, invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
                                  const fct_mesh_save_def *def);
 

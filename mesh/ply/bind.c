@@ -1,4 +1,4 @@
-/* mesh/ply/bind.c: see ply_read.h. */
+/* mesh/ply/bind.c: see bind.h. */
 #include "mesh/ply/bind.h"
 
 #include <string.h>
@@ -6,8 +6,8 @@
 #include "mesh/color.h"
 #include "mesh/ply/value.h"
 
-/* Groups of properties that are used when all of them are there; a later group with the same destination wins
- * over an earlier one. */
+/* Groups of properties. A group counts if the element has all its properties. A later group replaces an
+ * earlier one with the same destination. */
 typedef struct group {
     fct_ply_kind kind;
     const char *names[3];
@@ -46,7 +46,7 @@ static ptrdiff_t find_any(const fct_ply_property *properties, size_t count, bool
     return found != FCT_PLY_NOWHERE ? found : find_property(properties, count, list, b);
 }
 
-/* Appends the group's columns when they are all there. */
+/* Appends the columns of the group if the element has all of them. */
 static fct_result bind_group(const fct_env *env, const group *g, const fct_ply_property *properties,
                              const fct_ply_element *element, float **array, fct_ply_target *out) {
     ptrdiff_t found[3];
@@ -56,8 +56,7 @@ static fct_result bind_group(const fct_env *env, const group *g, const fct_ply_p
     }
     if (!*array) *array = fct_allocate(env, (size_t)element->count, g->width * sizeof(float));
     if (!*array) return fct_fail_memory(env, "a mesh");
-    if (g->destination == COLORS ||
-        g->destination == POLYGON_COLORS) { /* what was bound before is replaced */
+    if (g->destination == COLORS || g->destination == POLYGON_COLORS) { /* replaces the earlier group */
         while (out->column_count && out->columns[out->column_count - 1].color) --out->column_count;
     } else if (g->destination == TEXCOORDS) {
         while (out->column_count && out->columns[out->column_count - 1].stride == 2) --out->column_count;
@@ -113,8 +112,8 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
     return FCT_OK;
 }
 
-/* Integers from 0 to 255 (65535 for ushort) are sRGB, floats are linear. What is out of range becomes NaN,
- * which the check of the whole mesh reports with the element's number. */
+/* Integers from 0 to 255 (65535 for ushort) are sRGB, floats are linear. An integer out of range becomes NaN,
+ * and fct_mesh_check reports its element. */
 static float color_value(double value, fct_ply_type type) {
     if (type >= FCT_PLY_FLOAT) return (float)value;
     double top = type == FCT_PLY_UINT16 ? 65535 : 255;

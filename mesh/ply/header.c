@@ -1,4 +1,4 @@
-/* mesh/ply/header.c: see ply_header.h. */
+/* mesh/ply/header.c: see header.h. */
 #include "mesh/ply/header.h"
 
 #include <string.h>

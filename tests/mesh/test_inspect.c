@@ -168,7 +168,8 @@ static void agrees_with_brute_force(void **state) {
         assert_int_equal(p.components, q.components);
         env.thread_count = 1;
         fct_mesh_report single = inspect(&env, &m);
-        assert_memory_equal(&p, &single, offsetof(fct_mesh_report, bounds)); /* padding comes after the bounds */
+        assert_memory_equal(&p, &single,
+                            offsetof(fct_mesh_report, bounds)); /* padding comes after the bounds */
         assert_memory_equal(&p.bounds, &single.bounds, sizeof p.bounds);
         assert_true(p.area == single.area && p.diagonal == single.diagonal);
         release(&r, &m);
