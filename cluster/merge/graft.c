@@ -1,12 +1,11 @@
-/* cluster/merge/graft.c: clusters that may not merge with a tall neighbour become siblings of something
- * inside it.
+/* cluster/merge/graft.c: puts clusters that are too tall to merge into the trees of their neighbours.
  *
- * Where the height limit leaves clusters of one part of the mesh unmerged, the smaller one goes down the
- * neighbour's tree: next to the highest node that holds a face adjacent to it and has height to spare. Every
- * node on the way stays connected, so partitions do too, and no quadric is lost, for a merge's cost lies
- * between those of the nodes above and below. What fits nowhere is left for the join by proximity. A last
- * resort that costs O(F) and a few paths a cluster; meshes seldom come here (caterpillars of the MEAN cost,
- * hubs, graded strips). Merges are renumbered afterwards, children first.
+ * Where the height limit leaves adjacent clusters unmerged, the smaller one becomes the sibling of a node
+ * inside its neighbour: of the highest node that holds an adjacent face and has height to spare. Every node
+ * on the path stays connected, so partitions do too. No record changes inside the tree; the cost of the new
+ * merge is held between those of the nodes above and below. Clusters without a place are left to join.c.
+ * Merges are renumbered afterwards, children first. O(F), and up to MOST_PATHS paths per cluster.
+ * Caterpillars of the cost MEAN, hubs and graded strips come here, other meshes hardly ever.
  */
 #include "cluster/merge/graft.h"
 
@@ -21,13 +20,13 @@ enum { MOST_PATHS = 256, MOST_HEIGHT = 128 };
 typedef struct grafter {
     fct_work *work;
     uint32_t *parents;            /* per build id; FCT_NONE above roots */
-    uint32_t *slots;              /* per build id, of roots alone */
+    uint32_t *slots;              /* per build id of a root */
     uint8_t *heights;             /* per build id */
-    uint32_t *starts, *neighbors; /* per face: its run of neighbours */
+    uint32_t *starts, *neighbors; /* per face: its neighbours are starts[f] to starts[f + 1] - 1 */
     uint32_t *stack;
 } grafter;
 
-/* Where to put a cluster: beside `node`, in the tree of `root`, `depth` below it. */
+/* A place for a cluster: beside `node`, which is `depth` below `root`. */
 typedef struct place {
     uint32_t node, root, depth;
 } place;
@@ -69,8 +68,8 @@ static fct_result link_faces(grafter *g, const fct_mesh *mesh) {
     return result;
 }
 
-/* Looks along the path from a face to its root for the highest node that a cluster of that height fits
- * beside. */
+/* Searches the path from a face to its root for the highest node that the cluster of `slot` fits beside.
+ * Returns false if the face is in that cluster. */
 static bool look_up(const grafter *g, uint32_t face, uint32_t root, uint32_t slot, place *best) {
     uint32_t path[MOST_HEIGHT], length = 0;
     for (uint32_t node = face; node != FCT_NONE; node = g->parents[node]) path[length++] = node;
@@ -109,7 +108,7 @@ static float cost_of(const fct_work *work, uint32_t node, float other) {
     return node == FCT_NONE || node < work->face_count ? other : work->costs[node - work->face_count];
 }
 
-static void graft(grafter *g, uint32_t slot, place at) {
+static void graft_cluster(grafter *g, uint32_t slot, place at) {
     fct_work *work = g->work;
     uint32_t root = work->nodes[slot], host = g->slots[at.root], above = g->parents[at.node];
     uint32_t merge = work->merge_count, node = work->face_count + merge;
@@ -136,7 +135,7 @@ static void graft(grafter *g, uint32_t slot, place at) {
     work->heights[host] = g->heights[work->nodes[host]];
 }
 
-/* Children before parents again: the reverse of an order that goes from the roots down. */
+/* Renumbers merges so that children come before parents: the reverse of a preorder. */
 static fct_result renumber(grafter *g) {
     fct_work *work = g->work;
     const fct_env *env = work->env;
@@ -171,7 +170,7 @@ static fct_result renumber(grafter *g) {
     return FCT_OK;
 }
 
-/* Whether an edge leads from the cluster to another: a finished part of the mesh has none. */
+/* Whether the cluster has an adjacent face outside. A finished part of the mesh has none. */
 static bool has_neighbors(const grafter *g, uint32_t slot) {
     place none = {FCT_NONE, FCT_NONE, 0};
     uint32_t faces = g->work->face_count, top = 0;
@@ -189,7 +188,7 @@ static bool has_neighbors(const grafter *g, uint32_t slot) {
     return false;
 }
 
-static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t *order) {
+static fct_result graft_all(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t *order) {
     fct_work *work = g->work;
     uint32_t count = 0;
     link_nodes(g);
@@ -198,7 +197,7 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
     for (uint32_t s = 0; s < work->face_count; ++s)
         if (work->nodes[s] != FCT_NONE) keys[count] = work->records[s].count, order[count++] = s;
     result = fct_sort_pairs(work->env, keys, order, count);
-    /* again while it helps: hosts that have grown may be taller */
+    /* repeat while it helps: a host that has grown may be taller */
     for (uint32_t before = 0; result == FCT_OK && count != before;) {
         before = count;
         count = 0;
@@ -206,7 +205,7 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
             if (i % 1024 == 0) result = fct_progress(work->env, "clusters", 1);
             place at = find_place(g, order[i]);
             if (at.node != FCT_NONE)
-                graft(g, order[i], at);
+                graft_cluster(g, order[i], at);
             else
                 order[count++] = order[i];
         }
@@ -216,7 +215,7 @@ static fct_result run(grafter *g, const fct_mesh *mesh, uint64_t *keys, uint32_t
 }
 
 fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh) {
-    /* between materials a graft would break their order */
+    /* a graft could put a merge across materials below one within a material */
     if (work->edge_count == 0 || work->materials) return FCT_OK;
     const fct_env *env = work->env;
     size_t faces = work->face_count, live = faces - work->merge_count;
@@ -228,7 +227,7 @@ fct_result fct_work_graft(fct_work *work, const fct_mesh *mesh) {
                                 FCT_ARRAY(g.stack, faces),       FCT_ARRAY(keys, live),
                                 FCT_ARRAY(order, live)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "clustering");
-    if (result == FCT_OK) result = run(&g, mesh, keys, order);
+    if (result == FCT_OK) result = graft_all(&g, mesh, keys, order);
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     fct_release(env, g.neighbors);
     return result;

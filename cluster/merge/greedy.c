@@ -1,10 +1,14 @@
-/* cluster/merge/greedy.c: the dissertation's loop: contract the cheapest dual edge until none is left (8.2).
+/* cluster/merge/greedy.c: the dissertation's loop: contract the cheapest dual edge until none is left
+ * (section 8.2).
  *
- * In and out: the live edges of an fct_work. Each cluster has a singly linked list of its edges; a merge
- * walks the two lists once, adds up edges that now lead to the same neighbour, and prices what remains. Edges
- * whose union would be too tall wait outside the heap until one of their ends changes, which bounds how often
- * an edge is priced by the height of the tree: O(F log^2 F) at worst, whatever the valence. Ties go to the
- * smaller union, then to a hash of the edge: by edge number a flat grid would become chains.
+ * Each cluster has a singly linked list of its edges. A merge walks the lists of both clusters once, unites
+ * edges that now lead to the same neighbour, and prices the edges of the union. An edge whose union would be
+ * too tall waits outside the heap until one of its ends changes. So an edge is priced at most once per level
+ * of the tree: O(F log^2 F) on every input, whatever the valence.
+ *
+ * Ties go to the smaller log2 of the union's faces, then to a hash of the edge's index, then to the lower
+ * index, because a flat grid would become chains by index alone. Indices are the order of the list of edges,
+ * first those that meet the lower cluster. The key of a MEAN cost is the double without its low 20 bits.
  */
 #include "cluster/merge/greedy.h"
 
@@ -23,13 +27,14 @@ typedef struct greedy {
     fct_work *work;
     fct_edge *edges;
     float *costs;
-    double *mean_costs;  /* MEAN only */
-    uint32_t (*next)[2]; /* per edge and end: the next link of that end's list; a link is 2 edge + end */
-    uint32_t *heads;     /* per slot: first link */
-    uint32_t *seen;      /* per slot: the edge of the list being walked that leads there, if it does */
+    double *mean_costs; /* MEAN only */
+    uint32_t (
+        *next)[2];   /* per edge and end: the next link of the list of that end; a link is 2 * edge + end */
+    uint32_t *heads; /* per slot: first link */
+    uint32_t *seen;  /* per slot: the edge of the list being walked that leads to it, or FCT_NONE */
     fct_heap heap;
     bool across;
-    uint32_t waiting, batch[FCT_LANES]; /* edges to be priced together */
+    uint32_t waiting, batch[FCT_LANES]; /* edges to be priced in one call */
 } greedy;
 
 /* Orders as the doubles do; -0 below +0. */
@@ -51,7 +56,7 @@ static uint64_t edge_key(const greedy *g, uint32_t e) {
     return cost << 32 | size << 27 | hash;
 }
 
-static bool waits(const greedy *g, const fct_edge *edge) {
+static bool must_wait(const greedy *g, const fct_edge *edge) {
     const uint32_t *materials = g->work->materials;
     if (!g->across && materials && materials[edge->a] != materials[edge->b]) return true;
     return !fct_work_allowed(g->work, edge->a, edge->b);
@@ -79,8 +84,8 @@ static void price_batch(greedy *g) {
     g->waiting = 0;
 }
 
-static void price(greedy *g, uint32_t e) {
-    if (waits(g, &g->edges[e])) {
+static void price_later(greedy *g, uint32_t e) {
+    if (must_wait(g, &g->edges[e])) {
         fct_heap_remove(&g->heap, e);
         return;
     }
@@ -110,8 +115,8 @@ static void link_edges(greedy *g) {
     }
 }
 
-/* Moves what is worth keeping of the list at `link`, the edges of slot `from`, to the end of a's new list:
- * no dead edges, none between a and b, one for each neighbour. */
+/* Appends the list at `link`, that of slot `from`, to the new list of a, whose last link is *tail. Drops dead
+ * edges and those between a and b, and unites edges to the same neighbour. Returns the new tail. */
 static uint32_t *keep_links(greedy *g, uint32_t link, uint32_t from, uint32_t a, uint32_t b, uint32_t *tail) {
     while (link != FCT_NONE) {
         uint32_t e = link / 2, end = link & 1, after = g->next[e][end];
@@ -140,7 +145,7 @@ static uint32_t *keep_links(greedy *g, uint32_t link, uint32_t from, uint32_t a,
     return tail;
 }
 
-static void contract(greedy *g, uint32_t e) {
+static void contract_edge(greedy *g, uint32_t e) {
     uint32_t a = g->edges[e].a, b = g->edges[e].b;
     double shared = g->mean_costs ? g->work->borders[e] : (double)g->edges[e].shared;
     fct_work_merge(g->work, a, b, shared, g->costs[e]);
@@ -151,16 +156,16 @@ static void contract(greedy *g, uint32_t e) {
     for (uint32_t link = g->heads[a]; link != FCT_NONE; link = g->next[link / 2][link & 1]) {
         const fct_edge *edge = &g->edges[link / 2];
         g->seen[link & 1 ? edge->a : edge->b] = FCT_NONE;
-        price(g, link / 2);
+        price_later(g, link / 2);
     }
     price_batch(g);
 }
 
-static fct_result run(greedy *g) {
+static fct_result run_greedy(greedy *g) {
     fct_work *work = g->work;
     fct_parallel_for(work->env, work->edge_count, 1 << 13, price_chunk, g);
     for (uint32_t e = 0; e < work->edge_count; ++e)
-        if (!waits(g, &g->edges[e])) fct_heap_append(&g->heap, e, edge_key(g, e));
+        if (!must_wait(g, &g->edges[e])) fct_heap_append(&g->heap, e, edge_key(g, e));
     fct_heap_order(&g->heap);
     for (uint32_t step = 0;; ++step) {
         if (step % 8192 == 0) {
@@ -172,9 +177,10 @@ static fct_result run(greedy *g) {
         if (e == FCT_NONE) break;
         uint32_t a = g->edges[e].a, b = g->edges[e].b;
         if (work->frozen && (work->frozen[a] || work->frozen[b]))
-            work->frozen[a] = work->frozen[b] = 1; /* the cheapest partner is, so it stays the cheapest */
+            work->frozen[a] = work->frozen[b] =
+                1; /* the cheapest partner of a frozen cluster waits too, so that it stays cheapest */
         else
-            contract(g, e);
+            contract_edge(g, e);
     }
     uint32_t kept = 0;
     for (uint32_t e = 0; e < work->edge_count; ++e)
@@ -210,7 +216,7 @@ fct_result fct_work_greedy(fct_work *work, bool across) {
     if (result == FCT_OK) result = fct_heap_create(env, work->edge_count, &g.heap);
     if (result == FCT_OK) {
         link_edges(&g);
-        result = run(&g);
+        result = run_greedy(&g);
     }
     fct_heap_release(env, &g.heap);
     fct_release_all(env, arrays, FCT_LENGTH(arrays));

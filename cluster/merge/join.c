@@ -1,11 +1,12 @@
-/* cluster/merge/join.c: one tree over clusters that share no edge, or may not merge along one for height.
+/* cluster/merge/join.c: joins clusters that share no edge, or are too tall to merge, into one tree.
  *
- * Top down: the clusters' axis-aligned boxes are split by the surface area heuristic, between any two where
- * they are few, else in 16 bins, so that the tree above them is a good box tree. A split is taken only if
- * both sides can still be finished within the height that is left: a group of weights n_i can always be cut
- * in halves of its weight so that cluster i ends at most log2(W / n_i) + 2 below its top (Mehlhorn's
- * bisection). With heights of at most 3 log2 n_i - 1 this keeps the whole within 3 log2 F. O(k log k) for k
- * clusters. Smaller groups are split side by side; unions are then made level by level from below.
+ * Top down: groups of clusters are cut by the surface area heuristic on their axis-aligned boxes, between any
+ * two if there are at most FEW, otherwise in 16 bins, so that the tree above them is a good box tree. A cut
+ * is taken only if both sides still fit into the remaining height. Clusters of n_i faces in a group of W
+ * faces can always be cut in halves of weight so that cluster i ends at most log2(W / n_i) + 2 below the top
+ * (Mehlhorn's bisection). With heights of at most 3 log2 n_i - 1, the whole tree stays within 3 log2 F.
+ * O(k log k) for k clusters. Small groups are cut in parallel; unions are then made level by level from
+ * below.
  */
 #include "cluster/merge/join.h"
 
@@ -21,24 +22,23 @@ enum { BINS = 16, FEW = 8, STACK = 256, GRAIN = 1 << 8, PORTION = 1 << 12, PORTI
 
 /* A cluster to be joined. */
 typedef struct part {
-    float box[8]; /* in the unit model: lower x, y, z, 0, upper x, y, z negated, 0: the least of two is a
-                     union */
+    float box[8]; /* lower x y z, 0, minus upper x y z, 0 in the unit model; the union is the minimum */
     uint32_t slot, count;
     float excess; /* its height less log2 of its count */
     uint32_t height;
 } part;
 
-/* What is known of a group of parts. */
+/* The sums of a group of parts. */
 typedef struct summary {
-    f8 range; /* of lower plus upper corners: the least, 0, the greatest negated, 0 */
+    f8 range; /* of lower + upper corner: minimum x y z, 0, minus maximum x y z, 0 */
     uint64_t weight;
-    float excess; /* the greatest */
+    float excess; /* the largest of its parts */
 } summary;
 
 typedef struct group {
     summary of;
     uint32_t begin, end; /* parts */
-    uint32_t node;       /* nodes are numbered in preorder: the first of its end - begin - 1 */
+    uint32_t node;       /* the first of its end - begin - 1 nodes, which are numbered in preorder */
     int height_left;
     bool keep_order;
 } group;
@@ -47,16 +47,16 @@ typedef struct joiner {
     fct_work *work;
     const fct_mesh *mesh;
     uint32_t part_count;
-    part *parts, *scratch;     /* permuted; the same room once more */
-    group *portions;           /* PORTIONS groups to be split side by side */
-    uint32_t (*children)[2];   /* of the upper tree's nodes: a node, or PART and a part */
+    part *parts, *scratch;     /* in the order of the cuts; room to permute them */
+    group *portions;           /* PORTIONS groups to be split in parallel */
+    uint32_t (*children)[2];   /* per node: a node, or PART | a part */
     uint32_t *ordered, *slots; /* nodes by level from below; the slot of each */
     uint8_t *levels;
 } joiner;
 
 /* --- Boxes --- */
 
-/* Half the surface. */
+/* Half the surface area. */
 static inline float area_of(f8 box) {
     float e[8];
     f8_store(e, f8_add(box, f8_swap(box))); /* extents, negated */
@@ -97,7 +97,7 @@ static void bound_face(const joiner *j, uint32_t face, float box[8]) {
     }
 }
 
-/* Boxes of the parts, through their faces. No part is taller than its stack is long. */
+/* The boxes of the parts, from their faces. The stack suffices for the largest height. */
 static void bound_parts(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const joiner *j = user;
@@ -123,15 +123,15 @@ static void bound_parts(void *user, size_t begin, size_t end, size_t chunk, uint
 
 /* --- Cuts --- */
 
-/* Whether a group can be joined for certain within less than this height. */
-static bool fits(const joiner *j, const summary *s, uint32_t begin, uint32_t end, int height_left) {
+/* Whether the group can be joined within less than this height, by Mehlhorn's bound. */
+static bool group_fits(const joiner *j, const summary *s, uint32_t begin, uint32_t end, int height_left) {
     if (end - begin == 1) return (int)j->parts[begin].height < height_left;
     int bits = 64 - __builtin_clzll(s->weight);
-    if (s->excess + (float)(bits + 3) < (float)height_left) return true; /* log2 is less than that */
+    if (s->excess + (float)(bits + 3) < (float)height_left) return true; /* a cheap bound on log2 first */
     return ceil((double)s->excess + fct_log2((double)s->weight) + 1e-5) + 2 < height_left;
 }
 
-/* The cheapest cut of boxes in a row: the first *cut + 1 go left. */
+/* The cheapest cut of a row of boxes: the first *cut + 1 go left. Returns its cost. */
 static float best_cut(const f8 *boxes, const uint32_t *weights, uint32_t count, uint32_t *cut) {
     float right[BINS], best = INFINITY;
     uint64_t weight = 0;
@@ -151,7 +151,7 @@ static float best_cut(const f8 *boxes, const uint32_t *weights, uint32_t count, 
     return best;
 }
 
-/* Of at most FEW parts, at any place along each axis. */
+/* The cheapest cut of at most FEW parts, sorted along each axis. Returns the end of the left side. */
 static uint32_t cut_few(const joiner *j, const group *g, summary sides[2]) {
     part *parts = j->parts + g->begin, *scratch = j->scratch + g->begin;
     uint32_t count = g->end - g->begin, orders[3][FEW], best_axis = 0, middle = 0;
@@ -177,7 +177,7 @@ static uint32_t cut_few(const joiner *j, const group *g, summary sides[2]) {
     return middle;
 }
 
-/* Where a group's bins lie. */
+/* The map from a part's middle to its bins. */
 typedef struct grid {
     f8 least, factor;
 } grid;
@@ -187,7 +187,7 @@ static inline void bins_of(const grid *where, f8 middle, uint32_t bins[8]) {
     i8_store(bins, i8_trunc(f8_min(place, f8_set(BINS - 1))));
 }
 
-/* BINS along each axis; a factor of zero where all middles are the same. */
+/* BINS along each axis; the factor is 0 where all middles are equal. */
 static grid make_grid(const summary *s) {
     float range[8], least[8] = {0}, factor[8] = {0};
     f8_store(range, s->range);
@@ -198,7 +198,7 @@ static grid make_grid(const summary *s) {
     return (grid){f8_load(least), f8_load(factor)};
 }
 
-/* The axis and the last bin that goes left; false where all parts lie in one place. */
+/* The axis and the last bin that goes left; false if all parts lie in one bin. */
 static bool find_cut(const joiner *j, const group *g, const grid *where, uint32_t *axis, uint32_t *cut) {
     f8 boxes[3][BINS];
     uint32_t weights[3][BINS] = {{0}}, bins[8];
@@ -221,8 +221,9 @@ static bool find_cut(const joiner *j, const group *g, const grid *where, uint32_
     return best < INFINITY;
 }
 
-/* Returns the end of the left side, or g->begin where all parts lie in one place. Keeps the order within both
- * sides. */
+/* Returns the end of the left side, or g->begin if all parts lie in one bin. Keeps the order within both
+ * sides.
+ */
 static uint32_t cut_by_area(const joiner *j, const group *g, summary sides[2]) {
     if (g->end - g->begin <= FEW) return cut_few(j, g, sides);
     uint32_t axis, cut, bins[8], left = g->begin, right = g->begin;
@@ -242,7 +243,7 @@ static uint32_t cut_by_area(const joiner *j, const group *g, summary sides[2]) {
     return left;
 }
 
-/* The cut that leaves the two weights most alike. */
+/* The cut with the least difference of weights. */
 static uint32_t cut_by_weight(const joiner *j, const group *g) {
     uint64_t left = 0, best = UINT64_MAX;
     uint32_t middle = g->begin + 1;
@@ -254,7 +255,7 @@ static uint32_t cut_by_weight(const joiner *j, const group *g) {
     return middle;
 }
 
-/* Brings a part of more than half the weight to the front; returns whether there is one. */
+/* Moves the part with more than half the weight to the front; false if there is none. */
 static bool heaviest_first(const joiner *j, const group *g) {
     uint32_t heaviest = g->begin;
     for (uint32_t i = g->begin; i < g->end; ++i)
@@ -267,11 +268,11 @@ static bool heaviest_first(const joiner *j, const group *g) {
 }
 
 static bool both_fit(const joiner *j, const group *g, uint32_t middle, const summary sides[2]) {
-    return fits(j, &sides[0], g->begin, middle, g->height_left) &&
-           fits(j, &sides[1], middle, g->end, g->height_left);
+    return group_fits(j, &sides[0], g->begin, middle, g->height_left) &&
+           group_fits(j, &sides[1], middle, g->end, g->height_left);
 }
 
-static uint32_t cut(const joiner *j, group *g, summary sides[2]) {
+static uint32_t cut_group(const joiner *j, group *g, summary sides[2]) {
     uint32_t middle;
     if (!g->keep_order) {
         middle = cut_by_area(j, g, sides);
@@ -281,7 +282,7 @@ static uint32_t cut(const joiner *j, group *g, summary sides[2]) {
             sides[0] = summarize(j->parts, g->begin, middle), sides[1] = summarize(j->parts, middle, g->end);
             if (both_fit(j, g, middle, sides)) return middle;
         }
-        g->keep_order = !fits(j, &g->of, g->begin, g->end, g->height_left);
+        g->keep_order = !group_fits(j, &g->of, g->begin, g->end, g->height_left);
     }
     middle = cut_by_weight(j, g);
     sides[0] = summarize(j->parts, g->begin, middle), sides[1] = summarize(j->parts, middle, g->end);
@@ -290,10 +291,10 @@ static uint32_t cut(const joiner *j, group *g, summary sides[2]) {
 
 /* --- Tree --- */
 
-/* Splits a group in two and returns how many of these are more than a part. */
-static uint32_t split(const joiner *j, group *g, group *out) {
+/* Splits a group in two; writes the sides that have several parts to `out` and returns their number. */
+static uint32_t split_group(const joiner *j, group *g, group *out) {
     summary sides[2];
-    uint32_t middle = cut(j, g, sides), bounds[3] = {g->begin, middle, g->end}, count = 0;
+    uint32_t middle = cut_group(j, g, sides), bounds[3] = {g->begin, middle, g->end}, count = 0;
     for (int k = 1; k >= 0; --k) {
         uint32_t node = k ? g->node + (middle - g->begin) : g->node + 1;
         bool leaf = bounds[k + 1] - bounds[k] == 1;
@@ -314,12 +315,12 @@ static void split_portions(void *user, size_t begin, size_t end, size_t chunk, u
         stack[depth++] = j->portions[i];
         while (depth > 0) {
             group g = stack[--depth];
-            depth += split(j, &g, stack + depth);
+            depth += split_group(j, &g, stack + depth);
         }
     }
 }
 
-/* Groups of at most PORTION wait until there are enough of them for all threads. */
+/* Groups of at most PORTION parts wait until there are PORTIONS of them, then go to the threads. */
 static void split_all(joiner *j, const group *all) {
     group stack[STACK];
     uint32_t depth = 0, waiting = 0;
@@ -327,7 +328,7 @@ static void split_all(joiner *j, const group *all) {
     while (depth > 0) {
         group g = stack[--depth];
         if (g.end - g.begin > PORTION)
-            depth += split(j, &g, stack + depth);
+            depth += split_group(j, &g, stack + depth);
         else
             j->portions[waiting++] = g;
         if (waiting < PORTIONS && depth > 0) continue;
@@ -364,7 +365,7 @@ static void merge_level(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* Unions of two parts first, then those of what these have made, and so on. */
+/* Merges level by level: unions of two parts first. */
 static void merge_nodes(const joiner *j) {
     uint32_t count = j->part_count - 1, ends[STACK] = {0};
     for (uint32_t node = count; node-- > 0;) {
@@ -378,7 +379,7 @@ static void merge_nodes(const joiner *j) {
     }
     for (uint32_t i = 1; i < STACK; ++i) ends[i] += ends[i - 1];
     for (uint32_t node = count; node-- > 0;) j->ordered[--ends[j->levels[node]]] = node;
-    for (uint32_t i = 0; i < STACK; ++i) { /* an end is a beginning now */
+    for (uint32_t i = 0; i < STACK; ++i) { /* ends[i] is now the begin of level i */
         uint32_t end = i + 1 < STACK ? ends[i + 1] : count;
         level l = {j, j->ordered + ends[i], j->work->merge_count};
         fct_parallel_for(j->work->env, end - ends[i], GRAIN, merge_level, &l);

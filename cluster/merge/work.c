@@ -1,4 +1,4 @@
-/* cluster/merge/work.c: see work.h. */
+/* cluster/merge/work.c: creates a clustering from a mesh, records merges, and turns lists into edges. */
 #include "cluster/merge/work.h"
 
 #include <string.h>
@@ -39,7 +39,7 @@ static void bound_faces(void *user, size_t begin, size_t end, size_t chunk, uint
     fct_bound_faces(job->mesh, begin, end, &job->bounds[chunk]);
 }
 
-/* Of the vertices that faces use. */
+/* Bounds of the vertices that faces use. */
 static fct_result bound_mesh(const fct_env *env, const fct_mesh *mesh, fct_bounds *out) {
     size_t chunks = fct_chunk_count(mesh->face_count, GRAIN);
     face_job job = {.mesh = mesh, .bounds = fct_allocate(env, chunks, sizeof *job.bounds)};
