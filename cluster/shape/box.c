@@ -1,7 +1,7 @@
-/* cluster/shape/box.c: oriented boxes of streams of points.
+/* cluster/shape/box.c: the oriented box of a cluster, from the extents of its points.
  *
- * Extents are taken in double along the very axes that fct_cluster_box expands from the stored quaternion, so
- * that a box holds its points for exactly these, and is as tight as they allow.
+ * Extents are taken in double along the axes that fct_cluster_box expands from the stored quaternion. So the
+ * box contains its points for these axes, and is as tight as they allow.
  */
 #include "cluster/shape/box.h"
 
@@ -28,14 +28,15 @@ void fct_cluster_box(const fct_cluster *cluster, fct_box *out) {
     fct_box_axes(cluster->box_rotation, out->axes);
 }
 
-/* The next float above one that is not below 0. */
+/* The next float above `value`, which is not negative. */
 static float above(float value) {
     uint32_t bits = fct_float_bits(value);
     return fct_float_of_bits(bits + (bits < 0x7F800000u));
 }
 
 bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_cluster *cluster) {
-    /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
+    /* from a point, because the axes are orthonormal only to float rounding and the model may be far from 0
+     */
     v3 center = point, a[3];
     double size = 0;
     bool within = true;
@@ -48,7 +49,7 @@ bool fct_box_set(const fct_extents *e, const float axes[3][3], v3 point, fct_clu
     v3_store(cluster->box_center, center);
     for (int k = 0; k < 3; ++k) {
         double middle = v3_dot(center, a[k]), half = greater(e->high[k] - middle, middle - e->low[k]);
-        half += 16 * DBL_EPSILON * size; /* whatever order of operations checks it */
+        half += 16 * DBL_EPSILON * size; /* for any order of operations in a check */
         cluster->box_half[k] = above((float)half);
         within = within && isfinite(cluster->box_half[k]) && isfinite(cluster->box_center[k]);
         cluster->box_half[k] = cluster->box_half[k] < FLT_MAX ? cluster->box_half[k] : FLT_MAX;

@@ -1,5 +1,5 @@
-/* cluster/shape/cone.c: how far normals lie from an axis, by the chord, which keeps small angles that a
- * cosine loses. */
+/* cluster/shape/cone.c: angles of cones of normals, from the chord between unit vectors: the cosine of a
+ * small angle has no digits left. */
 #include "cluster/shape/cone.h"
 
 #include "base/math/simd_d8.h"
@@ -12,8 +12,9 @@ void fct_unit_normal(const float *positions, const uint32_t triangle[3], float n
     v3_store(normal, length > 0 ? v3_scale(n, 1 / length) : (v3){NAN, NAN, NAN});
 }
 
-/* asin(x) for x in [0, 1] within 4e-10, less than a float shows: a polynomial up to 1/2, half the angle
- * beyond. */
+/* asin(x) for x in [0, 1], within 4e-10: the Taylor series up to 1/2, pi / 2 - 2 asin(sqrt((1 - x) / 2))
+ * above.
+ */
 static inline d8 arc_sine(d8 x) {
     static const double series[] = {
         2027025.0 / 175472640, 135135.0 / 9676800, 10395.0 / 599040, 945.0 / 42240,

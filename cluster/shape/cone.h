@@ -5,12 +5,13 @@
 #include "base/variant.h"
 #include "cluster/shape/box.h"
 
-/* A triangle's unit normal in floats; NaN where it has no area. */
+/* The unit normal of a triangle; NaN if its area is 0. */
 #define fct_unit_normal FCT_KERNEL(fct_unit_normal)
 FCT_DECLARE_KERNEL(void, fct_unit_normal,
                    (const float *positions, const uint32_t triangle[3], float normal[3]));
 
-/* The angle of a squared chord, enlarged by what floats may have lost, at most pi; of one, of eight. */
+/* The angle (radians, at most pi) between unit vectors whose squared distance is `widest`, enlarged by the
+ * rounding of floats. */
 #define fct_cone_angle FCT_KERNEL(fct_cone_angle)
 FCT_DECLARE_KERNEL(float, fct_cone_angle, (float widest));
 #define fct_cone_angles FCT_KERNEL(fct_cone_angles)

@@ -1,10 +1,9 @@
-/* cluster/shape/octet.c: eight clusters described side by side, a lane each.
+/* cluster/shape/octet.c: describes eight clusters at once, one per lane.
  *
- * Three quarters of all clusters have two to four faces. One by one, each waits for its own roots and
- * divisions and leaves most lanes of a vector idle; side by side nothing waits and no branch depends on a
- * cluster. Frame of a box: PCA of the surface, turned in its plane to the least area of eight angles.
- * Extents are taken in double along the very axes that fct_cluster_box expands from the stored quaternion, so
- * that a box holds its points for exactly these, and is as tight as they allow.
+ * Three quarters of all clusters have two to four faces. One by one, each would wait for its own roots and
+ * divisions and leave most lanes idle. The frame of a box is the PCA of the surface, turned in its plane to
+ * the least area of eight angles. Extents are taken in double along the axes that fct_cluster_box expands
+ * from the stored quaternion. So the box contains its points for these axes, and is as tight as they allow.
  */
 #include "cluster/shape/octet.h"
 
@@ -42,7 +41,7 @@ static inline d8 negative(d8 a) {
 
 /* --- Sums, plane and frame --- */
 
-/* The sums' twenty numbers, turned on their side. */
+/* The 20 doubles of each cluster's sums; s[i] holds number i of all eight. */
 static inline void load_sums(const fct_sums *const sums[8], d8 s[20]) {
     for (int i = 0; i < 20; i += 4) {
         d4 low[4], high[4];
@@ -67,7 +66,7 @@ void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
     for (int i = 0; i < 6; ++i) d8_store_floats(o->words[MOMENT + i], d8_mul(moment[i], factor));
     for (int i = 0; i < 3; ++i) d8_store_floats(o->words[CENTROID + i], center[i]);
     d8 spread = d8_add(d8_add(covariance[0], covariance[3]), covariance[5]);
-    d8 radius = d8_sqrt(d8_div(spread, weight)); /* may be no number */
+    d8 radius = d8_sqrt(d8_div(spread, weight)); /* may be NaN */
     radius = d8_if_lt(none, radius, d8_if_lt(radius, limit, radius, one), one);
     d8_store_floats(o->shrink, d8_div(one, radius));
     fct_eigen3_eight(covariance, NULL, axes);
@@ -85,7 +84,7 @@ void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
 
 /* --- Cone --- */
 
-/* Unit area vectors to `axis`; returns a bit for each lane that has none. */
+/* The unit area vectors; bit i of the result: lane i has none. */
 static inline uint32_t find_axes(const fct_octet *o, float axis[3][8]) {
     d8 s[3];
     for (int i = 0; i < 3; ++i) s[i] = d8_load_floats(o->words[VECTOR + i]);
@@ -113,7 +112,7 @@ void fct_octet_cone(fct_octet *o, const fct_octet_normals *n) {
         longest = n->counts[i] > longest ? n->counts[i] : longest;
     }
     for (uint32_t j = 0; j < shortest; ++j) {
-        widest = f8_max(chords_to(rows, a), widest); /* NaN is passed over */
+        widest = f8_max(chords_to(rows, a), widest); /* f8_max ignores NaN here */
         for (int i = 0; i < 8; ++i) rows[i] += 4;
     }
     for (uint32_t j = shortest; j < longest; ++j) {
@@ -128,15 +127,16 @@ void fct_octet_cone(fct_octet *o, const fct_octet_normals *n) {
 
 /* --- Turn and rotation --- */
 
-/* Points in the plane from the first of each cluster, which is left out. */
+/* Points in the plane, relative to the first of each cluster, which is left out. */
 typedef struct plane_points {
     float u[SAMPLES][8], v[SAMPLES][8];
     uint32_t count;
     f8 height;
 } plane_points;
 
-/* Points in the frame, over the cluster's radius; some of them where there are many. */
-static void project(const fct_octet *o, const fct_octet_row *points, uint32_t count, plane_points *out) {
+/* Projects up to SAMPLES points, evenly chosen, to the frame, in units of the cluster's radius. */
+static void project_points(const fct_octet *o, const fct_octet_row *points, uint32_t count,
+                           plane_points *out) {
     float frame[9][8];
     f8 f[9], shrink = f8_load(o->shrink), low = f8_set(0), high = low;
     f8 x0 = f8_load(points->x), y0 = f8_load(points->y), z0 = f8_load(points->z);
@@ -161,8 +161,8 @@ typedef struct turn {
     f8 area, cosine, sine;
 } turn;
 
-/* Takes the turn where the sides x and y make a smaller box. */
-static inline void offer(turn *best, f8 x, f8 y, f8 height, float cosine, float sine) {
+/* Takes this turn in the lanes where it makes a smaller box; x, y: the sides in the plane. */
+static inline void offer_turn(turn *best, f8 x, f8 y, f8 height, float cosine, float sine) {
     f8 area = f8_add(f8_mul(x, y), f8_mul(height, f8_add(x, y)));
     best->cosine = f8_if_lt(area, best->area, f8_set(cosine), best->cosine);
     best->sine = f8_if_lt(area, best->area, f8_set(sine), best->sine);
@@ -173,43 +173,43 @@ typedef struct range {
     f8 low, high;
 } range;
 
-static inline void widen(range *r, f8 x) {
+static inline void widen_range(range *r, f8 x) {
     r->low = f8_min(x, r->low), r->high = f8_max(x, r->high);
 }
 static inline f8 width(range r) {
     return f8_sub(r.high, r.low);
 }
 
-/* Turned by an angle below 45 degrees, and by what it leaves of 90. The points are measured in units of the
- * cosine, which saves half of the products. */
+/* Tries an angle below 45 degrees and its complement to 90. Coordinates are in units of the cosine, which
+ * saves half of the products. */
 static inline void try_pair(const plane_points *p, float cosine, float sine, turn *best) {
     f8 c = f8_set(cosine), tangent = f8_set(sine / cosine);
     range x = {f8_set(0), f8_set(0)}, y = x, other_x = x, other_y = x;
     for (uint32_t j = 0; j < p->count; ++j) {
         f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]), tu = f8_mul(tangent, u), tv = f8_mul(tangent, v);
-        widen(&x, f8_add(u, tv)), widen(&y, f8_sub(v, tu));
-        widen(&other_x, f8_add(tu, v)), widen(&other_y, f8_sub(tv, u));
+        widen_range(&x, f8_add(u, tv)), widen_range(&y, f8_sub(v, tu));
+        widen_range(&other_x, f8_add(tu, v)), widen_range(&other_y, f8_sub(tv, u));
     }
-    offer(best, f8_mul(c, width(x)), f8_mul(c, width(y)), p->height, cosine, sine);
-    offer(best, f8_mul(c, width(other_x)), f8_mul(c, width(other_y)), p->height, sine, cosine);
+    offer_turn(best, f8_mul(c, width(x)), f8_mul(c, width(y)), p->height, cosine, sine);
+    offer_turn(best, f8_mul(c, width(other_x)), f8_mul(c, width(other_y)), p->height, sine, cosine);
 }
 
-/* Not at all, and by 45 degrees. */
+/* Tries 0 and 45 degrees. */
 static inline void try_ends(const plane_points *p, turn *best) {
     range x = {f8_set(0), f8_set(0)}, y = x, other_x = x, other_y = x;
     for (uint32_t j = 0; j < p->count; ++j) {
         f8 u = f8_load(p->u[j]), v = f8_load(p->v[j]);
-        widen(&x, u), widen(&y, v);
-        widen(&other_x, f8_add(u, v)), widen(&other_y, f8_sub(v, u));
+        widen_range(&x, u), widen_range(&y, v);
+        widen_range(&other_x, f8_add(u, v)), widen_range(&other_y, f8_sub(v, u));
     }
     const float half = 0.70710678f;
-    offer(best, width(x), width(y), p->height, 1, 0);
-    offer(best, f8_mul(f8_set(half), width(other_x)), f8_mul(f8_set(half), width(other_y)), p->height, half,
-          half);
+    offer_turn(best, width(x), width(y), p->height, 1, 0);
+    offer_turn(best, f8_mul(f8_set(half), width(other_x)), f8_mul(f8_set(half), width(other_y)), p->height,
+               half, half);
 }
 
-/* The rotation whose rows are the axes a, a right-handed frame, as a quaternion. */
-static void rotate(fct_octet *o, const d8 a[3][3]) {
+/* Writes the unit quaternion of the rotation whose rows are the axes a, a right-handed frame. */
+static void write_rotation(fct_octet *o, const d8 a[3][3]) {
     const d8 one = d8_set(1);
     d8 x = a[0][0], y = a[1][1], z = a[2][2];
     d8 xy = d8_add(a[0][1], a[1][0]), xz = d8_add(a[0][2], a[2][0]), yz = d8_add(a[1][2], a[2][1]);
@@ -219,7 +219,7 @@ static void rotate(fct_octet *o, const d8 a[3][3]) {
                      {xz, yz, d8_add(d8_sub(d8_sub(one, x), y), z), wz},
                      {wx, wy, wz, d8_add(d8_add(d8_add(one, x), y), z)}};
     d8 most = rows[0][0], *q = rows[0], squared = d8_set(0);
-    for (int i = 1; i < 4; ++i) { /* the row with the largest entry on the diagonal */
+    for (int i = 1; i < 4; ++i) { /* take the row with the largest diagonal entry */
         d8 entry = rows[i][i];
         for (int k = 0; k < 4; ++k) q[k] = d8_if_lt(most, entry, rows[i][k], q[k]);
         most = d8_max(entry, most);
@@ -234,7 +234,7 @@ void fct_octet_turn(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     turn best = {f8_set(INFINITY), f8_set(1), f8_set(0)};
     float cosines[8], sines[8];
     d8 axes[3][3];
-    project(o, points, count, &p);
+    project_points(o, points, count, &p);
     try_ends(&p, &best);
     try_pair(&p, 0.98078528f, 0.19509032f, &best);
     try_pair(&p, 0.92387953f, 0.38268343f, &best);
@@ -247,12 +247,12 @@ void fct_octet_turn(fct_octet *o, const fct_octet_row *points, uint32_t count) {
         axes[1][i] = d8_sub(d8_mul(c, v), d8_mul(s, u));
         axes[2][i] = d8_load(o->frame[2][i]);
     }
-    rotate(o, (const d8(*)[3])axes);
+    write_rotation(o, (const d8(*)[3])axes);
 }
 
 /* --- Box --- */
 
-/* fct_box_axes, to the bit. */
+/* The same bits as fct_box_axes. */
 static inline void expand_axes(const fct_octet *o, d8 axes[3][3]) {
     const d8 one = d8_set(1);
     d8 x = d8_load_floats(o->words[ROTATION]), y = d8_load_floats(o->words[ROTATION + 1]);
@@ -277,7 +277,7 @@ static inline void load_row(const fct_octet_row *row, d8 p[3]) {
     p[0] = d8_load_floats(row->x), p[1] = d8_load_floats(row->y), p[2] = d8_load_floats(row->z);
 }
 
-static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
+static void fit_boxes(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     d8 a[3][3], low[3], high[3], first[3], along[3], center[3], size = d8_set(0);
     expand_axes(o, a);
     load_row(points, first);
@@ -290,7 +290,8 @@ static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
             low[k] = d8_min(x, low[k]), high[k] = d8_max(x, high[k]);
         }
     }
-    /* from a point, for axes are orthonormal to float rounding only, and the model may be far from 0 */
+    /* from a point, because the axes are orthonormal only to float rounding and the model may be far from 0
+     */
     for (int i = 0; i < 3; ++i) center[i] = first[i];
     for (int k = 0; k < 3; ++k) {
         d8 way = d8_sub(d8_mul(d8_set(0.5), d8_add(low[k], high[k])), along[k]);
@@ -301,11 +302,11 @@ static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
         center[i] = d8_round(center[i]);
         d8_store_floats(o->words[CENTER + i], center[i]);
     }
-    d8 slack = d8_mul(d8_set(16 * DBL_EPSILON), size); /* whatever order of operations checks it */
+    d8 slack = d8_mul(d8_set(16 * DBL_EPSILON), size); /* for any order of operations in a check */
     for (int k = 0; k < 3; ++k) {
         d8 middle = dot(center, a[k]), half = d8_max(d8_sub(high[k], middle), d8_sub(middle, low[k]));
         half = d8_add(half, slack);
-        /* rounded it is not less than it was */
+        /* rounding to float does not make it smaller */
         half = d8_add(d8_mul(half, d8_set(1 + 0x1p-23)), d8_set(0x1p-149));
         d8_store_floats(o->words[HALF + k], half);
     }
@@ -314,16 +315,16 @@ static void fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
 void fct_octet_fit(fct_octet *o, const fct_octet_row *points, uint32_t count) {
     const f8 limit = f8_set(FLT_MAX);
     uint32_t within = 255;
-    fit(o, points, count);
+    fit_boxes(o, points, count);
     for (int k = 0; k < 3; ++k) {
         within &= f8_le(f8_load(o->words[HALF + k]), limit);
         within &= f8_le(f8_abs(f8_load(o->words[CENTER + k])), limit);
     }
     if (within == 255) return;
-    /* A model wider than half the range of floats: a turned box may not have one. */
+    /* A model wider than half the range of a float: a rotated box may not fit into floats. */
     for (int i = 0; i < 8; ++i)
         for (int k = 0; k < 4 && !(within >> i & 1); ++k) o->words[ROTATION + k][i] = k < 3 ? 0 : 1;
-    fit(o, points, count);
+    fit_boxes(o, points, count);
     for (int k = 0; k < 3; ++k) f8_store(o->words[HALF + k], f8_min(f8_load(o->words[HALF + k]), limit));
 }
 

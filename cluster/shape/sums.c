@@ -1,8 +1,9 @@
 /* cluster/shape/sums.c: sums over the surface of a cluster, in double: of triangles, four at a time, and of
- * the union of two clusters, about its own centroid.
+ * the union of two clusters.
  *
- * A face without area weighs 1e-20 of its longest side squared in centroid and covariance, so that clusters
- * of such faces still have both.
+ * The covariance of a triangle about its centroid is area / 36 times the sum of the outer products of its
+ * three sides. A triangle without area weighs 1e-20 of its longest squared side in centroid and covariance,
+ * so that clusters of such faces have both.
  */
 #include "cluster/shape/sums.h"
 
@@ -11,7 +12,7 @@
 
 #include "base/math/simd.h"
 
-/* Four vectors. */
+/* Four vectors, one per lane. */
 typedef struct w3 {
     d4 x, y, z;
 } w3;
@@ -51,7 +52,7 @@ void fct_sums_four(const float *const corners[3][4], fct_sums *out, float (*norm
     d4 weight = d4_if_lt(none, area, area, d4_mul(d4_set(1e-20), longest));
     d4 inverse = d4_div(d4_set(1), area), bounded = d4_if_lt(none, area, inverse, none);
     w3 n = w3_scale(s, inverse), m = w3_scale(s, bounded);
-    d4 share = d4_mul(weight, d4_set(1.0 / 36)); /* of the sides' outer products */
+    d4 share = d4_mul(weight, d4_set(1.0 / 36)); /* of the outer products of the sides */
     d4 rows[20] = {
         area,
         weight,

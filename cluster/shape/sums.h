@@ -7,15 +7,15 @@
 #include "base/math/vec.h"
 #include "base/variant.h"
 
-/* Centre and covariance about it by `weight`. Twenty doubles, which four clusters' sums are turned on their
- * side by. */
+/* 20 doubles per cluster, so that four clusters transpose as 4 x 4 blocks. Centre and covariance are weighted
+ * by `weight`; the covariance is about the centre. */
 typedef struct fct_sums {
     double area, weight, moment[6], covariance[6];
     v3 vector, center;
 } fct_sums;
 
-/* Of four triangles, whose corners are rows of four floats, x y z and one more; their unit normals too, in
- * such rows: NaN where a triangle has no area. */
+/* The sums of four triangles. corners[k][i]: corner k of triangle i, a row of four floats x y z and any
+ * fourth. normals[i]: the unit normal in such a row, NaN if the area is 0. */
 #define fct_sums_four FCT_KERNEL(fct_sums_four)
 FCT_DECLARE_KERNEL(void, fct_sums_four,
                    (const float *const corners[3][4], fct_sums *out, float (*normals)[4]));
