@@ -18,12 +18,15 @@ CLUSTERS = 1000
 REPEATS = 5
 FIELDS = ["group", "mesh", "faces", "builder", "threads", "run", "status", "seconds", "cpu", "dual", "contract", "boxes",
           "grown_bytes", "peak_bytes", "depth", "mean_depth", "clusters", "deviation", "fit", "irregularity", "box_area",
-          "refine_seconds", "refined_deviation", "refined_irregularity"]
+          "refine_seconds", "refined_deviation", "refined_fit", "refined_irregularity"]
 FULL = ["dragon-11k", "dragon-48k", "bunny", "nefertiti", "sphere-100k", "terrain-100k", "dragon-203k", "bunny-x4",
         "dragon-871k", "terrain-1m", "sphere-1m", "bunny-x16", "terrain-4m", "bunny-x64", "terrain-10m"]
 QUICK = ["dragon-11k", "dragon-48k", "bunny", "terrain-100k", "sphere-100k", "bunny-x4", "terrain-1m"]
 BOXES = ["bunny", "terrain-100k", "nefertiti", "dragon-203k", "dragon-871k"]
 ADVERSARIAL = ["grid", "strip", "fan", "loose", "books", "shuffled-faces", "shuffled"]
+# Scans and machine parts whose cuts are compared, and into how many clusters.
+CUTS = ["cow", "fandisk", "gear-20k", "rocker-arm", "bunny", "nefertiti", "dragon-48k"]
+CUT_COUNTS = [30, 100, 1000, 10000]
 SEAM_FIGURES = ["mean_fit", "mean_direction", "mean_irregularity", "mean_normal_deviation", "box_area"]
 # Builder, threads, seconds its turns on one mesh may take in all.
 BUILDERS = [("rounds", 1, 25), ("rounds", 2, 25), ("greedy", 1, 6), ("greedy", 2, 6), ("meshlets", 1, 20), ("vsa-random", 1, 5),
@@ -124,6 +127,32 @@ class Bench:
         for mesh in self.present(["sphere-480k", "cubes-480k", "sphere-" + size] + [a + "-" + size for a in ADVERSARIAL]):
             self.turns("adversarial", mesh, builders, 3 if self.options.quick else REPEATS)
 
+    def cuts(self):
+        """Quality of cuts at several numbers of clusters: ours, refined, and CGAL's. Times are not of interest here."""
+        fields = ["mesh", "faces", "builder", "clusters", "status", "deviation", "fit", "irregularity", "refined_deviation", "refined_fit",
+                  "refined_irregularity", "mean_depth"]
+        builders = ["rounds", "greedy"] + (["vsa-hierarchical", "vsa-random"] if os.path.exists(self.program("vsa")) else [])
+        with open(os.path.join(self.options.out, "cuts.csv"), "w", newline="") as file:
+            writer = csv.DictWriter(file, fields, restval="", extrasaction="ignore")
+            writer.writeheader()
+            for mesh in self.present(CUTS):
+                for count in [c for c in CUT_COUNTS if c < self.faces(mesh)]:
+                    for builder in builders:
+                        row = {"mesh": mesh, "faces": self.faces(mesh), "builder": builder}
+                        row.update(self.judge_cut(builder, mesh, count), clusters=count)
+                        writer.writerow(row)
+                print("  {:<20}{:>11} faces".format(mesh, self.faces(mesh)), flush=True)
+
+    def judge_cut(self, builder, mesh, count):
+        vsa = builder.startswith("vsa-")
+        command = [self.program("vsa"), self.path(mesh), str(count), builder[4:]] if vsa else \
+                  [self.program("tree"), self.path(mesh), builder, "1", str(count)]
+        try:
+            done = subprocess.run(command, stdout=subprocess.PIPE, timeout=self.options.limit)
+        except subprocess.TimeoutExpired:
+            return {"status": "over the limit"}
+        return dict(json.loads(done.stdout), status="ok") if done.returncode == 0 else {"status": "failed"}
+
     def boxes(self):
         meshes = self.present(BOXES[:3] if self.options.quick else BOXES)
         with open(os.path.join(self.options.out, "boxes.csv"), "w", newline="") as file:
@@ -220,11 +249,11 @@ def main():
     parser.add_argument("--limit", type=float, default=45)
     parser.add_argument("--load", type=float, default=os.getloadavg()[0], help="of the machine before anything was built")
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only", action="append", choices=["time", "boxes", "adversarial", "large"])
+    parser.add_argument("--only", action="append", choices=["time", "cuts", "boxes", "adversarial", "large"])
     bench = Bench(parser.parse_args())
     begin, moment = time.monotonic(), time.time()
-    for part in bench.options.only or ["time", "adversarial", "boxes"]:
-        print({"time": "Time, memory and quality", "boxes": "Boxes", "adversarial": "Adversarial meshes",
+    for part in bench.options.only or ["time", "cuts", "adversarial", "boxes"]:
+        print({"time": "Time, memory and quality", "cuts": "Cuts", "boxes": "Boxes", "adversarial": "Adversarial meshes",
                "large": "Out of core"}[part], flush=True)
         save_machine(bench.options, moment, begin)
         getattr(bench, part)()

@@ -168,6 +168,35 @@ def table_quality(runs):
            "greedy", "MixKit"], rows)
 
 
+# L2,1 of MixKit, Garland's own code, by mesh and number of clusters.
+MIXKIT_CUTS = {("rocker-arm", 100): .0886, ("bunny", 1000): .0367}
+
+
+def best_cut(rows, mesh, count):
+    """CGAL's row with the least deviation."""
+    found = [r for r in rows if r["builder"].startswith("vsa") and r["status"] == "ok" and (r["mesh"], int(r["clusters"])) == (mesh, count)]
+    return min(found, key=lambda r: float(r["deviation"]), default=None)
+
+
+def table_cuts(rows):
+    cells = []
+    for r in rows:
+        if r["builder"] != "rounds" or r["status"] != "ok":
+            continue
+        mesh, count = r["mesh"], int(r["clusters"])
+        greedy = [g for g in rows if g["builder"] == "greedy" and g["status"] == "ok" and (g["mesh"], int(g["clusters"])) == (mesh, count)]
+        vsa, refined = best_cut(rows, mesh, count), float(r["refined_deviation"])
+        peer = [float(vsa[k]) if vsa else None for k in ("deviation", "fit", "irregularity")]
+        cells.append([mesh, str(count), show(float(r["deviation"])), show(float(greedy[0]["deviation"]) if greedy else None), show(refined), show(peer[0]),
+                      show(MIXKIT_CUTS.get((mesh, count))), show(over(refined, peer[0]), "{:.2f}"), show(float(r["fit"]), "{:.2e}"),
+                      show(float(r["refined_fit"]), "{:.2e}"), show(peer[1], "{:.2e}"), show(float(r["irregularity"]), "{:.2f}"),
+                      show(float(r["refined_irregularity"]), "{:.2f}"), show(peer[2], "{:.2f}")])
+    table("Cuts: L2,1, squared distance to planes over the squared diagonal (fit), and irregularity",
+          "VSA: the better of CGAL's hierarchical and random seeds, 20 iterations. refined: the cut of rounds, refined by the tree.",
+          ["mesh", "clusters", "rounds", "greedy", "refined", "VSA", "MixKit", "refined/VSA", "fit rounds", "refined", "VSA", "irr. rounds", "refined",
+           "VSA"], cells)
+
+
 def growth(runs, mesh, base, threads):
     if mesh not in runs.faces or base not in runs.faces:
         return None
@@ -303,8 +332,15 @@ def worst(pairs):
     return max(pairs) if pairs else (None, "-")
 
 
-def goals(runs, hard, large):
+def goals(runs, hard, large, cuts):
     g = Goals()
+    for r in cuts:
+        mesh, count = r["mesh"], int(r["clusters"])
+        vsa = best_cut(cuts, mesh, count)
+        if r["builder"] == "rounds" and count == 1000 and vsa:
+            g.most(f"refined L2,1 at 1000 clusters over CGAL's better, {mesh}", over(float(r["refined_deviation"]), float(vsa["deviation"])), .95)
+        if r["builder"] == "rounds" and (mesh, count) in MIXKIT_CUTS:
+            g.most(f"L2,1 at {count} clusters over MixKit's, {mesh}", float(r["deviation"]) / MIXKIT_CUTS[mesh, count], 1)
     peer = runs.get("bunny-x16", "meshlets") if "bunny-x16" in runs.faces else None
     for threads, mixkit, rate in ((1, 30, 2), (2, 55, 3.5)):
         seconds = runs.get("bunny-x16", "rounds", threads=threads)
@@ -388,7 +424,7 @@ def main():
         with open(os.path.join(out, "machine.json")) as file:
             machine = json.load(file)
         print("\n{processor}, {cores} cores, load {load_before:.1f} before; {seconds:.0f} seconds of measuring".format(**machine))
-        old = [part for part in ("time", "adversarial", "boxes", "large") if is_older(os.path.join(out, part + ".csv"), machine["begin"])]
+        old = [part for part in ("time", "cuts", "adversarial", "boxes", "large") if is_older(os.path.join(out, part + ".csv"), machine["begin"])]
         if old:
             print(f"Of earlier runs: {', '.join(old)}.")
         if machine["load_before"] > .5:
@@ -405,7 +441,10 @@ def main():
     large = read_rows(os.path.join(out, "large.csv"))
     if large:
         table_large(large)
-    goals(runs, hard, large)
+    cuts = read_rows(os.path.join(out, "cuts.csv"))
+    if cuts:
+        table_cuts(cuts)
+    goals(runs, hard, large, cuts)
     print(f"\nIn {out}: CSV files, time-per-face.svg, report.txt")
 
 

@@ -1,7 +1,7 @@
 /* bench/cluster/shapes.c: meshes that `facetree make` does not make: subdivided, shuffled and adversarial
  * ones.
  *
- * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes: of about COUNT triangles
+ * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes, gear: of about COUNT triangles
  *        shapes subdivide LEVELS IN OUT   each triangle into four, LEVELS times, with noise
  *        shapes shuffle-faces SEED IN OUT, shapes shuffle SEED IN OUT (vertices, too), shapes copy 0 IN OUT
  * Everything is a function of the arguments alone.
@@ -87,6 +87,43 @@ static void make_cubes(const fct_env *env, uint32_t count, fct_mesh *m) {
         for (int s = 0; s < 12; ++s)
             add_face(m, 8 * c + sides[s][0], 8 * c + sides[s][1], 8 * c + sides[s][2]);
     }
+}
+
+/* A ring with twelve rounded teeth, 1 high: flat ends, curved walls, sharp edges between them. The profile is
+ * a closed loop of `around` points (outer wall, upper end, inner wall, lower end), repeated at `turns`
+ * angles. */
+static void make_gear(const fct_env *env, uint32_t count, fct_mesh *m) {
+    uint32_t quarter = (uint32_t)(sqrt(count / 2.0) / 8) + 1, around = 4 * quarter,
+             turns = count / 2 / around;
+    if (turns < 3) turns = 3;
+    start(env, around * turns, 2 * around * turns, m);
+    for (uint32_t i = 0; i < turns; ++i) {
+        double angle = 2 * M_PI * i / turns, tooth = fmax(-1, fmin(1, 3 * sin(12 * angle)));
+        double outer = 2.6 + .25 * tooth, inner = 1.2;
+        for (uint32_t k = 0; k < around; ++k) {
+            double t = (double)(k % quarter) / quarter, radius, height;
+            switch (k / quarter) {
+            case 0:
+                radius = outer, height = t;
+                break;
+            case 1:
+                radius = outer + t * (inner - outer), height = 1;
+                break;
+            case 2:
+                radius = inner, height = 1 - t;
+                break;
+            default:
+                radius = inner + t * (outer - inner), height = 0;
+            }
+            add_vertex(m, radius * cos(angle), radius * sin(angle), height);
+        }
+    }
+    for (uint32_t i = 0; i < turns; ++i)
+        for (uint32_t k = 0; k < around; ++k) {
+            uint32_t a = i * around + k, b = i * around + (k + 1) % around;
+            uint32_t c = (i + 1) % turns * around + k, d = (i + 1) % turns * around + (k + 1) % around;
+            add_face(m, a, c, b), add_face(m, b, c, d);
+        }
 }
 
 /* --- Made from another mesh --- */
@@ -189,11 +226,8 @@ int main(int argc, char **argv) {
     static const struct {
         const char *name;
         void (*make)(const fct_env *env, uint32_t count, fct_mesh *m);
-    } made[] = {{"strip", make_strip},
-                {"fan", make_fan},
-                {"loose", make_loose},
-                {"books", make_books},
-                {"cubes", make_cubes}};
+    } made[] = {{"strip", make_strip}, {"fan", make_fan},     {"loose", make_loose},
+                {"books", make_books}, {"cubes", make_cubes}, {"gear", make_gear}};
     fct_env env = bench_env(2);
     fct_mesh m = {0};
     if (argc < 4 || argc > 5) bench_fail("usage: shapes NAME COUNT [IN] OUT");

@@ -1,9 +1,9 @@
-/* bench/cluster/tree.c: builds our tree of one mesh and tells what it took and how good it is.
+/* bench/cluster/tree.c: builds our tree of one mesh and prints its time, memory and quality.
  *
  * usage: tree MESH METHOD THREADS [K]
- * METHOD is rounds or greedy. With K, the partition into K clusters is judged, refined on one thread and
- * judged again, and boxes are added up, outside of every measured time and size of the build. Memory is that
- * of the build above what the loaded mesh takes; peak_bytes is the whole process with its mesh.
+ * METHOD is rounds or greedy. With K, the program judges the partition into K clusters, refines it on one
+ * thread and judges it again, and sums the box areas; the time and memory of the build do not include that.
+ * grown_bytes is the memory of the build above the loaded mesh; peak_bytes is the whole process.
  */
 #include <math.h>
 #include <stdio.h>
@@ -35,15 +35,6 @@ static fct_tree *build(const fct_mesh *mesh, const fct_env *env, const char *met
     return tree;
 }
 
-/* Labels of the partition into `count` clusters. Returns their number. */
-static uint32_t label_cut(const fct_env *env, const fct_tree *tree, uint32_t count, uint32_t *labels) {
-    uint32_t *nodes = bench_allocate(count, sizeof *nodes), found;
-    bench_check(fct_tree_partition(env, tree, count, nodes, &found), "the partition");
-    bench_check(fct_tree_labels(env, tree, nodes, found, labels), "the labels");
-    free(nodes);
-    return found;
-}
-
 static void judge(const fct_mesh *mesh, const fct_tree *tree, uint32_t count) {
     fct_env env = bench_env(2);
     fct_tree_view view = fct_tree_get(tree);
@@ -58,18 +49,22 @@ static void judge(const fct_mesh *mesh, const fct_tree *tree, uint32_t count) {
     if (count > view.face_count) count = view.face_count;
     if (count < view.root_count) count = view.root_count;
     uint32_t *labels = bench_allocate(view.face_count, sizeof *labels);
-    uint32_t found = label_cut(&env, tree, count, labels);
+    uint32_t *nodes = bench_allocate(count, sizeof *nodes), found;
+    bench_check(fct_tree_partition(&env, tree, count, nodes, &found), "the partition");
+    bench_check(fct_tree_labels(&env, tree, nodes, found, labels), "the labels");
     bench_quality q = bench_judge(&env, mesh, labels, found);
     printf(
         ", \"clusters\": %u, \"deviation\": %.6g, \"fit\": %.6g, \"irregularity\": %.6g, \"box_area\": %.6g",
         q.clusters, q.deviation, q.fit, q.irregularity, area / (diagonal * diagonal));
     fct_env alone = bench_env(1);
     double start = bench_seconds();
-    bench_check(fct_partition_refine(&alone, mesh, found, NULL, labels, NULL), "the refinement");
+    bench_check(fct_tree_refine(&alone, tree, nodes, found, NULL, labels, NULL), "the refinement");
     double seconds = bench_seconds() - start;
     q = bench_judge(&env, mesh, labels, found);
-    printf(", \"refine_seconds\": %.6g, \"refined_deviation\": %.6g, \"refined_irregularity\": %.6g", seconds,
-           q.deviation, q.irregularity);
+    printf(", \"refine_seconds\": %.6g, \"refined_deviation\": %.6g, \"refined_fit\": %.6g, "
+           "\"refined_irregularity\": %.6g",
+           seconds, q.deviation, q.fit, q.irregularity);
+    free(nodes);
     free(labels);
 }
 
