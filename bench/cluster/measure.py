@@ -141,6 +141,7 @@ class Bench:
                         row = {"mesh": mesh, "faces": self.faces(mesh), "builder": builder}
                         row.update(self.judge_cut(builder, mesh, count), clusters=count)
                         writer.writerow(row)
+                file.flush()
                 print("  {:<20}{:>11} faces".format(mesh, self.faces(mesh)), flush=True)
 
     def judge_cut(self, builder, mesh, count):
