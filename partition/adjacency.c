@@ -1,8 +1,10 @@
 /* partition/adjacency.c: pairs of labels that share mesh edges.
  *
- * The chain of sides of every mesh edge is walked once from its head; links between faces of different labels
- * are listed, sorted by pair of labels, and summed. Shares of an edge with three faces or more are those of
- * the dual graph. O(F + B log B) for B links across borders, parallel, the same for every thread count.
+ * 1. Walk the chain of sides of every mesh edge once, from its first side.
+ * 2. List a link for each pair of successive faces with different labels. A chain of k >= 3 faces gives each
+ *    link half the length, as in the dual graph.
+ * 3. Sort the links by pair and sum them.
+ * O(F + B log B) for B links, parallel, the same result for every thread count.
  */
 #include "partition/adjacency.h"
 
@@ -14,23 +16,25 @@
 
 enum { GRAIN = 1 << 15 };
 
+/* A border between two labels on one mesh edge. */
 typedef struct link {
     double length;
-    uint32_t head; /* first side on the mesh edge: its name */
+    uint32_t head; /* first side of the mesh edge, which identifies it */
 } link;
 
 typedef struct lister {
     const fct_mesh *mesh;
     const fct_sides *sides;
     const uint32_t *labels;
-    uint32_t *places; /* per chunk: links, then the place of its first */
+    uint32_t *places; /* per chunk: number of links, then index of the first */
     uint64_t *keys;
     uint32_t *order;
     link *links;
 } lister;
 
-/* The last side of the run of sides of one face that begins at `side`, and their number. */
-static uint32_t run_last(const fct_sides *sides, uint32_t side, uint32_t *length) {
+/* The last of the successive sides of one face that begin at `side`, and their number. A face that uses a
+ * vertex twice can have several sides on one edge. */
+static uint32_t find_run_end(const fct_sides *sides, uint32_t side, uint32_t *length) {
     *length = 1;
     while (sides->after[side] != FCT_NONE && sides->after[side] / 3 == side / 3) {
         side = sides->after[side];
@@ -39,7 +43,7 @@ static uint32_t run_last(const fct_sides *sides, uint32_t side, uint32_t *length
     return side;
 }
 
-static double side_length(const fct_mesh *mesh, uint32_t side) {
+static double measure_side(const fct_mesh *mesh, uint32_t side) {
     uint32_t face = side / 3, corner = side % 3;
     const uint32_t *t = mesh->triangles + 3 * (size_t)face;
     v3 p = v3_load(mesh->positions + 3 * (size_t)t[corner]),
@@ -47,12 +51,14 @@ static double side_length(const fct_mesh *mesh, uint32_t side) {
     return v3_norm(v3_sub(q, p));
 }
 
-/* The links across borders of the mesh edge with this head, from place on; keys NULL: only counted. */
+/* Lists the links of the mesh edge with this head from index `place` on; only counts them while keys is NULL.
+ */
 static uint32_t list_edge(const lister *l, uint32_t head, uint32_t place) {
-    uint32_t runs, last = run_last(l->sides, head, &runs), count = 0;
+    uint32_t runs, last = find_run_end(l->sides, head, &runs), count = 0;
     bool first = true;
     while (l->sides->after[last] != FCT_NONE) {
-        uint32_t side = l->sides->after[last], next_runs, next_last = run_last(l->sides, side, &next_runs);
+        uint32_t side = l->sides->after[last], next_runs,
+                 next_last = find_run_end(l->sides, side, &next_runs);
         uint32_t a = l->labels[last / 3], b = l->labels[side / 3];
         if (a != b) {
             if (l->keys) {
@@ -60,7 +66,7 @@ static uint32_t list_edge(const lister *l, uint32_t head, uint32_t place) {
                                     next_runs / (l->sides->after[next_last] == FCT_NONE ? 1.0 : 2.0));
                 l->keys[place + count] = fct_pair_key(a, b);
                 l->order[place + count] = place + count;
-                l->links[place + count] = (link){share * side_length(l->mesh, head), head};
+                l->links[place + count] = (link){share * measure_side(l->mesh, head), head};
             }
             ++count;
         }
@@ -86,7 +92,7 @@ static void list_links(void *user, size_t begin, size_t end, size_t chunk, uint3
         if (l->sides->before[i] == FCT_NONE) place += list_edge(l, (uint32_t)i, place);
 }
 
-/* Sums the links of each pair. A mesh edge that joins the same two labels more than once counts once. */
+/* Sums the links of each pair. A mesh edge with several links of one pair counts once in `edges`. */
 static fct_result sum_links(const fct_env *env, const lister *l, uint32_t link_count, fct_adjacency *out) {
     uint32_t pairs = 0;
     for (uint32_t i = 0; i < link_count; ++i) pairs += i == 0 || l->keys[i] != l->keys[i - 1];
@@ -138,7 +144,7 @@ fct_result fct_adjacency_pairs(const fct_env *env, const fct_mesh *mesh, const f
     return result;
 }
 
-/* Pairs are sorted, so the lower neighbours of a label come before its higher ones, each in order. */
+/* Fills the rows of neighbours. They come out ascending, because the pairs are sorted. */
 static fct_result list_neighbours(const fct_env *env, uint32_t label_count, fct_adjacency *out) {
     size_t ends = 2 * (size_t)out->pair_count;
     out->label_count = label_count;

@@ -1,8 +1,9 @@
-/* partition/cut.c: cuts from the top down, and the cut by the largest distance to the planes.
+/* partition/cut.c: cuts from the roots down, and the cut by distance to the planes.
  *
- * First the frontier is opened level by level, its tests in parallel, until it is wide; then threads take its
- * subtrees, each with a stack inside the subtree's own range of the output, which no cut of it can outgrow.
- * Kept nodes are gathered in order of places at the end: the same for every thread count.
+ * 1. Open the frontier level by level, with tests in parallel, until it is wide.
+ * 2. Threads take the subtrees of the frontier. Each works inside the subtree's own range of the output,
+ * which no cut of the subtree can outgrow.
+ * 3. Gather the kept nodes in order of places. The result does not depend on the threads.
  */
 #include "partition/cut.h"
 
@@ -12,16 +13,16 @@
 #include "base/parallel.h"
 #include "facetree/partition.h"
 
-enum { WIDE = 1 << 10, GRAIN = 1 << 12 };
+enum { WIDE = 1 << 10 /* nodes in a wide frontier */, GRAIN = 1 << 12 };
 
 typedef struct cutter {
     const fct_tree *tree;
     fct_cut_test *test;
     void *user;
-    uint32_t *nodes;    /* a place each; FCT_NONE where nothing is kept */
-    uint32_t *frontier; /* nodes yet to be tested, in order of places */
+    uint32_t *nodes;    /* per place: the kept node that begins there, or FCT_NONE */
+    uint32_t *frontier; /* untested nodes in order of places */
     uint32_t count;
-    bool *kept; /* of the frontier */
+    bool *kept; /* per node of the frontier */
 } cutter;
 
 static void test_frontier(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -31,7 +32,7 @@ static void test_frontier(void *user, size_t begin, size_t end, size_t chunk, ui
         c->kept[i] = fct_node_is_leaf(c->tree, c->frontier[i]) || c->test(c->user, c->frontier[i], thread);
 }
 
-/* Opens the frontier until it is wide or empty. `next` holds twice WIDE. */
+/* Opens the frontier until it is wide or empty. `next` has room for 2 WIDE nodes. */
 static void widen_frontier(const fct_env *env, cutter *c, uint32_t *next) {
     while (c->count > 0 && c->count < WIDE) {
         uint32_t count = 0;
@@ -50,8 +51,8 @@ static void widen_frontier(const fct_env *env, cutter *c, uint32_t *next) {
     }
 }
 
-/* Depth first. What is kept and what is on the stack are disjoint, so both fit into the subtree's range, one
- * from its front and one from its end. */
+/* Depth first. Kept nodes fill the subtree's range from the front and the stack fills it from the end. They
+ * are disjoint clusters, so they never meet. */
 static void cut_subtrees(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk;
     cutter *c = user;
@@ -111,7 +112,7 @@ static double box_distance(const fct_cluster *c) {
     return reach + 1e-6 * halves + 1e-14 * size;
 }
 
-/* The largest distance of a vertex, or the first one found that is above `enough`. */
+/* The largest distance of a vertex, or the first one above `enough`. */
 static double vertex_distance(const fct_tree_view *view, const fct_cluster *c, double enough) {
     v3 normal = v3_load(c->plane);
     double largest = 0, offset = (double)c->plane[3];
@@ -129,7 +130,7 @@ typedef struct distance_cut {
     double *largest; /* per chunk */
 } distance_cut;
 
-static bool near_plane(void *user, uint32_t node, uint32_t thread) {
+static bool is_near_plane(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
     const distance_cut *cut = user;
     fct_cluster room;
@@ -157,7 +158,7 @@ fct_result fct_tree_cut_at_distance(const fct_env *env, const fct_tree *tree, do
         return fct_fail(env, FCT_ERROR_DATA, "expected a distance of at least 0, found %g", max_distance);
     distance_cut cut = {.tree = tree, .max_distance = max_distance, .nodes = nodes};
     fct_result result = fct_tree_check(env, tree);
-    if (result == FCT_OK) result = fct_cut_tree(env, tree, "cut", near_plane, &cut, nodes, count);
+    if (result == FCT_OK) result = fct_cut_tree(env, tree, "cut", is_near_plane, &cut, nodes, count);
     if (result != FCT_OK || !largest) return result;
     size_t chunks = fct_chunk_count(*count, GRAIN);
     cut.largest = fct_allocate(env, chunks, sizeof *cut.largest);

@@ -1,10 +1,11 @@
-/* partition/quality.c: how good a partition is, measured from the triangles alone.
+/* partition/quality.c: measures of a partition, from the triangles alone.
  *
- * A cluster is a range of a list of faces: for nodes of a tree the places themselves, for labels a counting
- * sort of the faces. Sums are in double per cluster; borders and connectedness come from the dual graph. Area
- * weights; a cluster without area weighs nothing. Boxes are the tree's, or for labels along the principal
- * axes of the surface, turned about the normal to the best of eight angles. O(F log F), parallel over
- * clusters.
+ * A piece is a range of a list of faces: for nodes of a tree the places themselves, for labels a counting
+ * sort of the faces. Sums are in double. The least-squares plane (8.1) has the eigenvector of the covariance
+ * (8.5), here the surface integral; E_dir (8.12) follows from the sums of (8.14) and (8.15); borders and
+ * connectedness come from the dual graph. Means weigh pieces by area. Boxes are those of the tree, or for
+ * labels along the principal axes of the surface, turned about the normal to the best of TURNS angles. O(F
+ * log F), parallel over pieces.
  */
 #include <float.h>
 #include <string.h>
@@ -15,6 +16,7 @@
 #include "base/union_find.h"
 #include "cluster/tree/node.h"
 #include "facetree/dual.h"
+#include "facetree/partition.h"
 #include "partition/labels.h"
 
 enum { TURNS = 8 };
@@ -22,20 +24,20 @@ static const double pi = 3.14159265358979323846;
 
 typedef struct piece {
     uint32_t first, count;                            /* range of the list */
-    double area, fit, direction, deviation, box_area; /* fit, direction, deviation times area */
+    double area, fit, direction, deviation, box_area; /* fit, direction and deviation are times area */
     double perimeter;
 } piece;
 
 typedef struct judge {
     const fct_mesh *mesh;
-    const fct_tree *tree;   /* NULL where boxes are to be fitted */
+    const fct_tree *tree;   /* NULL: boxes are fitted */
     const uint32_t *nodes;  /* of the tree */
-    const uint32_t *labels; /* by face of the mesh */
-    uint32_t *faces;        /* the list; NULL: face i at place i */
-    uint32_t *parents;      /* union-find over faces */
+    const uint32_t *labels; /* per face of the mesh */
+    uint32_t *faces;        /* the list; NULL: face i is entry i */
+    uint32_t *parents;      /* disjoint sets of faces */
     piece *pieces;
     uint32_t count;
-    float *planes; /* count x 4, where they are asked for */
+    float *planes; /* count x 4, or NULL */
 } judge;
 
 static void load_triangle(const judge *j, size_t place, v3 origin, v3 p[3]) {
@@ -44,12 +46,13 @@ static void load_triangle(const judge *j, size_t place, v3 origin, v3 p[3]) {
         p[k] = v3_sub(v3_load(j->mesh->positions + 3 * (size_t)j->mesh->triangles[3 * face + k]), origin);
 }
 
-static v3 area_vector(const v3 p[3]) {
+static v3 find_area_vector(const v3 p[3]) {
     return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 0.5);
 }
 
-/* Sums over the surface of a piece; covariance about the centroid, which is returned (the first corner of a
- * piece without area). */
+/* Sums over the surface of a piece: area, S, moment M (D of (8.14), by area) and the covariance about the
+ * centroid. Returns the centroid, or the first corner of a piece without area. The covariance of a triangle
+ * is area / 12 times the sum of p p^T over its corners and their sum. */
 static v3 sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], double moment[6]) {
     const size_t first = out->first, end = first + out->count;
     v3 origin = {0, 0, 0}, center = {0, 0, 0}, p[3];
@@ -57,7 +60,7 @@ static v3 sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], d
     origin = p[0];
     for (size_t place = first; place < end; ++place) {
         load_triangle(j, place, origin, p);
-        v3 a = area_vector(p);
+        v3 a = find_area_vector(p);
         double area = v3_norm(a);
         if (!(area > 0)) continue;
         out->area += area;
@@ -69,15 +72,15 @@ static v3 sum_surface(const judge *j, piece *out, v3 *s, double covariance[6], d
     origin = v3_mad(origin, 1 / out->area, center);
     for (size_t place = first; place < end; ++place) {
         load_triangle(j, place, origin, p);
-        double area = v3_norm(area_vector(p));
+        double area = v3_norm(find_area_vector(p));
         for (int k = 0; k < 3; ++k) sym3_add_outer(covariance, area / 12, p[k]);
         sym3_add_outer(covariance, area / 12, v3_add(v3_add(p[0], p[1]), p[2]));
     }
     return origin;
 }
 
-/* The least-squares plane of a piece's surface, its normal along S. */
-static void judge_plane(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+/* Least-squares planes of pieces, n.S >= 0. */
+static void judge_planes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const judge *j = user;
     for (size_t i = begin; i < end; ++i) {
@@ -94,7 +97,7 @@ static void judge_plane(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* The least surface area of a box about the piece with one axis along axes[0]. */
+/* The least surface area of a box around the piece with one axis along axes[0]. */
 static double fit_box(const judge *j, const piece *range, const v3 axes[3]) {
     double low[2 * TURNS + 1], high[2 * TURNS + 1], best = INFINITY;
     v3 along[2 * TURNS + 1], p[3];
@@ -147,7 +150,7 @@ static void judge_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) judge_piece(user, (uint32_t)i);
 }
 
-/* Borders of the clusters, and whether the faces of each hang together. */
+/* Sums the perimeters of the pieces. Returns whether edges connect the faces of each piece. */
 static bool walk_dual(const judge *j, const fct_dual *dual) {
     uint32_t joined = 0, filled = 0;
     for (uint32_t i = 0; i < j->count; ++i) filled += j->pieces[i].count > 0;
@@ -175,7 +178,7 @@ static double squared_diagonal(const fct_mesh *mesh) {
     return squared > 0 ? squared : 1;
 }
 
-static fct_partition_quality mean_of(const judge *j, bool connected) {
+static fct_partition_quality average_pieces(const judge *j, bool connected) {
     double area = 0, unit = squared_diagonal(j->mesh);
     fct_partition_quality q = {.connected = connected};
     for (uint32_t i = 0; i < j->count; ++i) {
@@ -190,13 +193,13 @@ static fct_partition_quality mean_of(const judge *j, bool connected) {
     if (!(area > 0)) return (fct_partition_quality){.box_area = q.box_area, .connected = connected};
     q.mean_fit /= area;
     q.mean_direction /= area;
-    q.mean_irregularity /= area; /* area times perimeter^2 / (4 pi area) */
+    q.mean_irregularity /= area; /* (8.16) times area is perimeter^2 / (4 pi) */
     q.mean_normal_deviation /= area;
     return q;
 }
 
-/* The judge is complete but for parents. */
-static fct_result measure(const fct_env *env, judge *j, fct_partition_quality *out) {
+/* Measures a judge that is complete except for parents. */
+static fct_result measure_pieces(const fct_env *env, judge *j, fct_partition_quality *out) {
     fct_dual dual = {0};
     j->parents = fct_allocate(env, j->mesh->face_count, sizeof *j->parents);
     fct_result result;
@@ -206,7 +209,7 @@ static fct_result measure(const fct_env *env, judge *j, fct_partition_quality *o
         result = fct_dual_build(env, j->mesh, &dual);
     if (result == FCT_OK) {
         fct_parallel_for(env, j->count, 64, judge_chunk, j);
-        *out = mean_of(j, walk_dual(j, &dual));
+        *out = average_pieces(j, walk_dual(j, &dual));
     }
     fct_dual_release(env, &dual);
     fct_release(env, j->parents);
@@ -234,23 +237,13 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
             for (uint32_t place = p->first; place < p->first + p->count; ++place) labels[place] = i;
         }
         j.labels = labels;
-        result = measure(env, &j, out);
+        result = measure_pieces(env, &j, out);
     }
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 
-fct_result fct_labels_check(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
-                            uint32_t count) {
-    fct_result result = fct_mesh_validate(env, mesh);
-    for (uint32_t f = 0; result == FCT_OK && f < mesh->face_count; ++f)
-        if (labels[f] >= count)
-            result = fct_fail(env, FCT_ERROR_DATA, "face %u: label %u is out of range, of %u clusters", f,
-                              labels[f], count);
-    return result;
-}
-
-/* Groups the faces by label. The judge has mesh, labels and count. Errors: MEMORY. */
+/* Groups the faces of a judge that has mesh, labels and count. Errors: MEMORY. */
 static fct_result group_faces(const fct_env *env, judge *j) {
     const fct_array arrays[] = {FCT_ARRAY(j->faces, j->mesh->face_count),
                                 FCT_ARRAY_ZERO(j->pieces, j->count)};
@@ -276,7 +269,7 @@ fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const ui
     if (result != FCT_OK) return result;
     judge j = {.mesh = mesh, .labels = labels, .count = count};
     result = group_faces(env, &j);
-    if (result == FCT_OK) result = measure(env, &j, out);
+    if (result == FCT_OK) result = measure_pieces(env, &j, out);
     fct_release(env, j.faces);
     fct_release(env, j.pieces);
     return result;
@@ -288,7 +281,7 @@ fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, const uin
     if (result != FCT_OK) return result;
     judge j = {.mesh = mesh, .labels = labels, .count = count, .planes = planes};
     result = group_faces(env, &j);
-    if (result == FCT_OK) fct_parallel_for(env, count, 64, judge_plane, &j);
+    if (result == FCT_OK) fct_parallel_for(env, count, 64, judge_planes, &j);
     fct_release(env, j.faces);
     fct_release(env, j.pieces);
     return result;

@@ -1,13 +1,15 @@
-/* partition/refine.c: what lies on the borders of a partition changes sides.
+/* partition/refine.c: moves units across the borders of a partition.
  *
- * Energy: 2 sum (A_c - |S_c|), the squared deviation of unit normals from their cluster's mean (L2,1), plus
- * a weight times sum P_c^2 / (4 pi), which is area times irregularity; the weight is in units of the ratio of
- * the two at the start, so it is the same for every scale, mesh and number of clusters.
- * Units that move are faces and, before them, the clusters of finer cuts of the tree: a border of fine faces
- * would have to get longer before it could come to a better place. A sweep moves each unit at most once, the
- * largest gain first (an indexed heap); gains are taken anew when a unit's turn comes. A unit leaves only
- * where a search finds its neighbours of the cluster still connected without it, nearly always around one of
- * its corners; a search that has looked at SEARCH borders refuses. O(F) and O(B log B) a sweep, B on borders.
+ * Energy: E = 2 sum (A_c - |S_c|) + w sum P_c^2 over the clusters c. The first sum is the squared deviation
+ * of unit normals from the mean normal of their cluster (L2,1); P_c^2 / (4 pi) is area times irregularity
+ * (8.16). w is perimeter_weight times the ratio of the two sums at the start, so it does not depend on scale,
+ * mesh or number of clusters.
+ *
+ * Units are the clusters of finer cuts of the tree and at last the faces, because a border of single faces
+ * would have to grow longer before it could reach a better place. A sweep moves each unit at most once,
+ * largest gain first, by an indexed heap; the gain is computed again when the unit's turn comes. A unit
+ * leaves only if its neighbours in the cluster stay connected without it. O(F) and O(B log B) per sweep, B
+ * units on borders.
  */
 #include <math.h>
 #include <string.h>
@@ -15,13 +17,16 @@
 #include "base/heap.h"
 #include "base/key.h"
 #include "cluster/tree/node.h"
+#include "facetree/partition.h"
 #include "partition/labels.h"
 #include "partition/units.h"
 
-/* Borders that a search may look at; other clusters that a unit may choose from (a face has six at most); the
- * most neighbours of a unit that is looked at again when one of them moves; the first cut is into COARSEST
- * units a cluster, and each finer one into as many a unit. */
-enum { SEARCH = 2048, SIDES = 16, WIDE = 256, COARSEST = 4 };
+enum {
+    SEARCH = 2048, /* borders that a search for connections may visit; a longer search refuses the move */
+    SIDES = 16,    /* clusters that a unit may choose from; a face has at most six */
+    WIDE = 256,    /* a unit with more neighbours is not priced again when one of them moves */
+    COARSEST = 4   /* units per cluster in the first cut; each finer cut has as many units per unit */
+};
 
 typedef struct region {
     v3 vector; /* S */
@@ -29,21 +34,21 @@ typedef struct region {
     uint32_t count; /* units */
 } region;
 
-/* A unit's best change of side: gain is what the energy falls by, 0 where nothing is to be had. */
+/* The best move of a unit: `gain` is the decrease of the energy, 0 if no move decreases it. */
 typedef struct step {
-    double gain, squares; /* squares: growth of the sum of squared perimeters */
+    double gain, squares; /* squares: increase of the sum of squared perimeters */
     uint32_t to;
 } step;
 
-/* Arrays by unit have room for all faces. */
+/* Arrays per unit have room for all faces. */
 typedef struct refiner {
     const fct_units *units;
     uint32_t *labels;
     region *regions;
     uint32_t region_count;
-    uint32_t *seen, *wanted, search; /* the search that saw or sought a unit last; the latest */
-    uint32_t *moved, sweep;          /* the sweep in which a unit moved last; the current one */
-    fct_heap heap;                   /* units that gain, the most first */
+    uint32_t *seen, *wanted, search; /* per unit: the last search that saw or wanted it; the current search */
+    uint32_t *moved, sweep;          /* per unit: the last sweep that moved it; the current sweep */
+    fct_heap heap;                   /* units that gain, largest gain first */
     double weight;                   /* of squared perimeters */
     double squares, most_squares;
     uint32_t queue[SEARCH + 1];
@@ -54,26 +59,26 @@ fct_refine_def fct_refine_def_default(void) {
         .size = sizeof(fct_refine_def), .sweep_count = 4, .perimeter_weight = 0.1, .irregularity_limit = 1};
 }
 
-/* |s + a| - |s|, without the digits that the difference loses. */
-static double growth(v3 s, v3 a) {
+/* |s + a| - |s|, without cancellation. */
+static double grow_length(v3 s, v3 a) {
     double length = v3_norm(v3_add(s, a)) + v3_norm(s);
     return length > 0 ? (2 * v3_dot(s, a) + v3_dot(a, a)) / length : 0;
 }
 
 /* (p + d)^2 - p^2 */
-static double square_growth(double p, double d) {
+static double grow_square(double p, double d) {
     return d * (2 * p + d);
 }
 
-/* Border of the unit with each cluster around it. */
+/* Borders of a unit with the clusters around it. */
 typedef struct fringe {
     uint32_t count, labels[SIDES];
     double lengths[SIDES];
-    bool open[SIDES]; /* a neighbour there is alike */
-    double own;       /* with its own cluster */
+    bool open[SIDES]; /* the unit may join: a neighbour there has its material */
+    double own;       /* border with its own cluster */
 } fringe;
 
-static void look_around(const refiner *r, uint32_t unit, fringe *out) {
+static void list_borders(const refiner *r, uint32_t unit, fringe *out) {
     const fct_units *units = r->units;
     out->count = 0, out->own = 0;
     for (uint32_t i = units->first[unit]; i < units->first[unit + 1]; ++i) {
@@ -93,24 +98,24 @@ static void look_around(const refiner *r, uint32_t unit, fringe *out) {
     }
 }
 
-/* Gains that are lost in the rounding of their parts are none: on even ground nothing moves for nothing. (The
- * lengths of borders are floats.) */
-static step best_step(const refiner *r, uint32_t unit) {
+/* Gains below the rounding of their terms count as 0, so that nothing moves on flat ground without a reason.
+ * Lengths of borders are floats. */
+static step find_best_step(const refiner *r, uint32_t unit) {
     step best = {0, 0, FCT_NONE};
     const region *from = &r->regions[r->labels[unit]];
     fringe around;
     if (from->count == 1) return best;
-    look_around(r, unit, &around);
+    list_borders(r, unit, &around);
     if (around.count == 0) return best;
     v3 a = fct_unit_vector(r->units, unit);
     double area = v3_norm(a), perimeter = fct_unit_perimeter(r->units, unit);
-    double leave = growth(from->vector, v3_scale(a, -1));
-    double left = square_growth(from->perimeter, 2 * around.own - perimeter);
+    double leave = grow_length(from->vector, v3_scale(a, -1));
+    double left = grow_square(from->perimeter, 2 * around.own - perimeter);
     for (uint32_t k = 0; k < around.count; ++k) {
         if (!around.open[k]) continue;
         const region *to = &r->regions[around.labels[k]];
-        double entered = square_growth(to->perimeter, perimeter - 2 * around.lengths[k]);
-        double gain = 2 * (leave + growth(to->vector, a)) - r->weight * (left + entered);
+        double entered = grow_square(to->perimeter, perimeter - 2 * around.lengths[k]);
+        double gain = 2 * (leave + grow_length(to->vector, a)) - r->weight * (left + entered);
         double rounding = 1e-12 * (area + fabs(leave)) + 1e-6 * r->weight * (fabs(left) + fabs(entered));
         if (!(gain > rounding) || gain < best.gain) continue;
         if (gain == best.gain && around.labels[k] > best.to) continue;
@@ -120,12 +125,12 @@ static step best_step(const refiner *r, uint32_t unit) {
     return best;
 }
 
-/* Whether the neighbours of the unit in its own cluster stay connected when it leaves: a search, breadth
- * first, from one of them through the cluster. */
+/* Whether the neighbours of the unit in its cluster stay connected without it: a breadth-first search from
+ * one of them through the cluster. */
 static bool may_leave(refiner *r, uint32_t unit) {
     const fct_units *units = r->units;
     uint32_t label = r->labels[unit], missing = 0, head = 0, tail = 0, looks = 0;
-    if (++r->search == 0) { /* all numbers are used up: start over */
+    if (++r->search == 0) { /* the numbers wrapped around */
         memset(r->seen, 0, (size_t)r->heap.capacity * sizeof *r->seen);
         memset(r->wanted, 0, (size_t)r->heap.capacity * sizeof *r->wanted);
         r->search = 1;
@@ -157,10 +162,10 @@ static bool may_leave(refiner *r, uint32_t unit) {
     return false;
 }
 
-static void move(refiner *r, uint32_t unit, const step *s) {
+static void move_unit(refiner *r, uint32_t unit, const step *s) {
     region *from = &r->regions[r->labels[unit]], *to = &r->regions[s->to];
     fringe around;
-    look_around(r, unit, &around);
+    list_borders(r, unit, &around);
     uint32_t k = 0;
     while (around.labels[k] != s->to) ++k;
     v3 a = fct_unit_vector(r->units, unit);
@@ -181,25 +186,25 @@ static uint64_t key_of(double gain) {
     return ~fct_double_bits(gain);
 }
 
-/* Returns how many units moved. */
-static uint64_t sweep(refiner *r) {
+/* One sweep. Returns the number of units that moved. */
+static uint64_t run_sweep(refiner *r) {
     const fct_units *units = r->units;
     uint64_t moves = 0;
     ++r->sweep;
     for (uint32_t i = 0; i < units->count; ++i) {
-        double gain = best_step(r, i).gain;
+        double gain = find_best_step(r, i).gain;
         if (gain > 0) fct_heap_append(&r->heap, i, key_of(gain));
     }
     fct_heap_order(&r->heap);
     for (uint32_t unit; (unit = fct_heap_pop(&r->heap)) != FCT_NONE;) {
-        step s = best_step(r, unit);
+        step s = find_best_step(r, unit);
         if (!(s.gain > 0) || !may_leave(r, unit)) continue;
-        move(r, unit, &s);
+        move_unit(r, unit, &s);
         ++moves;
         for (uint32_t i = units->first[unit]; i < units->first[unit + 1]; ++i) {
             uint32_t next = units->neighbours[i];
             if (r->moved[next] == r->sweep || units->first[next + 1] - units->first[next] > WIDE) continue;
-            double gain = best_step(r, next).gain;
+            double gain = find_best_step(r, next).gain;
             if (gain > 0)
                 fct_heap_set(&r->heap, next, key_of(gain));
             else
@@ -209,7 +214,7 @@ static uint64_t sweep(refiner *r) {
     return moves;
 }
 
-/* Sums of the clusters over their units; returns the deviation. */
+/* Sums the units of each cluster. Returns the deviation of normals. */
 static double sum_regions(refiner *r) {
     const fct_units *units = r->units;
     double deviation = 0;
@@ -233,17 +238,17 @@ static double sum_regions(refiner *r) {
     return deviation;
 }
 
-/* What the weight and the limit come to for this partition of the faces. */
+/* Sets weight and limit from the partition of the faces at the start. */
 static void set_weight(refiner *r, const fct_refine_def *def) {
     double area = 0, deviation = sum_regions(r);
     for (uint32_t f = 0; f < r->units->count; ++f) area += v3_norm(fct_unit_vector(r->units, f));
-    /* On flat ground all deviation is rounding, and borders may still be straightened. */
+    /* On flat ground the deviation is rounding alone. The lower bound still lets borders become straight. */
     deviation = fmax(deviation, 1e-6 * area);
     r->weight = r->squares > 0 ? def->perimeter_weight * deviation / r->squares : 0;
     r->most_squares = isinf(def->irregularity_limit) ? INFINITY : r->squares * def->irregularity_limit;
 }
 
-static void release(const fct_env *env, refiner *r) {
+static void release_refiner(const fct_env *env, refiner *r) {
     if (!r) return;
     fct_heap_release(env, &r->heap);
     fct_release(env, r->labels);
@@ -254,8 +259,8 @@ static void release(const fct_env *env, refiner *r) {
     fct_release(env, r);
 }
 
-/* Labels are not set yet. */
-static refiner *create(const fct_env *env, const fct_units *faces, uint32_t count) {
+/* Labels stay unset. */
+static refiner *create_refiner(const fct_env *env, const fct_units *faces, uint32_t count) {
     refiner *r = fct_allocate_zero(env, 1, sizeof *r);
     if (!r) {
         fct_fail_memory(env, "refining a partition");
@@ -270,11 +275,11 @@ static refiner *create(const fct_env *env, const fct_units *faces, uint32_t coun
     if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "refining a partition") == FCT_OK &&
         fct_heap_create(env, faces->count, &r->heap) == FCT_OK)
         return r;
-    release(env, r);
+    release_refiner(env, r);
     return NULL;
 }
 
-/* Sweeps over the units. [from, to) is its part of the progress. */
+/* Sweeps over the units until no unit moves. [from, to) is its part of the progress. */
 static fct_result run_sweeps(const fct_env *env, refiner *r, const fct_units *units,
                              const fct_refine_def *def, double from, double to, fct_refine_stats *stats) {
     r->units = units;
@@ -282,7 +287,7 @@ static fct_result run_sweeps(const fct_env *env, refiner *r, const fct_units *un
     for (uint32_t i = 0; i < def->sweep_count; ++i) {
         fct_result result = fct_progress(env, "refine", from + (to - from) * i / def->sweep_count);
         if (result != FCT_OK) return result;
-        uint64_t moves = sweep(r);
+        uint64_t moves = run_sweep(r);
         ++stats->sweeps;
         stats->moves += moves;
         if (moves == 0) break;
@@ -314,7 +319,7 @@ fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32
     if (result == FCT_OK) result = fct_labels_check(env, mesh, labels, count);
     if (result == FCT_OK && mesh->face_count > 0) result = fct_units_of_faces(env, mesh, NULL, NULL, &faces);
     if (result != FCT_OK || mesh->face_count == 0) goto done;
-    r = create(env, &faces, count);
+    r = create_refiner(env, &faces, count);
     result = FCT_ERROR_MEMORY;
     if (!r) goto done;
     memcpy(r->labels, labels, (size_t)mesh->face_count * sizeof *labels);
@@ -324,15 +329,15 @@ fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32
     done.seconds_sweeps = fct_seconds() - start - done.seconds_dual;
     if (result == FCT_OK) memcpy(labels, r->labels, (size_t)mesh->face_count * sizeof *labels);
 done:
-    release(env, r);
+    release_refiner(env, r);
     fct_units_release(env, &faces);
     if (result == FCT_OK && stats) *stats = done;
     return result;
 }
 
-/* Numbers the units by place that opening the clusters' nodes below `open` makes. Children have larger ids
- * than their parents, so no node within a unit is opened; children of nodes above the clusters begin where a
- * cluster does. Returns how many there are. */
+/* Numbers the units by place: the parts of the clusters after all nodes below id `open` are opened. Children
+ * have larger ids than their parents, so no node inside a unit is opened; children of nodes above the
+ * clusters begin where a cluster begins. Returns the number of units. */
 static uint32_t number_units(const fct_tree *tree, const uint32_t *nodes, uint32_t count, uint32_t open,
                              uint32_t *unit_of) {
     const fct_tree_view *view = &tree->view;
@@ -348,8 +353,8 @@ static uint32_t number_units(const fct_tree *tree, const uint32_t *nodes, uint32
     return units;
 }
 
-/* One finer cut: its units start from the labels by place, and leave theirs there. r->labels holds those of
- * the units meanwhile. */
+/* Refines one finer cut. Its units take their labels from `labels`, which is by place, and write the new ones
+ * there. */
 static fct_result refine_cut(const fct_env *env, refiner *r, const fct_units *faces, const uint32_t *unit_of,
                              uint32_t unit_count, uint32_t *scratch, uint32_t *labels,
                              const fct_refine_def *def, double from, double to, fct_refine_stats *stats) {
@@ -363,8 +368,8 @@ static fct_result refine_cut(const fct_env *env, refiner *r, const fct_units *fa
     return result;
 }
 
-/* Cuts from COARSEST units a cluster on, then the faces. labels and scratch by place; scratch holds three
- * numbers a face. */
+/* Refines cuts from COARSEST units per cluster on, then the faces. labels is by place; scratch holds three
+ * numbers per face. */
 static fct_result refine_cuts(const fct_env *env, refiner *r, const fct_tree *tree, const fct_units *faces,
                               const uint32_t *nodes, uint32_t *labels, uint32_t *scratch,
                               const fct_refine_def *def, fct_refine_stats *stats) {
@@ -384,8 +389,7 @@ static fct_result refine_cuts(const fct_env *env, refiner *r, const fct_tree *tr
     return run_sweeps(env, r, faces, def, from, 1, stats);
 }
 
-/* The faces in the tree's order, connected as they are in the input's: as they were when the tree was built.
- */
+/* The faces in the tree's order, connected as in the input's order, which is how the tree was built. */
 static fct_result units_of_places(const fct_env *env, const fct_tree *tree, const fct_mesh *places,
                                   fct_units *out) {
     const fct_tree_view *view = &tree->view;
@@ -423,7 +427,7 @@ fct_result fct_tree_refine(const fct_env *env, const fct_tree *tree, const uint3
     if (result == FCT_OK) result = fct_tree_check(env, tree);
     if (result == FCT_OK) result = units_of_places(env, tree, &mesh, &faces);
     if (result != FCT_OK) return result;
-    r = create(env, &faces, count);
+    r = create_refiner(env, &faces, count);
     places = r ? fct_allocate(env, view->face_count, 4 * sizeof *places) : NULL;
     result = r && !places ? fct_fail_memory(env, "refining a partition") : FCT_ERROR_MEMORY;
     if (!places) goto done;
@@ -441,7 +445,7 @@ fct_result fct_tree_refine(const fct_env *env, const fct_tree *tree, const uint3
         for (uint32_t place = 0; place < view->face_count; ++place)
             labels[view->face_ids[place]] = r->labels[place];
 done:
-    release(env, r);
+    release_refiner(env, r);
     fct_release(env, places);
     fct_units_release(env, &faces);
     if (result == FCT_OK && stats) *stats = done;

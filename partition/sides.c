@@ -1,8 +1,8 @@
 /* partition/sides.c: the sides of all faces, sorted by vertex pair.
  *
- * One stable radix sort brings the sides of a mesh edge together in order of their ids; neighbours in that
- * order are linked. No hash table, and no list of a vertex is ever searched, so a hub of any valence costs no
- * more. O(F log F), parallel, 24 bytes a face in the end and 96 on the way.
+ * One stable radix sort brings the sides of each mesh edge together in order of their ids; neighbours in that
+ * order are linked. There is no list per vertex, so vertices of high valence cost no more. O(F log F),
+ * parallel; 24 bytes per face in the end and 96 during the sort.
  */
 #include "partition/sides.h"
 
@@ -14,7 +14,7 @@ enum { GRAIN = 1 << 15 };
 typedef struct builder {
     const uint32_t *triangles;
     unsigned bits; /* of a vertex id */
-    uint64_t none; /* key of a side from a vertex to itself: above all others */
+    uint64_t none; /* key of a side from a vertex to itself: the largest */
     size_t count;
     uint64_t *keys;
     uint32_t *order;

@@ -1,12 +1,12 @@
-/* partition/sides.h: which sides of triangles lie on the same mesh edge. Side 3 f + k of face f runs from its
- * corner k to its corner k + 1. */
-#ifndef FCT_CLUSTER_SIDES_H
-#define FCT_CLUSTER_SIDES_H
+/* partition/sides.h: the sides of triangles that lie on the same mesh edge. Side 3 f + k of face f runs from
+ * its corner k to its corner k + 1. */
+#ifndef FCT_PARTITION_SIDES_H
+#define FCT_PARTITION_SIDES_H
 
 #include "base/env.h"
 
-/* Per side, the one before and the one after it on its mesh edge in order of side ids; FCT_NONE at the ends.
- * A side from a vertex to itself lies on no edge. Two sides of one face may lie on one edge. */
+/* The sides of each mesh edge as a list in order of side ids; FCT_NONE at its ends. A side from a vertex to
+ * itself lies on no edge. Two sides of one face may lie on one edge. */
 typedef struct fct_sides {
     uint32_t *before, *after; /* face_count x 3 */
 } fct_sides;

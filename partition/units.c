@@ -1,7 +1,7 @@
 /* partition/units.c: graphs of faces and of runs of faces, see units.h.
  *
- * Rows of faces come from the dual graph's edges by counting, rows of runs from the rows of their faces with
- * one slot a unit that says where in the row it is. O(F), no sort.
+ * Rows of faces come from the dual graph's edges by counting. Rows of runs come from the rows of their faces,
+ * with one slot per unit that holds its index in the row. O(F), no sort.
  */
 #include "partition/units.h"
 
@@ -22,8 +22,8 @@ void fct_units_release(const fct_env *env, fct_units *units) {
     *units = (fct_units){0};
 }
 
-/* Turns counts into where rows begin. */
-static void sum_up(uint32_t *first, uint32_t count) {
+/* Turns the lengths of rows into their first indices. */
+static void sum_rows(uint32_t *first, uint32_t count) {
     uint32_t end = 0;
     for (uint32_t i = 0; i <= count; ++i) {
         uint32_t row = i < count ? first[i] : 0;
@@ -32,14 +32,14 @@ static void sum_up(uint32_t *first, uint32_t count) {
     }
 }
 
-/* Rows move up by one while they are filled: first[i + 1] is where row i is filled next, and ends where row
- * i + 1 begins. */
+/* While rows are filled, first[i + 1] is the next free entry of row i; it ends as the beginning of row i + 1.
+ */
 static void list_faces(fct_units *units) {
     const fct_dual *dual = &units->dual;
     uint32_t *next = units->first + 1;
     memset(units->first, 0, ((size_t)units->count + 2) * sizeof *units->first);
     for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) ++next[dual->edges[e]];
-    sum_up(next, units->count);
+    sum_rows(next, units->count);
     for (size_t e = 0; e < 2 * (size_t)dual->edge_count; ++e) {
         uint32_t place = next[dual->edges[e]]++;
         units->neighbours[place] = dual->edges[e ^ 1];
@@ -47,8 +47,8 @@ static void list_faces(fct_units *units) {
     }
 }
 
-/* Faces of the dual graph become numbers. */
-static fct_result renumber(const fct_env *env, const uint32_t *numbers, fct_dual *dual) {
+/* Renumbers the faces of the dual graph. */
+static fct_result renumber_dual(const fct_env *env, const uint32_t *numbers, fct_dual *dual) {
     float *perimeters = fct_allocate(env, dual->face_count, sizeof *perimeters);
     if (!perimeters) return fct_fail_memory(env, "refining a partition");
     for (uint32_t f = 0; f < dual->face_count; ++f) perimeters[numbers[f]] = dual->perimeters[f];
@@ -63,7 +63,7 @@ fct_result fct_units_of_faces(const fct_env *env, const fct_mesh *mesh, const ui
     *out = (fct_units){.count = mesh->face_count, .mesh = numbers ? numbered : mesh};
     out->of_faces = out->mesh->materials;
     fct_result result = fct_dual_build(env, mesh, &out->dual);
-    if (result == FCT_OK && numbers) result = renumber(env, numbers, &out->dual);
+    if (result == FCT_OK && numbers) result = renumber_dual(env, numbers, &out->dual);
     if (result != FCT_OK) goto failed;
     size_t ends = 2 * (size_t)out->dual.edge_count;
     if (ends > UINT32_MAX) {
@@ -85,7 +85,7 @@ failed:
     return result;
 }
 
-/* Sums over the faces of each unit, and the units that never move. */
+/* Sums over the faces of each unit; marks the units that never move. */
 static void sum_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *parents, uint32_t *pieces,
                      fct_units *out) {
     memset(out->vectors, 0, (size_t)out->count * sizeof *out->vectors);
@@ -110,7 +110,7 @@ static void sum_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *
         if (pieces[u] > 1) out->materials[u] = FCT_NONE;
 }
 
-/* Rows of the units; without arrays for them it only says where they begin. slots: a number a unit. */
+/* Fills the rows of the units; only finds their beginnings while there are no arrays. slots: one per unit. */
 static void list_runs(const fct_units *faces, const uint32_t *unit_of, uint32_t *slots, fct_units *out) {
     uint32_t end = 0, row = 0;
     for (uint32_t u = 0; u < out->count; ++u) slots[u] = FCT_NONE;

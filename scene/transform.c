@@ -10,6 +10,7 @@
 
 #include "base/env.h"
 #include "base/math/round.h"
+#include "facetree/partition.h"
 
 const float fct_transform_identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 

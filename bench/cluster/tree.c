@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "bench/cluster/bench.h"
-#include "facetree/cluster.h"
+#include "facetree/partition.h"
 
 typedef struct run {
     double seconds, cpu;

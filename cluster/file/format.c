@@ -1,5 +1,5 @@
-/* cluster/file/format.c: where everything lies in a hierarchy file, and its checksums. A section's checksum
- * is the hash of the hashes of its blocks of 1 MiB, so that it can be computed by all threads and bit by bit.
+/* cluster/file/format.c: places of sections, and checksums. The checksum of a section is the hash of the
+ * hashes of its blocks of 1 MiB, so that threads can share the work and a writer can hash block by block.
  */
 #include "cluster/file/format.h"
 
@@ -20,7 +20,7 @@ const char *fct_format_section_name(int section) {
     return names[section];
 }
 
-static uint64_t align(uint64_t offset) {
+static uint64_t align_offset(uint64_t offset) {
     return (offset + FCT_FORMAT_ALIGNMENT - 1) / FCT_FORMAT_ALIGNMENT * FCT_FORMAT_ALIGNMENT;
 }
 
@@ -39,11 +39,11 @@ void fct_format_place(fct_format_header *header) {
         [FCT_SECTION_MATERIALS] = header->flags & FCT_FORMAT_MATERIALS ? 4 * faces : 0};
     header->section_count = FCT_SECTION_COUNT;
     header->head_size = sizeof *header + header->source_size + header->names_size;
-    uint64_t offset = align(header->head_size);
+    uint64_t offset = align_offset(header->head_size);
     for (uint32_t i = 0; i < FCT_SECTION_COUNT; ++i) {
         header->sections[i].kind = i, header->sections[i].reserved = 0;
         header->sections[i].offset = offset, header->sections[i].size = sizes[i];
-        offset = align(offset + sizes[i]);
+        offset = align_offset(offset + sizes[i]);
     }
     header->file_size = offset;
 }

@@ -1,5 +1,5 @@
-/* cluster/file/format.h: the hierarchy file's header and sections as they lie in the file, version 2; byte by
- * byte in docs/hierarchy-file.md. Little endian; the structs are the layout. */
+/* cluster/file/format.h: header and section table of the hierarchy file, version 2. docs/hierarchy-file.md
+ * describes every byte. The structs are the layout; all numbers are little endian. */
 #ifndef FCT_CLUSTER_FORMAT_H
 #define FCT_CLUSTER_FORMAT_H
 
@@ -9,8 +9,8 @@ enum {
     FCT_FORMAT_VERSION = 2,
     FCT_FORMAT_ORDER_MARK = 0x01020304,
     FCT_FORMAT_ALIGNMENT = 64,
-    FCT_FORMAT_BLOCK = 1 << 20, /* bytes that are hashed together */
-    FCT_FORMAT_CUT = 2048       /* clusters of the cut, at most */
+    FCT_FORMAT_BLOCK = 1 << 20, /* bytes per hash */
+    FCT_FORMAT_CUT = 2048       /* largest number of clusters in the cut */
 };
 
 /* Flags. */
@@ -40,28 +40,28 @@ typedef struct fct_format_header {
 } fct_format_header;
 
 _Static_assert(sizeof(fct_format_header) == 512 && sizeof(fct_cluster) == 132,
-               "the file's layout is these structs'");
+               "the structs are the layout of the file");
 
 extern const unsigned char fct_format_magic[8];
 
-/* "nodes" and so on, for messages. */
+/* The name of a section for messages, such as "nodes". */
 const char *fct_format_section_name(int section);
 
-/* Kinds, offsets and sizes of the sections, the head's size and the file's, from the counts, the flags and
- * the sizes of source and names. Sums cannot overflow: counts are 32 bits; source and names are at most 2^62.
- */
+/* Computes kinds, offsets and sizes of the sections and the sizes of head and file, from the counts, the
+ * flags and the sizes of source and names. Sums cannot overflow: counts have 32 bits, source and names at
+ * most 2^62 bytes. */
 void fct_format_place(fct_format_header *header);
 
-/* Of the whole head, `size` bytes that begin with the header, its checksum taken for zero. */
+/* The checksum of the head: `size` bytes that begin with the header, whose own checksum counts as zero. */
 uint64_t fct_format_head_checksum(const void *head, size_t size);
 
 static inline size_t fct_format_block_count(uint64_t size) {
     return (size_t)((size + FCT_FORMAT_BLOCK - 1) / FCT_FORMAT_BLOCK);
 }
 
-/* Hashes of the blocks of `size` bytes that begin at a block's start, in parallel. */
+/* Hashes `size` bytes block by block, in parallel. */
 void fct_format_hash_blocks(const fct_env *env, const void *data, size_t size, uint64_t *hashes);
-/* The checksum of a section from those of its blocks. */
+/* The checksum of a section from the hashes of its blocks. */
 uint64_t fct_format_fold(const uint64_t *hashes, size_t count);
 
 #endif

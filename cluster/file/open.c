@@ -1,12 +1,17 @@
-/* cluster/file/open.c: opening a hierarchy file. O(1) but for the names of materials: the header and its
- * checksum, counts, and the places of the sections, which follow from the counts. What the sections hold is
- * looked at when it is used (walk.c, structure.c), their checksums by fct_tree_verify. */
+/* cluster/file/open.c: opening and verifying hierarchy files.
+ *
+ * Opening reads the head (header, source, names of materials): its checksum, the counts, and the places of
+ * the sections, which follow from the counts. Its time does not depend on the number of faces. Sections are
+ * checked when they are used (walk.c, structure.c), their checksums by fct_tree_verify.
+ */
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
 #include "cluster/file/format.h"
+#include "cluster/tree/check/verify.h"
 
-static const char *counts_fault(const fct_format_header *h) {
+static const char *find_counts_fault(const fct_format_header *h) {
     if (h->face_count == 0 || h->face_count >= INT32_MAX || h->vertex_count == 0 ||
         h->vertex_count >= INT32_MAX)
         return "bad counts";
@@ -26,13 +31,13 @@ static const char *counts_fault(const fct_format_header *h) {
     return NULL;
 }
 
-/* NULL, or what is wrong with the head of a file of `size` bytes at `data`, of which *h is the header. */
-static const char *head_fault(const fct_format_header *h, const void *data, size_t size) {
+/* What is wrong with the head of a file of `size` bytes at `data`, or NULL. *h is a copy of the header. */
+static const char *find_head_fault(const fct_format_header *h, const void *data, size_t size) {
     if (h->order_mark != FCT_FORMAT_ORDER_MARK) return "written with another byte order, or damaged";
     if (h->file_size != size) return "truncated, with something appended, or damaged";
     if (h->head_size < sizeof *h || h->head_size > size) return "damaged header";
     if (h->checksum != fct_format_head_checksum(data, h->head_size)) return "damaged header";
-    const char *fault = counts_fault(h);
+    const char *fault = find_counts_fault(h);
     if (fault) return fault;
     if (h->source_size > size || h->names_size > size) return "bad sizes of names";
     fct_format_header expected = *h;
@@ -41,7 +46,7 @@ static const char *head_fault(const fct_format_header *h, const void *data, size
     return memcmp(h, &expected, sizeof expected) ? "bad section table" : NULL;
 }
 
-/* The source and pointers to the names, whose section must hold exactly as many strings. */
+/* Sets the source and pointers to the names; the head must hold as many strings. */
 static fct_result read_names(const fct_env *env, const char *name, const fct_format_header *h,
                              fct_tree *tree) {
     const char *source = (const char *)tree->file.data + sizeof *h, *text = source + h->source_size;
@@ -65,7 +70,7 @@ static fct_result read_names(const fct_env *env, const char *name, const fct_for
     return FCT_OK;
 }
 
-static const void *section_data(const fct_tree *tree, const fct_format_header *h, fct_section section) {
+static const void *find_section(const fct_tree *tree, const fct_format_header *h, fct_section section) {
     return tree->file.data + h->sections[section].offset;
 }
 
@@ -78,14 +83,14 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
     view->component_count = h->component_count;
     view->bounds = h->bounds;
     view->material_count = h->material_count;
-    view->roots = section_data(tree, h, FCT_SECTION_ROOTS);
-    tree->nodes = section_data(tree, h, FCT_SECTION_NODES);
-    view->face_ids = section_data(tree, h, FCT_SECTION_FACE_IDS);
-    view->vertex_ids = section_data(tree, h, FCT_SECTION_VERTEX_IDS);
-    view->triangles = section_data(tree, h, FCT_SECTION_TRIANGLES);
-    view->positions = section_data(tree, h, FCT_SECTION_POSITIONS);
-    if (h->flags & FCT_FORMAT_COLORS) view->colors = section_data(tree, h, FCT_SECTION_COLORS);
-    if (h->flags & FCT_FORMAT_MATERIALS) view->materials = section_data(tree, h, FCT_SECTION_MATERIALS);
+    view->roots = find_section(tree, h, FCT_SECTION_ROOTS);
+    tree->nodes = find_section(tree, h, FCT_SECTION_NODES);
+    view->face_ids = find_section(tree, h, FCT_SECTION_FACE_IDS);
+    view->vertex_ids = find_section(tree, h, FCT_SECTION_VERTEX_IDS);
+    view->triangles = find_section(tree, h, FCT_SECTION_TRIANGLES);
+    view->positions = find_section(tree, h, FCT_SECTION_POSITIONS);
+    if (h->flags & FCT_FORMAT_COLORS) view->colors = find_section(tree, h, FCT_SECTION_COLORS);
+    if (h->flags & FCT_FORMAT_MATERIALS) view->materials = find_section(tree, h, FCT_SECTION_MATERIALS);
     view->source_hash = h->source_hash;
     view->def = (fct_tree_def){.size = sizeof(fct_tree_def),
                                .method = (fct_cluster_method)h->method,
@@ -97,8 +102,8 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
                                .root_count = h->wanted_roots,
                                .max_cost = h->max_cost,
                                .source_hash = h->source_hash};
-    tree->cut_ids = section_data(tree, h, FCT_SECTION_CUT_IDS);
-    tree->cut = section_data(tree, h, FCT_SECTION_CUT);
+    tree->cut_ids = find_section(tree, h, FCT_SECTION_CUT_IDS);
+    tree->cut = find_section(tree, h, FCT_SECTION_CUT);
     tree->cut_count = h->cut_count;
     atomic_init(&tree->unchecked, true);
 }
@@ -110,7 +115,7 @@ static fct_result keep_path(const fct_env *env, const char *name, fct_tree *tree
     return FCT_OK;
 }
 
-/* tree->file holds the bytes. */
+/* Reads the head of the bytes in tree->file. */
 static fct_result read_file(const fct_env *env, const char *name, fct_tree *tree) {
     const unsigned char *data = tree->file.data;
     size_t size = tree->file.size;
@@ -124,14 +129,14 @@ static fct_result read_file(const fct_env *env, const char *name, fct_tree *tree
                         "%s: version %u of the hierarchy file, expected %d: build it anew from its mesh",
                         name, h.version, FCT_FORMAT_VERSION);
     if (size < sizeof h) return fct_fail(env, FCT_ERROR_DATA, "%s: truncated in the header", name);
-    const char *fault = head_fault(&h, data, size);
+    const char *fault = find_head_fault(&h, data, size);
     if (fault) return fct_fail(env, FCT_ERROR_DATA, "%s: %s", name, fault);
     fill_view(&h, tree);
     fct_result result = read_names(env, name, &h, tree);
     return result == FCT_OK ? keep_path(env, name, tree) : result;
 }
 
-static fct_result finish(fct_tree *tree, fct_result result, fct_tree **out) {
+static fct_result finish_tree(fct_tree *tree, fct_result result, fct_tree **out) {
     if (result == FCT_OK)
         *out = tree;
     else
@@ -146,11 +151,11 @@ fct_result fct_tree_parse(const fct_env *env, const char *name, const void *data
     unsigned char *copy = fct_allocate(env, size, 1);
     if (!tree || !copy) {
         fct_release(env, copy);
-        return finish(tree, fct_fail_memory(env, "a hierarchy"), out);
+        return finish_tree(tree, fct_fail_memory(env, "a hierarchy"), out);
     }
     if (size) memcpy(copy, data, size);
     tree->file = (fct_file){.data = copy, .size = size};
-    return finish(tree, read_file(env, name, tree), out);
+    return finish_tree(tree, read_file(env, name, tree), out);
 }
 
 fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out) {
@@ -159,7 +164,7 @@ fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out) {
     if (!tree) return fct_fail_memory(env, "a hierarchy");
     fct_result result = fct_file_open(env, path, &tree->file);
     if (result == FCT_OK) result = read_file(env, path, tree);
-    return finish(tree, result, out);
+    return finish_tree(tree, result, out);
 }
 
 static fct_result check_gap(const fct_env *env, const fct_tree *tree, const char *after, uint64_t begin,
@@ -171,12 +176,13 @@ static fct_result check_gap(const fct_env *env, const fct_tree *tree, const char
     return FCT_OK;
 }
 
-fct_result fct_tree_check_sums(const fct_env *env, const fct_tree *tree) {
+/* The checksums of all sections and the zeros between them, if the tree came from a file. */
+static fct_result check_sums(const fct_env *env, const fct_tree *tree) {
     if (!tree->file.data) return FCT_OK;
     fct_format_header header;
     const fct_format_header *h = &header;
     memcpy(&header, tree->file.data, sizeof header);
-    if (head_fault(h, tree->file.data, tree->file.size))
+    if (find_head_fault(h, tree->file.data, tree->file.size))
         return fct_fail(env, FCT_ERROR_DATA, "%s: changed since it was opened", tree->path);
     uint64_t *hashes = fct_allocate(env, fct_format_block_count(h->file_size), sizeof *hashes);
     if (!hashes) return fct_fail_memory(env, "verifying");
@@ -195,4 +201,9 @@ fct_result fct_tree_check_sums(const fct_env *env, const fct_tree *tree) {
     }
     fct_release(env, hashes);
     return result;
+}
+
+fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree) {
+    fct_result result = check_sums(env, tree);
+    return result == FCT_OK ? fct_tree_verify_contents(env, tree) : result;
 }

@@ -1,8 +1,8 @@
-/* cluster/file/write.c: the hierarchy file written section by section, and fct_tree_save on top of that.
+/* cluster/file/write.c: writes the hierarchy file section by section; fct_tree_save.
  *
- * The sections' places follow from the counts, so that any of them can grow at any time; blocks are hashed as
- * they come. The cut, the table of checksums and the head come last, from what was written. Memory: the
- * hashes, 8 bytes a MiB, and half a megabyte for the cut.
+ * The places of the sections follow from the counts, so any section can grow at any time. Blocks are hashed
+ * as they come. The cut, the checksums and the head come last, from what was written. Memory: the hashes (8
+ * bytes per MiB) and half a megabyte for the cut.
  */
 #include <assert.h>
 #include <stdlib.h>
@@ -13,25 +13,26 @@
 
 #include "base/io/output.h"
 #include "cluster/file/format.h"
+#include "cluster/tree/describe/single.h"
 
 enum { PORTION = 64 * FCT_FORMAT_BLOCK };
 
-/* What has come of a section. */
-typedef struct progress_of {
+/* How much of a section is written. */
+typedef struct section_state {
     uint64_t written;
     uint64_t *hashes;
-    XXH3_state_t block; /* the block that is not complete */
-} progress_of;
+    XXH3_state_t block; /* of the incomplete block */
+} section_state;
 
 struct fct_tree_writer {
-    progress_of sections[FCT_SECTION_COUNT];
+    section_state sections[FCT_SECTION_COUNT];
     fct_format_header header;
     char *head; /* header, source and names */
     const fct_env *env;
     fct_output output;
 };
 
-static fct_format_header header_of(const fct_tree_view *view, unsigned arrays) {
+static fct_format_header make_header(const fct_tree_view *view, unsigned arrays) {
     const fct_tree_def *def = &view->def;
     fct_format_header h = {.version = FCT_FORMAT_VERSION,
                            .order_mark = FCT_FORMAT_ORDER_MARK,
@@ -67,7 +68,7 @@ static fct_result allocate(const fct_env *env, const fct_tree_view *view, fct_tr
     writer->head = fct_allocate_zero(env, h->head_size, 1);
     bool complete = writer->head != NULL;
     for (int i = 0; i < FCT_SECTION_COUNT; ++i) {
-        progress_of *s = &writer->sections[i];
+        section_state *s = &writer->sections[i];
         s->hashes = fct_allocate(env, fct_format_block_count(h->sections[i].size), sizeof *s->hashes);
         complete = complete && s->hashes;
     }
@@ -90,7 +91,7 @@ fct_result fct_tree_writer_open(const fct_env *env, const char *path, const fct_
     if (!writer) return fct_fail_memory(env, "writing a hierarchy file");
     writer->env = env;
     writer->output.descriptor = -1;
-    writer->header = header_of(view, arrays);
+    writer->header = make_header(view, arrays);
     fct_result result = allocate(env, view, writer);
     if (result == FCT_OK) result = fct_output_open(env, path, writer->header.file_size, &writer->output);
     if (result == FCT_OK)
@@ -109,8 +110,8 @@ void fct_tree_writer_abandon(fct_tree_writer *writer) {
     fct_release(env, writer);
 }
 
-/* Notes the next bytes of a section in its hashes: whole blocks at once, the rest bit by bit. */
-static void hash(const fct_env *env, progress_of *s, uint64_t whole, const char *data, size_t size) {
+/* Adds the next bytes of a section to its hashes: whole blocks in parallel, the rest piece by piece. */
+static void hash_bytes(const fct_env *env, section_state *s, uint64_t whole, const char *data, size_t size) {
     while (size > 0) {
         size_t inside = s->written % FCT_FORMAT_BLOCK, take = FCT_FORMAT_BLOCK - inside;
         uint64_t *to = s->hashes + s->written / FCT_FORMAT_BLOCK;
@@ -129,7 +130,7 @@ static void hash(const fct_env *env, progress_of *s, uint64_t whole, const char 
 }
 
 fct_result fct_tree_writer_put(fct_tree_writer *writer, fct_section section, const void *data, size_t size) {
-    progress_of *s = &writer->sections[section];
+    section_state *s = &writer->sections[section];
     const fct_format_section *place = &writer->header.sections[section];
     const char *from = data;
     assert(size <= place->size - s->written);
@@ -137,7 +138,7 @@ fct_result fct_tree_writer_put(fct_tree_writer *writer, fct_section section, con
         size_t take = size < PORTION ? size : PORTION;
         fct_result result = fct_output_write(&writer->output, place->offset + s->written, from, take);
         if (result != FCT_OK) return result;
-        hash(writer->env, s, place->size, from, take);
+        hash_bytes(writer->env, s, place->size, from, take);
         from += take, size -= take;
     }
     return FCT_OK;
@@ -151,7 +152,7 @@ static fct_result read_back(const fct_tree_writer *writer, fct_section section, 
                            (size_t)count * size);
 }
 
-static int ascending(const void *a, const void *b) {
+static int compare_ids(const void *a, const void *b) {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
 }
@@ -166,13 +167,13 @@ static fct_result describe_face(const fct_tree_writer *writer, uint32_t place, f
     if (result != FCT_OK) return result;
     const fct_tree_view view = {
         .face_count = 1, .vertex_count = 3, .positions = positions, .triangles = corners};
-    fct_cluster_describe_leaf(&view, 0, out);
+    fct_leaf_describe(&view, 0, out);
     out->first = place;
     return FCT_OK;
 }
 
-/* Nodes that are not opened when all below id `opened` are: roots and children. Returns how many, at most one
- * more than there is room for. */
+/* Lists the roots and children with ids from `opened` on, whose parents have smaller ids: the partition that
+ * opens all nodes below `opened`. Returns their number, at most room + 1. */
 static uint32_t list_cut(const fct_cluster *top, uint32_t opened, uint32_t *ids, uint32_t roots,
                          uint32_t room) {
     uint32_t count = 0;
@@ -192,7 +193,7 @@ static fct_result put_cut(fct_tree_writer *writer, fct_cluster *top, fct_cluster
     if (result != FCT_OK) return result;
     if (list_cut(top, opened, ids, h->root_count, count) != count)
         return fct_fail(writer->env, FCT_ERROR_INTERNAL, "the nodes of a hierarchy are not in order");
-    qsort(ids, count, sizeof *ids, ascending);
+    qsort(ids, count, sizeof *ids, compare_ids);
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i)
         result = ids[i] < h->node_count
                      ? read_back(writer, FCT_SECTION_NODES, ids[i], 1, sizeof *records, &records[i])
@@ -246,7 +247,7 @@ fct_result fct_tree_writer_finish(fct_tree_writer *writer, const fct_tree_view *
 
 /* --- A whole tree --- */
 
-/* Puts a section in pieces between which the run can be cancelled. */
+/* Writes a section in pieces, between which the caller can cancel. */
 static fct_result put_section(fct_tree_writer *writer, int section, const void *data) {
     const fct_format_section *place = &writer->header.sections[section];
     const char *from = data;

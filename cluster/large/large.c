@@ -5,6 +5,8 @@
 
 #include "cluster/large/large.h"
 
+#include "cluster/tree/build.h"
+
 /* Bytes, measured: for a face of a part from its loading to its boxes, with 80 for the MEAN cost's sums; for
  * a top; buffers of all kinds. */
 enum {

@@ -13,7 +13,9 @@
 
 #include "base/io/spool.h"
 #include "cluster/file/file.h"
-#include "cluster/tree/describe.h"
+#include "cluster/merge/work.h"
+#include "cluster/tree/describe/outline.h"
+#include "cluster/tree/describe/single.h"
 #include "mesh/stream.h"
 
 /* A cluster that its part leaves to the whole. */

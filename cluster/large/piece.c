@@ -16,7 +16,9 @@
 #include "cluster/large/large.h"
 #include "cluster/merge/greedy.h"
 #include "cluster/merge/rounds/rounds.h"
+#include "cluster/tree/describe/describe.h"
 #include "cluster/tree/node.h"
+#include "cluster/tree/order.h"
 
 typedef struct piece {
     fct_large *large;

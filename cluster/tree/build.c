@@ -1,5 +1,14 @@
-/* cluster/tree/build.c: fct_tree_build: dual graph, contraction, order, boxes. */
+/* cluster/tree/build.c: fct_tree_build.
+ *
+ * 1. Sort the mesh, if its faces or vertices are in no order (locality.c).
+ * 2. Build the dual graph and contract it (section 8.2; cluster/merge).
+ * 3. Number the nodes, place the faces, copy the mesh (order.c).
+ * 4. Describe every node (describe/).
+ */
+#include "cluster/tree/build.h"
+
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 #include "base/pool.h"
@@ -7,8 +16,11 @@
 #include "cluster/merge/greedy.h"
 #include "cluster/merge/join.h"
 #include "cluster/merge/rounds/rounds.h"
+#include "cluster/tree/check/edges.h"
+#include "cluster/tree/check/verify.h"
+#include "cluster/tree/describe/describe.h"
 #include "cluster/tree/locality.h"
-#include "cluster/tree/tree.h"
+#include "cluster/tree/order.h"
 
 fct_tree_def fct_tree_def_default(void) {
     return (fct_tree_def){.size = sizeof(fct_tree_def),
@@ -22,7 +34,7 @@ fct_tree_def fct_tree_def_default(void) {
                           .max_cost = INFINITY};
 }
 
-/* Along edges as far as heights allow, then with the reserve of height. */
+/* Contracts edges under the lower limit of height, then under the higher one (cluster/merge/work.h). */
 static fct_result contract_edges(fct_work *work, fct_cluster_method method, bool across) {
     work->steep = false;
     fct_result result =
@@ -31,7 +43,7 @@ static fct_result contract_edges(fct_work *work, fct_cluster_method method, bool
     return result == FCT_OK ? fct_work_greedy(work, across) : result;
 }
 
-static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_method method) {
+static fct_result contract_mesh(fct_work *work, const fct_mesh *mesh, fct_cluster_method method) {
     fct_result result = FCT_OK;
     if (mesh->materials) result = contract_edges(work, method, false);
     work->phase_ends[0] = work->merge_count;
@@ -40,20 +52,21 @@ static fct_result contract(fct_work *work, const fct_mesh *mesh, fct_cluster_met
     return result;
 }
 
-/* Contraction along edges, and once more by size where heights left neighbours apart: stars of a tall hub. */
+/* Contracts the mesh. If the limit of height leaves neighbours unmerged (a hub with thousands of spikes),
+ * starts again and merges by size. */
 static fct_result make_parts(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                              fct_work *work) {
-    fct_result result = contract(work, mesh, def->method);
+    fct_result result = contract_mesh(work, mesh, def->method);
     if (result != FCT_OK || work->stranded == 0) return result;
     fct_work_release(work);
     result = fct_work_create(env, mesh, def, work);
     if (result != FCT_OK) return result;
     work->balanced = true;
-    return contract(work, mesh, FCT_CLUSTER_GREEDY);
+    return contract_mesh(work, mesh, FCT_CLUSTER_GREEDY);
 }
 
-/* The options as used, with the default weights filled in. */
-static fct_tree_def used_def(const fct_tree_def *def, const fct_metric *metric) {
+/* The options with the default weights filled in. */
+static fct_tree_def resolve_def(const fct_tree_def *def, const fct_metric *metric) {
     fct_tree_def used = *def;
     used.fit_weight = metric->fit_weight;
     used.direction_weight = metric->direction_weight;
@@ -73,7 +86,8 @@ static fct_result copy_source(const fct_env *env, const fct_tree_def *def, fct_t
     return FCT_OK;
 }
 
-/* Of the mesh's edges; what contraction along them leaves over is a part each, unless heights forbade one. */
+/* Sets the counts of edges and components. The clusters that contraction along all edges leaves are the
+ * components; otherwise the edges are counted anew. */
 static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts, bool complete,
                               fct_tree *tree) {
     fct_edge_counts all = *counts;
@@ -83,8 +97,7 @@ static fct_result take_counts(const fct_env *env, const fct_edge_counts *counts,
     return result;
 }
 
-/* Everything up to the face order. `env` is for what goes with the tree, the work's own memory is the pool's.
- */
+/* Everything up to the face order. `env` allocates what the tree keeps, `pool` the rest. */
 static fct_result build_links(const fct_env *env, const fct_env *pool, const fct_mesh *mesh,
                               const fct_tree_def *def, double *dual, fct_tree *tree) {
     fct_work work;
@@ -99,7 +112,7 @@ static fct_result build_links(const fct_env *env, const fct_env *pool, const fct
     if (result == FCT_OK) result = fct_work_join(&work, mesh);
     work.phase_ends[2] = work.merge_count;
     if (result == FCT_OK) {
-        tree->view.def = used_def(def, &work.metric);
+        tree->view.def = resolve_def(def, &work.metric);
         result = fct_tree_order(&work, mesh, def, tree);
     }
     fct_work_release(&work);
@@ -109,10 +122,10 @@ static fct_result build_links(const fct_env *env, const fct_env *pool, const fct
     return result;
 }
 
-/* The nodes' memory, the largest part of a tree, serves the contraction first: memory that is touched for the
- * first time costs more than most of what is done in it. */
-static fct_result build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
-                        fct_tree_stats *stats, fct_tree *tree) {
+/* The contraction works in the memory that later holds the records, because touching new memory costs more
+ * than most of the work in it (docs/clustering.md). */
+static fct_result build_tree(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
+                             fct_tree_stats *stats, fct_tree *tree) {
     double start = fct_seconds(), dual = start;
     fct_pool pool;
     tree->clusters = fct_allocate(env, mesh->face_count, sizeof *tree->clusters);
@@ -152,9 +165,9 @@ fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tr
     if (result != FCT_OK) return result;
     fct_tree *tree = fct_tree_new(env);
     if (!tree) return fct_fail_memory(env, "the tree");
-    result = build(env, mesh, &options, stats, tree);
+    result = build_tree(env, mesh, &options, stats, tree);
 #ifndef NDEBUG
-    if (result == FCT_OK) result = fct_tree_verify(env, tree);
+    if (result == FCT_OK) result = fct_tree_verify_contents(env, tree);
     assert(result != FCT_ERROR_DATA);
 #endif
     if (result == FCT_OK)

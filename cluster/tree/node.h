@@ -10,6 +10,7 @@
 #ifndef FCT_CLUSTER_NODE_H
 #define FCT_CLUSTER_NODE_H
 
+#include "cluster/tree/describe/single.h"
 #include "cluster/tree/tree.h"
 
 static inline bool fct_node_is_leaf(const fct_tree *tree, uint32_t node) {
@@ -26,6 +27,11 @@ static inline uint32_t fct_node_faces(const fct_tree *tree, uint32_t node) {
     return fct_node_is_leaf(tree, node) ? 1 : tree->nodes[node].count;
 }
 
+/* The cost of the merge that made an inner node. */
+static inline double fct_node_cost(const fct_tree *tree, uint32_t node) {
+    return (double)tree->nodes[node].cost;
+}
+
 /* A child of an inner node; k is 0 or 1. */
 static inline uint32_t fct_node_child(const fct_tree *tree, uint32_t node, int k) {
     return tree->nodes[node].child[k];
@@ -34,7 +40,7 @@ static inline uint32_t fct_node_child(const fct_tree *tree, uint32_t node, int k
 /* The record of any node. `room` receives it where the tree does not store it (today: leaves). */
 static inline const fct_cluster *fct_node_cluster(const fct_tree *tree, uint32_t node, fct_cluster *room) {
     if (!fct_node_is_leaf(tree, node)) return &tree->nodes[node];
-    fct_cluster_describe_leaf(&tree->view, node - tree->view.node_count, room);
+    fct_leaf_describe(&tree->view, node - tree->view.node_count, room);
     return room;
 }
 

@@ -1,19 +1,22 @@
-/* cluster/tree/order.c: from merges in the order they were found to the tree's numbering.
+/* cluster/tree/order.c: from merges in the order they were found to the numbering of the tree.
  *
- * Each merge's cost becomes the running maximum over its subtree, and no less than that of any merge of an
- * earlier phase; a stable radix sort by it then keeps children before parents. Inner node M - 1 - i is the
- * merge of rank i. Ranges are handed down from the roots, which places the faces; vertices are numbered in
- * order of first use by the faces, so that a cluster's new vertices are one run. What goes up or down the
- * tree goes by merge, for those found together lie near each other; by node they would be anywhere. Links and
- * costs stay in arrays of their own: nodes are written once, when they are described.
+ * 1. Raise each cost to the maximum over its subtree and over all merges of earlier phases.
+ * 2. Sort the merges by cost with a stable radix sort, so children stay before parents. The merge of rank i
+ *    becomes inner node M - 1 - i.
+ * 3. Hand ranges down from the roots, which places the faces.
+ * 4. Number vertices in order of first use, so the vertices that a cluster is the first to use are one run.
+ * Passes up and down the tree go by merge and not by node, because merges that were found together lie near
+ * each other in memory. Links and costs stay in their own arrays, so each record is written only once.
  */
+#include "cluster/tree/order.h"
+
+#include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "cluster/tree/tree.h"
 
 enum { GRAIN = 1 << 13 };
 
@@ -21,17 +24,18 @@ typedef struct orderer {
     fct_work *work;
     const fct_mesh *mesh;
     fct_tree *tree;
-    uint64_t *sorted;             /* by rank: cost << 32 | merge */
-    uint32_t *ranks;              /* of merges */
-    uint32_t *counts, *firsts;    /* per merge: faces, and the place of the first */
+    uint64_t *sorted;             /* per rank: cost << 32 | merge */
+    uint32_t *ranks;              /* per merge */
+    uint32_t *counts, *firsts;    /* per merge: number of faces, place of the first */
     uint8_t *depths;              /* per merge */
     uint32_t kept;                /* merges that become nodes */
     _Atomic uint32_t *first_uses; /* per vertex: its first corner in the tree's order */
-    uint32_t *renamed, *places;   /* per vertex; per chunk */
+    uint32_t *renamed;            /* per vertex: its new id */
+    uint32_t *places;             /* per chunk: first uses, then the id of its first new vertex */
 } orderer;
 
 /* Raises costs so that they never fall from child to parent or from phase to phase, and counts faces. */
-static void sum_merges(const orderer *o) {
+static void raise_costs(const orderer *o) {
     const fct_work *work = o->work;
     uint32_t faces = work->face_count;
     float floor = -INFINITY, highest = -INFINITY;
@@ -61,8 +65,8 @@ static void list_ranks(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (size_t i = begin; i < end; ++i) o->ranks[(uint32_t)o->sorted[i]] = (uint32_t)i;
 }
 
-/* How many merges the tree keeps: down to root_count clusters, none above max_cost. */
-static uint32_t kept_merges(const orderer *o, const fct_tree_def *def) {
+/* The number of merges that become nodes: down to root_count clusters, none above max_cost. */
+static uint32_t count_kept(const orderer *o, const fct_tree_def *def) {
     const fct_work *work = o->work;
     uint32_t roots = def->root_count > 1 ? def->root_count : 1;
     uint32_t kept = roots < work->face_count ? work->face_count - roots : 0;
@@ -75,7 +79,8 @@ static bool is_kept(const orderer *o, uint32_t merge) {
     return o->kept == o->work->merge_count || o->ranks[merge] < o->kept;
 }
 
-/* Places roots in order of node id, then faces that no node holds. held: per build id. */
+/* Places roots in order of node id, then faces that are roots. held: per face, then per merge: has a parent.
+ */
 static void place_roots(const orderer *o, uint8_t *held) {
     const fct_work *work = o->work;
     fct_tree *tree = o->tree;
@@ -122,7 +127,7 @@ static void place_faces(const orderer *o) {
     o->tree->view.mean_depth = (double)total / faces;
 }
 
-/* Merges become nodes; children go by node id, leaves by place. */
+/* Makes links of the kept merges. */
 static void link_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const orderer *o = user;
@@ -236,7 +241,7 @@ static uint32_t copy_side_by_side(const fct_env *env, orderer *o) {
     return used;
 }
 
-/* Triangles and materials by place, vertices in order of first use; those without a face come last. */
+/* Triangles and materials by place, vertices in order of first use, vertices without a face last. */
 static void copy_mesh(const fct_env *env, orderer *o) {
     size_t vertices = o->mesh->vertex_count;
     uint32_t used = fct_env_threads(env) == 1 ? copy_alone(o) : copy_side_by_side(env, o);
@@ -284,15 +289,15 @@ static fct_result rank_merges(const fct_env *env, orderer *o) {
                                 FCT_ARRAY(o->ranks, merges)};
     if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "ordering the tree") != FCT_OK)
         return FCT_ERROR_MEMORY;
-    sum_merges(o);
+    raise_costs(o);
     fct_parallel_for(env, merges, GRAIN, list_costs, o);
     fct_result result = fct_sort_items(env, o->sorted, merges);
     if (result == FCT_OK) fct_parallel_for(env, merges, GRAIN, list_ranks, o);
     return result;
 }
 
-/* Places, and links by node id. */
-static fct_result place(const fct_env *env, orderer *o) {
+/* Places the faces and makes the links. */
+static fct_result place_nodes(const fct_env *env, orderer *o) {
     size_t faces = o->mesh->face_count, merges = o->work->merge_count;
     fct_tree *tree = o->tree;
     uint8_t *held;
@@ -336,10 +341,10 @@ fct_result fct_tree_order(fct_work *work, const fct_mesh *mesh, const fct_tree_d
     fct_result result = rank_merges(env, &o);
     if (result == FCT_OK) result = fct_progress(env, "order", 0.3);
     if (result == FCT_OK) {
-        o.kept = kept_merges(&o, def);
+        o.kept = count_kept(&o, def);
         result = allocate_arrays(tree->env, mesh, o.kept, tree);
     }
-    if (result == FCT_OK) result = place(env, &o);
+    if (result == FCT_OK) result = place_nodes(env, &o);
     release_merges(env, &o);
     if (result == FCT_OK) result = order_vertices(env, &o);
     if (result == FCT_OK) result = copy_names(tree->env, mesh, tree);

@@ -1,7 +1,7 @@
-/* cluster/tree/tree.c: a tree from beginning to end: views, depth, bounds, labels, the mesh in its own order.
- * What reads all faces asks for fct_tree_check first. */
+/* cluster/tree/tree.c: life of a tree, its bounds, and the mesh in the order of the input. */
 #include "cluster/tree/tree.h"
 
+#include <math.h>
 #include <string.h>
 
 fct_tree *fct_tree_new(const fct_env *env) {
@@ -36,27 +36,6 @@ void fct_tree_destroy(fct_tree *tree) {
 
 fct_tree_view fct_tree_get(const fct_tree *tree) {
     return tree->view;
-}
-
-fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean) {
-    const fct_tree_view *view = &tree->view;
-    *depth = 0, *mean = 0;
-    uint8_t *depths = fct_allocate_zero(env, view->node_count, 1);
-    if (!depths) return fct_fail_memory(env, "the tree");
-    uint64_t total = 0;
-    for (uint32_t i = 0; i < view->node_count; ++i)
-        for (int k = 0; k < 2; ++k) {
-            uint32_t child = tree->nodes[i].child[k], below = depths[i] + 1u;
-            if (child < view->node_count) {
-                depths[child] = (uint8_t)(below < 255 ? below : 255);
-            } else {
-                total += below;
-                if (below > *depth) *depth = below;
-            }
-        }
-    fct_release(env, depths);
-    *mean = (double)total / view->face_count;
-    return FCT_OK;
 }
 
 void fct_tree_measure_bounds(fct_tree *tree) {
@@ -107,18 +86,4 @@ fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out
     if (complete) return FCT_OK;
     fct_mesh_release(env, out);
     return fct_fail_memory(env, "material names");
-}
-
-fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
-                           uint32_t *labels) {
-    const fct_tree_view *view = &tree->view;
-    fct_result result = fct_tree_check(env, tree);
-    if (result != FCT_OK) return result;
-    for (uint32_t i = 0; i < count; ++i) {
-        bool leaf = nodes[i] >= view->node_count;
-        uint32_t first = leaf ? nodes[i] - view->node_count : tree->nodes[nodes[i]].first;
-        uint32_t faces = leaf ? 1 : tree->nodes[nodes[i]].count;
-        for (uint32_t place = first; place < first + faces; ++place) labels[view->face_ids[place]] = i;
-    }
-    return FCT_OK;
 }

@@ -2,11 +2,10 @@
  *
  * Source: Garland, "Quadric-Based Polygonal Surface Simplification", CMU 1999, chapter 8.
  *
- * Node ids. A tree over F faces with R roots has F - R inner nodes, numbered in the order in which a reader
- * opens them: node 0 is the merge that was made last. Ids below `node_count` are inner nodes; id node_count +
- * p is the leaf of the face at place p of the tree's face order. Because ids run backwards through the
- * merges, the partition into K clusters is: the nodes with id >= K - R that are a root or a child of a node
- * with id < K - R.
+ * Node ids. A tree over F faces with R roots has N = F - R inner nodes. Id 0 is the last merge, id N - 1 the
+ * first. Id N + p is the leaf of the face at place p of the tree's face order. A child has a larger id than
+ * its parent. Therefore the partition into K clusters consists of the nodes with id >= K - R whose parent,
+ * if they have one, has an id < K - R.
  */
 #ifndef FACETREE_CLUSTER_H
 #define FACETREE_CLUSTER_H
@@ -19,26 +18,27 @@ extern "C" {
 
 typedef struct fct_tree fct_tree;
 
-/* One cluster; 132 bytes, as in the file. All in the mesh's own coordinates. Areas beyond a float's range end
- * at its largest value, with S and M scaled alike, below it at 0; the rest does not depend on them, but for
- * the cone, which is pi where S is 0. */
+/* One cluster: 132 bytes, in memory as in the file. All in the coordinates of the mesh. Areas outside the
+ * range of a float become FLT_MAX (S and M scale with them) or 0; then the cone is pi where S is 0, and the
+ * other members are not affected. */
 typedef struct fct_cluster {
-    float area;           /* sum A_k */
-    float area_vector[3]; /* S = sum A_k n_k */
-    float moment[6];      /* M = sum A_k n_k n_k^T: xx xy xz yy yz zz */
-    float centroid[3];    /* of the surface */
-    float cone_angle;     /* every face normal is within this angle (radians) of S; pi where S cancels */
-    float plane[4];       /* least-squares plane n.x + d = 0 (8.1), n along S */
-    float box_center[3];
-    float box_rotation[4]; /* unit quaternion x y z w: fct_cluster_box expands it */
-    float box_half[3];
-    float cost;        /* of the merge, not decreasing with merge order */
-    uint32_t child[2]; /* node ids; FCT_NONE in a leaf */
-    uint32_t first;    /* the cluster's faces are places [first, first + count) */
+    float area;            /* sum of A_k over the faces k; w of (8.12) */
+    float area_vector[3];  /* S = sum A_k n_k; -e of (8.14), weighted as in (8.13) */
+    float moment[6];       /* M = sum A_k n_k n_k^T, xx xy xz yy yz zz; D of (8.14), weighted as in (8.13) */
+    float centroid[3];     /* of the surface */
+    float cone_angle;      /* every face normal is within this angle (radians) of S; pi where S is 0 */
+    float plane[4];        /* n, d of the plane n.x + d = 0 with the least E_fit (8.1); n.S >= 0 */
+    float box_center[3];   /* oriented box (section 8.3.1) */
+    float box_rotation[4]; /* unit quaternion x y z w; fct_cluster_box makes axes of it */
+    float box_half[3];     /* half extents */
+    float cost;            /* of the merge; does not fall with the order of merges */
+    uint32_t child[2];     /* node ids; FCT_NONE in a leaf */
+    uint32_t first;        /* the faces of the cluster are places [first, first + count) */
     uint32_t count;
 } fct_cluster;
 
-/* The oriented box, whose extents hold every vertex for exactly these axes. */
+/* The oriented box of a cluster. Every vertex of its faces satisfies |(v - center).axis| <= half, in double,
+ * for the axes that this function returns. */
 FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
 
 /* GREEDY contracts the cheapest edge of the dual graph, again and again (section 8.2). ROUNDS, the default,
@@ -65,159 +65,95 @@ typedef struct fct_tree_def {
     fct_cluster_method method;
     fct_cluster_cost cost;
     fct_fit_measure fit_measure;
-    double fit_weight, direction_weight, shape_weight; /* at most 1e30; negative: the chosen cost's default */
-    uint32_t root_count;                               /* stop at this many clusters; at least 1; default 1 */
-    double max_cost;      /* no merge above this cost; default infinity. What is left over are roots */
-    const char *source;   /* name recorded in the file, or NULL */
-    uint64_t source_hash; /* xxh3 of the source file, recorded in the file; 0: unknown */
+    double fit_weight, direction_weight, shape_weight; /* at most 1e30; negative: the default of the cost */
+    uint32_t root_count;  /* merging stops at this many clusters; default 1; 0 means 1 */
+    double max_cost;      /* no merge costs more; default INFINITY; clusters that cannot merge become roots */
+    const char *source;   /* name of the mesh, recorded in the file; NULL: none */
+    uint64_t source_hash; /* XXH3-64 of the mesh file, recorded in the file; 0: unknown */
 } fct_tree_def;
 FCT_API fct_tree_def fct_tree_def_default(void);
 
+/* Wall-clock time of the phases. */
 typedef struct fct_tree_stats {
     double seconds_dual, seconds_contract, seconds_boxes;
 } fct_tree_stats;
 
-/* Builds the tree. Any valid mesh with at least one face; disconnected parts are joined by proximity under
- * one root. Where mesh->materials is present, clusters of different materials are merged only after all
- * merges along edges within a material are done. Depth at most 3 log2 F for one root. The mesh is copied. def
- * may be NULL (the defaults), stats too. Errors: DATA (no faces, invalid mesh, options out of range), MEMORY,
- * CANCELLED. */
+/* Builds the tree of a valid mesh with at least one face. Parts that no edge connects are joined by proximity
+ * under one root. Where mesh->materials is present, all merges along edges within a material come first. The
+ * depth of a tree with one root is at most 3 log2 F. The tree copies the mesh. env must outlive the tree. def
+ * may be NULL (the defaults), and stats too. Errors: DATA (no faces, invalid mesh, options out of range),
+ * MEMORY, CANCELLED. */
 FCT_API fct_result fct_tree_build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                                   fct_tree_stats *stats, fct_tree **out);
+/* NULL is allowed. */
 FCT_API void fct_tree_destroy(fct_tree *tree);
 
-/* Pointers into the tree, valid as long as it lives. */
+/* Counts of a tree, and pointers into it that are valid while it lives. "Place" and "tree vertex" are ids in
+ * the tree's order. */
 typedef struct fct_tree_view {
     uint32_t face_count, vertex_count, node_count, root_count;
-    uint32_t depth;    /* of the deepest leaf; a single root leaf has depth 0 */
-    double mean_depth; /* over the leaves */
-    /* Of the mesh, by its dual graph: edges with one face, with three or more, and parts that edges connect.
-     */
+    uint32_t depth;    /* edges from a root to the deepest leaf */
+    double mean_depth; /* mean over the leaves */
+    /* Edges of the mesh with one face, with three or more, and the parts that edges connect (dual.h). */
     uint32_t boundary_edges, nonmanifold_edges, component_count;
-    fct_bounds bounds;          /* of all vertices; empty where there are none */
+    fct_bounds bounds;          /* of all vertices; empty if there are none */
     const uint32_t *roots;      /* root_count node ids, ascending */
-    const uint32_t *face_ids;   /* place -> input face */
-    const uint32_t *vertex_ids; /* vertex of the tree's order -> input vertex */
-    const float *positions;     /* vertex_count x 3, in the tree's vertex order */
-    const uint32_t *triangles;  /* face_count x 3, by place, indices in the tree's vertex order */
-    const float *colors;        /* vertex_count x 3 or NULL, in the tree's vertex order */
-    const uint32_t *materials;  /* face_count or NULL, by place */
+    const uint32_t *face_ids;   /* face_count: place -> input face */
+    const uint32_t *vertex_ids; /* vertex_count: tree vertex -> input vertex */
+    const float *positions;     /* vertex_count x 3, by tree vertex */
+    const uint32_t *triangles;  /* face_count x 3, by place: tree vertices */
+    const float *colors;        /* vertex_count x 3, by tree vertex; or NULL */
+    const uint32_t *materials;  /* face_count, by place; or NULL */
     uint32_t material_count;
-    const char *const *material_names; /* material_count strings or NULL */
-    const char *source;                /* never NULL */
+    const char *const *material_names; /* material_count strings; or NULL */
+    const char *source;                /* name of the mesh; never NULL */
     uint64_t source_hash;
-    fct_tree_def def; /* the options of the build; def.source is NULL */
+    fct_tree_def def; /* the options of the build, with the weights that it used; def.source is NULL */
 } fct_tree_view;
 FCT_API fct_tree_view fct_tree_get(const fct_tree *tree);
 
-/* Trees from files. fct_tree_open reads the file's first page; what lies behind is looked at when it is used.
- * Calls that touch few nodes (fct_tree_cluster, fct_tree_children, fct_tree_partition) check each node as
- * they read it. Calls that read all of a tree check its whole structure first, once, which the tree
- * remembers; do so yourself before you walk the arrays of a view of a tree from a file. After it has passed
- * nothing can lead out of the arrays or around in circles, no call on this tree returns DATA, and the calls
- * above cost no checks. A tree from fct_tree_build needs none. Several threads may call it. Errors: DATA,
- * MEMORY. */
+/* Checks the whole structure of a tree from a file: links, ranges, indices, permutations, finite numbers. The
+ * first check takes O(F); the tree remembers that it passed. fct_tree_open reads only the head of a file.
+ * After that:
+ * - fct_tree_cluster, fct_tree_children and fct_tree_partition check each node that they read;
+ * - functions that read the whole tree call fct_tree_check first;
+ * - a caller that reads the arrays of a view must call fct_tree_check first.
+ * After the check has passed, no walk leaves the arrays or runs in circles, and no call on this tree returns
+ * DATA. A tree from fct_tree_build needs no check. Several threads may call this. Errors: DATA, MEMORY. */
 FCT_API fct_result fct_tree_check(const fct_env *env, const fct_tree *tree);
 
-/* The cluster of any node id below node_count + face_count, leaves included (computed from the triangle).
- * Errors: DATA (a damaged file; *out is zero then, a leaf without faces, and the message goes to the
- * environment of the tree). */
+/* The record of a node, id < node_count + face_count. Records of leaves are computed from the triangle, and a
+ * later version may compute those of other small clusters too: ask again rather than keep many records.
+ * Errors: DATA (damaged file: *out is all zero with FCT_NONE for children, and the message goes to the env
+ * that the tree was opened with). */
 FCT_API fct_result fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *out);
-/* The two children of an inner node, whose faces are the first and the last part of its own. Who walks down
- * the tree of a file by this comes to each node once. Errors as above. */
+/* The records of the two children of an inner node. The first child has the first places of the node's range,
+ * the second child the rest. Walking down from the roots with this function visits each node once, whatever
+ * the file contains. Errors: DATA, as above. */
 FCT_API fct_result fct_tree_children(const fct_tree *tree, uint32_t node, fct_cluster out[2]);
 
-/* The mesh in the input's own order (positions, triangles, colours, materials). Errors: DATA, MEMORY. */
+/* A copy of the mesh in the order of the input: positions, triangles, colours, materials. The caller releases
+ * it with fct_mesh_release. Errors: DATA, MEMORY. */
 FCT_API fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out);
 
-/* Node ids of the partition into `count` clusters, in order of their first place. `nodes` holds at least
- * `count`. *written: how many there are: count clamped to [root_count, face_count]; 0 on failure. Touches the
- * nodes above the partition and its own. Errors: DATA. */
-FCT_API fct_result fct_tree_partition(const fct_env *env, const fct_tree *tree, uint32_t count,
-                                      uint32_t *nodes, uint32_t *written);
-/* How many clusters remain when all merges of cost <= max_cost are done. */
-FCT_API uint32_t fct_tree_count_at_cost(const fct_tree *tree, double max_cost);
-/* Cluster number (0..count-1, in the order of `nodes`) of each input face; labels holds face_count. Errors:
- * DATA, MEMORY. */
-FCT_API fct_result fct_tree_labels(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
-                                   uint32_t count, uint32_t *labels);
+/* --- Files --- */
 
-/* Area-weighted means over a partition (fit over the squared diagonal of the mesh's bounds). Errors: MEMORY.
- */
-typedef struct fct_partition_quality {
-    double mean_fit;          /* E_fit of each cluster to its best plane, by the surface integral */
-    double mean_direction;    /* E_dir (8.12) about the plane's normal */
-    double mean_irregularity; /* g (8.16) */
-    double
-        mean_normal_deviation; /* squared deviation of unit normals from the cluster's mean normal (L2,1) */
-    double box_area;           /* sum of the boxes' surface areas over the squared diagonal */
-    bool connected;            /* every cluster's faces are connected through shared edges */
-} fct_partition_quality;
-FCT_API fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
-                                    uint32_t count, fct_partition_quality *out);
-
-/* The same for any partition of a mesh: labels (face_count, each < count) as fct_tree_labels and
- * fct_partition_refine leave them. box_area is that of boxes fitted for the occasion. A label without faces
- * counts for nothing. Errors: DATA (invalid mesh, a label out of range), MEMORY. */
-FCT_API fct_result fct_labels_quality(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
-                                      uint32_t count, fct_partition_quality *out);
-
-/* The least-squares plane n.x + d = 0 of each label's surface, n along its area vector: planes holds count x
- * 4. All 0 for a label without faces. Errors: DATA, MEMORY. */
-FCT_API fct_result fct_labels_planes(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels,
-                                     uint32_t count, float *planes);
-
-typedef struct fct_refine_def {
-    uint32_t size;
-    uint32_t sweep_count;      /* at most this many; it ends when no face moves; default 4 */
-    double perimeter_weight;   /* of the sum of squared perimeters beside the deviation of normals, each over
-                                  what it is at the start; 0 to 1e6, default .1 */
-    double irregularity_limit; /* mean irregularity may reach this multiple of its start; at least 1, INFINITY
-                                  for no limit; default 1 */
-} fct_refine_def;
-FCT_API fct_refine_def fct_refine_def_default(void);
-
-typedef struct fct_refine_stats {
-    uint32_t sweeps; /* done, over all cuts */
-    uint64_t moves;  /* faces, or clusters of finer cuts, that changed sides */
-    double seconds_dual, seconds_sweeps;
-} fct_refine_stats;
-
-/* Refines a partition: faces on the borders between clusters change sides, those that gain most first, so
- * that the squared deviation of normals (L2,1) falls while borders stay short. No cluster loses its last face
- * or falls into more pieces than it had, and with mesh->materials a face follows only neighbours of its own
- * material. labels holds face_count entries, each < count, and is changed in place; on failure it is as it
- * was. The result is a partition and no longer a cut of a tree. def may be NULL (the defaults), stats too.
- * Same result for every thread count. Errors: DATA (invalid mesh, a label or an option out of range), MEMORY,
- * CANCELLED. */
-FCT_API fct_result fct_partition_refine(const fct_env *env, const fct_mesh *mesh, uint32_t count,
-                                        const fct_refine_def *def, uint32_t *labels, fct_refine_stats *stats);
-
-/* The same from the cut of the tree that `nodes` are, and better: clusters of finer cuts change sides before
- * faces do, with so many sweeps each. labels receives the refined cluster of each input face (0..count-1, in
- * the order of `nodes`), face_count entries, untouched on failure. Errors: DATA (a damaged file, an option
- * out of range), MEMORY, CANCELLED. */
-FCT_API fct_result fct_tree_refine(const fct_env *env, const fct_tree *tree, const uint32_t *nodes,
-                                   uint32_t count, const fct_refine_def *def, uint32_t *labels,
-                                   fct_refine_stats *stats);
-
-/* Writes the hierarchy file, docs/hierarchy-file.md: temporary file, fsync, rename. Errors: OUTPUT, MEMORY,
- * CANCELLED; DATA for a damaged tree. */
+/* Writes the hierarchy file (docs/hierarchy-file.md) to a temporary file, syncs and renames it. After an
+ * error the old file is as it was. Errors: OUTPUT, MEMORY, CANCELLED, DATA (damaged tree). */
 FCT_API fct_result fct_tree_save(const fct_env *env, const fct_tree *tree, const char *path);
-/* Maps a hierarchy file read-only and validates its header, names included; nothing else is read before it is
- * used (see fct_tree_check). The file must not be shortened while the tree lives. Errors: INPUT, DATA,
- * MEMORY.
- */
+/* Maps a hierarchy file read-only and checks its header and the names; see fct_tree_check for the rest. The
+ * time does not depend on the number of faces. env must outlive the tree. Nobody may shorten the file while
+ * the tree lives. Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_tree_open(const fct_env *env, const char *path, fct_tree **out);
-/* Reads everything: checksums, fct_tree_check, and of every node its box, cone, area, area vector, moment,
- * centroid and plane against its triangles; the counts and bounds of the view. O(F log F). Errors: DATA with
- * what is wrong, MEMORY, CANCELLED. */
+/* Reads everything: checksums, structure, the counts and bounds of the view, and for every node the box,
+ * cone, area, area vector, moment, centroid and plane against its triangles. O(F log F). Errors: DATA (the
+ * message names the node and what is wrong), MEMORY, CANCELLED. */
 FCT_API fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree);
 
 /* --- From file to file --- */
 
-/* What building takes, in bytes, by estimate: a tree in memory with its mesh, and the least that
- * fct_tree_build_file can do with. def may be NULL. */
+/* Estimates of the bytes that a build takes: in memory (mesh and tree), and the least max_memory with which
+ * fct_tree_build_file works. def may be NULL. */
 typedef struct fct_build_need {
     uint64_t in_memory, in_parts;
 } fct_build_need;
@@ -226,9 +162,9 @@ FCT_API fct_build_need fct_tree_build_need(uint32_t face_count, uint32_t vertex_
 
 typedef struct fct_large_def {
     uint32_t size;
-    uint64_t max_memory;          /* bytes to be allocated at once; default 4 GiB */
-    const char *temporary_folder; /* NULL, the default: beside the hierarchy file */
-    uint32_t part_faces;          /* faces clustered at once; 0, the default: as many as memory allows */
+    uint64_t max_memory;          /* bytes allocated at the same time; default 4 GiB */
+    const char *temporary_folder; /* NULL, the default: the folder of the hierarchy file */
+    uint32_t part_faces;          /* faces per part; 0, the default: as many as the memory allows */
 } fct_large_def;
 FCT_API fct_large_def fct_large_def_default(void);
 
@@ -236,16 +172,18 @@ typedef struct fct_large_stats {
     uint32_t face_count, vertex_count, root_count, depth;
     double mean_depth;
     uint32_t part_count; /* parts that the mesh was cut into */
-    uint32_t top_count;  /* clusters that parts left to the whole */
+    uint32_t top_count;  /* clusters that the parts left for the last contraction */
     double seconds_read, seconds_dual, seconds_contract, seconds_boxes, seconds_write;
 } fct_large_stats;
 
-/* From a mesh file to a hierarchy file with neither in memory: the mesh is cut along a space-filling curve
- * into parts that are clustered one by one, but for what depends on faces of other parts; that is clustered
- * last, together. Temporary files without names take about as much of the disk as the hierarchy file. Binary
- * PLY files of triangles are read where they lie, others are loaded once. The same bytes for every thread
- * count, but not those of fct_tree_build. def, large and stats may be NULL. Errors: INPUT, DATA, OUTPUT,
- * MEMORY (max_memory is too little, too), CANCELLED. */
+/* Builds a hierarchy file from a mesh file while neither is in memory:
+ * 1. A space-filling curve cuts the mesh into parts.
+ * 2. Each part is clustered alone, except for clusters that depend on faces of other parts.
+ * 3. Those clusters are merged together in memory.
+ * Temporary files have no names and take about as much disk as the hierarchy file. Binary PLY files of
+ * triangles are read in place; other files are loaded once. The bytes do not depend on the number of threads,
+ * but they differ from those of fct_tree_build and fct_tree_save. def, large and stats may be NULL. Errors:
+ * INPUT, DATA, OUTPUT, MEMORY (also if max_memory is too small), CANCELLED. */
 FCT_API fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const char *tree_path,
                                        const fct_tree_def *def, const fct_large_def *large,
                                        fct_large_stats *stats);

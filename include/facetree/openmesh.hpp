@@ -36,7 +36,7 @@
 #include <OpenMesh/Core/Utils/PropertyManager.hh>
 #include <OpenMesh/Core/Utils/vector_traits.hh>
 
-#include "facetree/cluster.h"
+#include "facetree/partition.h"
 
 namespace facetree {
 

@@ -1,23 +1,24 @@
-/* partition/chart/audit.c: what charts turned out to be, counted from labels and triangles alone.
+/* partition/chart/audit.c: measures of finished charts, from labels and triangles alone.
  *
- * Faces are sorted by chart; mesh edges are named by their first side. Then every chart is walked on its own,
- * stamping the vertices and edges it uses. It shares no count with the code that made the charts. O(F).
+ * Sorts the faces by chart, names each mesh edge by its first side, then walks every chart and stamps the
+ * vertices and edges that it uses. Shares no count with the code that makes charts. O(F).
  */
+#include "partition/chart/audit.h"
+
 #include "base/parallel.h"
 #include "base/union_find.h"
-#include "partition/chart/chart.h"
 
 enum { SEEN_ONCE = 1, SEEN_TWICE = 2, SEEN_MORE = 3 };
 
 typedef struct auditor {
     const fct_charter *charter;
     uint32_t *places;                    /* faces in order of charts */
-    uint32_t *first;                     /* count + 1: of each chart in places */
-    uint32_t *edges;                     /* first side on the mesh edge of each side */
-    uint32_t *parents;                   /* by place, for union-find */
-    uint32_t *vertex_chart, *edge_chart; /* the chart that used it last */
-    uint32_t *edge_face;                 /* by first side: the face that used it last */
-    uint8_t *edge_uses;                  /* by first side: faces of that chart */
+    uint32_t *first;                     /* count + 1: first index in `places` per chart */
+    uint32_t *edges;                     /* per side: the first side on its mesh edge */
+    uint32_t *parents;                   /* disjoint sets of places */
+    uint32_t *vertex_chart, *edge_chart; /* the last chart that used it */
+    uint32_t *edge_face;                 /* per first side: the last face that used it */
+    uint8_t *edge_uses;                  /* per first side: faces of that chart */
 } auditor;
 
 static void sort_by_chart(auditor *a) {
@@ -54,7 +55,7 @@ static void name_edges(auditor *a, fct_chart_stats *stats) {
     }
 }
 
-static bool chart_is_disk(auditor *a, uint32_t chart) {
+static bool is_chart_disk(auditor *a, uint32_t chart) {
     const fct_tree_view *view = a->charter->view;
     uint64_t vertices = 0, edges = 0, faces = a->first[chart + 1] - a->first[chart], joins = 0;
     bool clean = true;
@@ -80,7 +81,7 @@ static bool chart_is_disk(auditor *a, uint32_t chart) {
     return clean && joins + 1 == faces && 2 * edges > 3 * faces && vertices + faces == edges + 1;
 }
 
-static double chart_angle(const auditor *a, uint32_t chart) {
+static double find_chart_angle(const auditor *a, uint32_t chart) {
     const fct_tree_view *view = a->charter->view;
     v3 s = {0, 0, 0};
     double largest = 0;
@@ -91,7 +92,7 @@ static double chart_angle(const auditor *a, uint32_t chart) {
     return largest;
 }
 
-static void audit(auditor *a, fct_chart_stats *stats) {
+static void audit_charts(auditor *a, fct_chart_stats *stats) {
     sort_by_chart(a);
     name_edges(a, stats);
     for (uint32_t v = 0; v < a->charter->view->vertex_count; ++v) a->vertex_chart[v] = FCT_NONE;
@@ -99,8 +100,8 @@ static void audit(auditor *a, fct_chart_stats *stats) {
     for (uint32_t i = 0; i < a->charter->count; ++i) {
         uint32_t faces = a->first[i + 1] - a->first[i];
         if (faces > stats->largest_faces) stats->largest_faces = faces;
-        stats->non_disks += !chart_is_disk(a, i);
-        stats->largest_angle = fmax(stats->largest_angle, chart_angle(a, i));
+        stats->non_disks += !is_chart_disk(a, i);
+        stats->largest_angle = fmax(stats->largest_angle, find_chart_angle(a, i));
     }
 }
 
@@ -116,7 +117,7 @@ fct_result fct_charts_audit(const fct_env *env, const fct_charter *c, fct_chart_
                                 FCT_ARRAY(a.edge_face, 3 * (size_t)faces),
                                 FCT_ARRAY(a.edge_uses, 3 * (size_t)faces)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "charts");
-    if (result == FCT_OK) audit(&a, stats);
+    if (result == FCT_OK) audit_charts(&a, stats);
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }

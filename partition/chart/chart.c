@@ -1,28 +1,29 @@
-/* partition/chart/chart.c: charts from the top of the tree down.
+/* partition/chart/chart.c: charts from the roots of the tree down.
  *
- * Whether the faces [first, end) are a disk is counted without any table: each corner knows the place of the
- * face before it at the same vertex, each side the side before it on the same mesh edge; what has none inside
- * the range is new. Connected, at most two faces an edge, V - E + F = 1 and a border: a disk, for a vertex
- * where fans or borders only touch would lower the characteristic below 1. O(faces) a node that is tested;
- * nodes whose cone is too wide are opened unseen.
+ * To test whether the faces [first, end) are a disk, each corner knows the previous face at its vertex and
+ * each side the previous side on its mesh edge. A vertex or edge is new to the range if that face lies before
+ * `first`. The faces are a disk if they are connected, have at most two faces per edge, V - E + F = 1 and a
+ * border. A vertex where fans or borders only touch lowers the characteristic below 1. O(faces) per tested
+ * node; nodes with too wide a cone are opened without a test.
  */
-#include "partition/chart/chart.h"
-
 #include "base/parallel.h"
 #include "base/union_find.h"
+#include "partition/chart/audit.h"
+#include "partition/chart/charter.h"
+#include "partition/chart/merge.h"
 #include "partition/cut.h"
 
 enum { GRAIN = 1 << 15 };
 
 typedef struct counts {
     uint64_t angle, limit, topology;
-    uint64_t pad[5]; /* a line of the cache for each thread */
+    uint64_t pad[5]; /* a cache line per thread */
 } counts;
 
 typedef struct opener {
     const fct_charter *charter;
-    uint32_t *vertex_before; /* per corner: place of the face before it at its vertex */
-    uint32_t *parents;       /* by place, for union-find */
+    uint32_t *vertex_before; /* per corner: the previous face at its vertex, or FCT_NONE */
+    uint32_t *parents;       /* disjoint sets of places */
     counts *opened;          /* per thread */
 } opener;
 
@@ -33,8 +34,8 @@ fct_chart_def fct_chart_def_default(void) {
                            .max_area = INFINITY};
 }
 
-/* By the stored cone, which is rounded up; where that does not decide, by the faces. */
-static bool within_angle(const fct_tree_view *view, const fct_cluster *c, double limit) {
+/* Compares the stored cone, which is rounded up; compares the faces where that does not decide. */
+static bool is_within_angle(const fct_tree_view *view, const fct_cluster *c, double limit) {
     const double rounding = 4e-6;
     double cone = (double)c->cone_angle;
     if (cone <= limit || limit >= FCT_HALF_TURN) return true;
@@ -46,7 +47,7 @@ static bool within_angle(const fct_tree_view *view, const fct_cluster *c, double
     return v3_norm2(s) > 0 || c->area == 0;
 }
 
-static bool one_material(const fct_tree_view *view, const fct_cluster *c) {
+static bool has_one_material(const fct_tree_view *view, const fct_cluster *c) {
     if (!view->materials) return true;
     for (size_t p = c->first; p < (size_t)c->first + c->count; ++p)
         if (view->materials[p] != view->materials[c->first]) return false;
@@ -81,12 +82,12 @@ static bool is_chart(void *user, uint32_t node, uint32_t thread) {
     const fct_charter *charter = o->charter;
     fct_cluster room;
     const fct_cluster *c = fct_node_cluster(charter->tree, node, &room);
-    if (!within_angle(charter->view, c, charter->def.max_angle)) {
+    if (!is_within_angle(charter->view, c, charter->def.max_angle)) {
         ++o->opened[thread].angle;
         return false;
     }
     if (c->count > charter->def.max_faces || (double)c->area > charter->def.max_area ||
-        !one_material(charter->view, c)) {
+        !has_one_material(charter->view, c)) {
         ++o->opened[thread].limit;
         return false;
     }
@@ -103,7 +104,7 @@ static void link_corners(const fct_tree_view *view, uint32_t *last, uint32_t *ve
     }
 }
 
-/* The cut of the tree, as labels by place. */
+/* Cuts the tree and sets the labels. */
 static fct_result open_nodes(const fct_env *env, const fct_tree *tree, fct_charter *c,
                              fct_chart_stats *stats) {
     const fct_tree_view *view = c->view;

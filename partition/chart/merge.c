@@ -1,19 +1,20 @@
-/* partition/chart/merge.c: neighbouring charts join where the union is a chart.
+/* partition/chart/merge.c: merges neighbouring charts whose union is a chart.
  *
- * A tree's clusters end at its own borders, and what is opened leaves small ones beside large ones. In
- * rounds: pairs of neighbours by the share of the smaller one's border that would go, the largest first; a
- * chart takes any number of others or is taken itself. Two disks make a disk where their common vertices are
- * one more than their common edges: only the faces of the smaller one are looked at, with a hash set telling
- * which vertices the other has. Rounds end when no pair is left that may join.
+ * Clusters end at borders of the tree, and opened nodes leave small charts beside large ones. Each round
+ * takes the pairs of neighbours in order of the share of the smaller one's border that the merge removes. A
+ * chart takes any number of others per round, or is taken itself. Two disks form a disk if they share one
+ * more vertex than edges. That test reads only the faces of the smaller chart, and a hash set of (vertex,
+ * chart) tells which vertices the other one has. Rounds end when no pair can merge.
  */
+#include "partition/chart/merge.h"
+
 #include <string.h>
 
 #include "base/key.h"
 #include "base/sort.h"
 #include "partition/adjacency.h"
-#include "partition/chart/chart.h"
 
-/* At least an eighth of the smaller chart's border goes: below that shapes become stars. */
+/* A merge must remove this share of the smaller chart's border. Smaller shares give star-shaped charts. */
 static const double least_share = 0.125;
 
 enum { MOST_ROUNDS = 256, STREAM = 4096 };
@@ -21,28 +22,30 @@ enum { MOST_ROUNDS = 256, STREAM = 4096 };
 typedef struct piece {
     v3 vector; /* area vector */
     double area, perimeter;
-    double cone; /* all its normals are within this angle of its vector */
+    double cone; /* upper bound of the angle between its normals and its vector */
     uint32_t faces;
-    uint32_t head, tail;    /* of its list of places */
-    bool fixed;             /* no disk: joins none */
-    bool grew, gone, fresh; /* this round; taken by another; changed in the last round */
+    uint32_t head, tail; /* of its list of places */
+    bool fixed;          /* not a disk: never merges */
+    bool grew;           /* took a chart in this round */
+    bool gone;           /* taken by another chart */
+    bool fresh;          /* changed in the last round */
 } piece;
 
 typedef struct merger {
     fct_charter *charter;
     piece *pieces;
-    uint32_t *next;       /* of each place in its piece's list */
-    uint32_t *last_label; /* by vertex */
-    uint32_t *stamps;     /* by vertex: the test that counted it */
-    bool *shared;         /* by vertex: of two charts or more */
+    uint32_t *next;       /* per place: the next one in the list of its piece */
+    uint32_t *last_label; /* per vertex */
+    uint32_t *stamps;     /* per vertex: the test that counted it last */
+    bool *shared;         /* per vertex: two or more charts use it */
     uint32_t test;
-    uint64_t *set; /* vertex << 32 | chart of shared vertices; open addressing */
+    uint64_t *set; /* hash set of vertex << 32 | chart, for shared vertices; open addressing */
     size_t set_mask;
 } merger;
 
 static const uint64_t nothing = UINT64_MAX;
 
-static size_t slot_of(const merger *m, uint64_t key) {
+static size_t find_slot(const merger *m, uint64_t key) {
     uint64_t hash = key * 0x9E3779B97F4A7C15u;
     size_t slot = (size_t)(hash ^ hash >> 29) & m->set_mask;
     while (m->set[slot] != nothing && m->set[slot] != key) slot = (slot + 1) & m->set_mask;
@@ -50,15 +53,15 @@ static size_t slot_of(const merger *m, uint64_t key) {
 }
 
 static bool has_vertex(const merger *m, uint32_t vertex, uint32_t chart) {
-    return m->set[slot_of(m, (uint64_t)vertex << 32 | chart)] != nothing;
+    return m->set[find_slot(m, (uint64_t)vertex << 32 | chart)] != nothing;
 }
 
 static void add_vertex(merger *m, uint32_t vertex, uint32_t chart) {
     uint64_t key = (uint64_t)vertex << 32 | chart;
-    m->set[slot_of(m, key)] = key;
+    m->set[find_slot(m, key)] = key;
 }
 
-/* Which vertices are shared, and the set of their charts with room for as many again. */
+/* Finds the shared vertices and fills the set, with room for as many entries again. */
 static fct_result list_shared(const fct_env *env, merger *m) {
     const fct_tree_view *view = m->charter->view;
     const uint32_t *labels = m->charter->labels;
@@ -89,15 +92,15 @@ static fct_result list_shared(const fct_env *env, merger *m) {
     return FCT_OK;
 }
 
-/* Whether three faces or more lie on the mesh edge of a side. */
+/* Whether three or more faces lie on the mesh edge of a side. */
 static bool is_crowded(const fct_sides *sides, uint32_t side) {
     uint32_t before = sides->before[side], after = sides->after[side];
     if (before != FCT_NONE) return after != FCT_NONE || sides->before[before] != FCT_NONE;
     return after != FCT_NONE && sides->after[after] != FCT_NONE;
 }
 
-/* Whether chart `small` may be glued to `large`: the common border is one piece of a line. A crowded edge of
- * `small` whose ends `large` has too may be its own: then not. */
+/* Whether the union of two disks is a disk: their common border is one line. Refuses if `small` has a crowded
+ * edge with both ends in `large`, because that edge may belong to both. */
 static bool glues_to_disk(merger *m, uint32_t small, uint32_t large, double *length) {
     const fct_tree_view *view = m->charter->view;
     const fct_sides *sides = &m->charter->sides;
@@ -120,15 +123,15 @@ static bool glues_to_disk(merger *m, uint32_t small, uint32_t large, double *len
     return !crowded && edges > 0 && vertices == edges + 1;
 }
 
-static double widest_angle(const merger *m, uint32_t chart, v3 axis, double enough) {
+static double find_widest_angle(const merger *m, uint32_t chart, v3 axis, double enough) {
     double widest = 0;
     for (uint32_t p = m->pieces[chart].head; p != FCT_NONE && widest <= enough; p = m->next[p])
         widest = fmax(widest, fct_angle(fct_face_vector(m->charter->view, p), axis));
     return widest;
 }
 
-/* Whether all normals of both are within the limit of the common vector: by their cones where that decides,
- * else by the faces, unless the larger chart has too many for the smaller one's sake. */
+/* Whether all normals of both charts are within the limit of the common vector. Compares their cones first,
+ * then the faces, unless the larger chart has too many faces for so small a gain. */
 static bool keeps_angle(const merger *m, uint32_t small, uint32_t large, double *cone) {
     const piece *a = &m->pieces[small], *b = &m->pieces[large];
     double limit = m->charter->def.max_angle;
@@ -137,13 +140,13 @@ static bool keeps_angle(const merger *m, uint32_t small, uint32_t large, double 
     if (limit >= FCT_HALF_TURN) return true;
     if (v3_norm2(axis) > 0 ? *cone <= limit : a->area + b->area == 0) return true;
     if (!(v3_norm2(axis) > 0) || b->faces > STREAM + 16 * a->faces) return false;
-    *cone = widest_angle(m, small, axis, limit);
-    if (*cone <= limit) *cone = fmax(*cone, widest_angle(m, large, axis, limit));
+    *cone = find_widest_angle(m, small, axis, limit);
+    if (*cone <= limit) *cone = fmax(*cone, find_widest_angle(m, large, axis, limit));
     return *cone <= limit;
 }
 
-/* Joins `small` to `large` if their union is a chart. */
-static bool join(merger *m, uint32_t small, uint32_t large) {
+/* Merges `small` into `large` if their union is a chart. */
+static bool join_charts(merger *m, uint32_t small, uint32_t large) {
     piece *a = &m->pieces[small], *b = &m->pieces[large];
     const fct_charter *c = m->charter;
     const fct_tree_view *view = c->view;
@@ -166,17 +169,17 @@ static bool join(merger *m, uint32_t small, uint32_t large) {
     return true;
 }
 
-/* One pass over the pairs in order of their scores; returns how many charts were taken. */
+/* One pass over the pairs in order. Returns how many charts were taken. */
 static uint32_t join_pairs(merger *m, const fct_adjacency *neighbours, const uint32_t *order) {
     uint32_t joined = 0;
     for (uint32_t i = 0; i < neighbours->pair_count; ++i) {
         uint32_t a = neighbours->pairs[2 * (size_t)order[i]], b = neighbours->pairs[2 * (size_t)order[i] + 1];
         piece *p = &m->pieces[a], *q = &m->pieces[b];
         if (p->fixed || q->fixed || p->gone || q->gone || (p->grew && q->grew)) continue;
-        if (!p->fresh && !q->fresh && !p->grew && !q->grew) continue; /* refused before */
+        if (!p->fresh && !q->fresh && !p->grew && !q->grew) continue; /* refused in an earlier round */
         if (neighbours->lengths[order[i]] < least_share * fmin(p->perimeter, q->perimeter)) continue;
         bool first_small = p->grew ? false : q->grew ? true : p->faces < q->faces;
-        joined += join(m, first_small ? a : b, first_small ? b : a);
+        joined += join_charts(m, first_small ? a : b, first_small ? b : a);
     }
     return joined;
 }
@@ -235,11 +238,11 @@ static void describe_pieces(merger *m) {
         }
     }
     for (uint32_t i = 0; i < c->count; ++i)
-        m->pieces[i].cone = widest_angle(m, i, m->pieces[i].vector, INFINITY);
+        m->pieces[i].cone = find_widest_angle(m, i, m->pieces[i].vector, INFINITY);
 }
 
-/* Labels without gaps, in order of first places. */
-static void renumber(merger *m) {
+/* Renumbers the charts in order of first places. */
+static void renumber_charts(merger *m) {
     fct_charter *c = m->charter;
     for (uint32_t i = 0; i < c->count; ++i) m->pieces[i].head = FCT_NONE;
     uint32_t count = 0;
@@ -263,7 +266,7 @@ static fct_result run_rounds(const fct_env *env, merger *m) {
         result = run_round(env, m, &joined);
         if (result == FCT_OK) result = fct_progress(env, "merging", 1 - 1.0 / (round + 2));
     }
-    if (result == FCT_OK) renumber(m);
+    if (result == FCT_OK) renumber_charts(m);
     return result;
 }
 

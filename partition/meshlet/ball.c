@@ -1,9 +1,9 @@
 /* partition/meshlet/ball.c: smallest enclosing ball by pivoting.
  *
- * At most four points hold a ball in place. The farthest point outside enters, and the smallest ball about it
- * and the old four is that through it and some subset of them: 15 small systems at most. The radius grows
- * with every step, so no set of four comes back and the loop ends, in practice after fewer than ten passes
- * over the points; it is cut off where rounding stops the growth.
+ * At most four support points define the ball. The farthest point outside enters; the smallest ball around it
+ * and the support passes through it and a subset of the support, so at most 15 small systems are solved. The
+ * radius grows with every step, so no support returns and the loop ends, in practice after fewer than ten
+ * passes over the points. It stops where rounding stops the growth.
  */
 #include "partition/meshlet/ball.h"
 
@@ -11,8 +11,8 @@
 
 enum { MOST_PASSES = 64 };
 
-/* The center of the smallest ball with the points on its sphere; false where they do not span one. */
-static bool ball_through(const v3 *p, int count, v3 *center) {
+/* The centre of the smallest ball with all points on its sphere; false if they are dependent. */
+static bool fit_ball(const v3 *p, int count, v3 *center) {
     v3 d[3];
     double g[3][4];
     *center = p[0];
@@ -21,7 +21,8 @@ static bool ball_through(const v3 *p, int count, v3 *center) {
         for (int k = 0; k + 1 < count; ++k) g[i][k] = v3_dot(d[i], d[k]);
         g[i][3] = 0.5 * v3_norm2(d[i]);
     }
-    for (int i = 0; i + 1 < count; ++i) { /* elimination: the matrix is positive where it is regular */
+    for (int i = 0; i + 1 < count;
+         ++i) { /* elimination without pivoting: the Gram matrix is positive definite */
         if (!(g[i][i] > 1e-12 * v3_norm2(d[i]))) return false;
         for (int k = 0; k + 1 < count; ++k) {
             double factor = g[k][i] / g[i][i];
@@ -32,8 +33,8 @@ static bool ball_through(const v3 *p, int count, v3 *center) {
     return true;
 }
 
-/* Replaces the support by the points that hold the smallest ball about it and `entering`. */
-static bool pivot(v3 *support, int *count, v3 entering, v3 *center, double *squared) {
+/* Replaces the support by that of the smallest ball around it and `entering`. */
+static bool pivot_support(v3 *support, int *count, v3 entering, v3 *center, double *squared) {
     double best = INFINITY;
     int best_set = -1;
     v3 best_center = *center;
@@ -43,7 +44,7 @@ static bool pivot(v3 *support, int *count, v3 entering, v3 *center, double *squa
         chosen[size++] = entering;
         for (int i = 0; i < *count; ++i)
             if (set >> i & 1) chosen[size++] = support[i];
-        if (size > 4 || !ball_through(chosen, size, &middle)) continue;
+        if (size > 4 || !fit_ball(chosen, size, &middle)) continue;
         double reach = v3_norm2(v3_sub(entering, middle));
         bool holds = reach < best;
         for (int i = 0; i < *count && holds; ++i)
@@ -59,7 +60,7 @@ static bool pivot(v3 *support, int *count, v3 entering, v3 *center, double *squa
     return true;
 }
 
-static uint32_t farthest(const v3 *points, uint32_t count, v3 center, double *squared) {
+static uint32_t find_farthest(const v3 *points, uint32_t count, v3 center, double *squared) {
     uint32_t far = 0;
     *squared = -1;
     for (uint32_t i = 0; i < count; ++i) {
@@ -75,11 +76,12 @@ void fct_smallest_ball(const v3 *points, uint32_t count, v3 *center, double *rad
     double squared = 0, reach;
     support[0] = points[0];
     *center = middle;
-    farthest(points, count, middle, &reach);
+    find_farthest(points, count, middle, &reach);
     *radius = sqrt(reach);
     for (int pass = 0; pass < MOST_PASSES; ++pass) {
-        uint32_t far = farthest(points, count, middle, &reach);
+        uint32_t far = find_farthest(points, count, middle, &reach);
         if (reach < *radius * *radius) *center = middle, *radius = sqrt(reach);
-        if (reach <= squared * (1 + 1e-12) || !pivot(support, &held, points[far], &middle, &squared)) break;
+        if (reach <= squared * (1 + 1e-12) || !pivot_support(support, &held, points[far], &middle, &squared))
+            break;
     }
 }

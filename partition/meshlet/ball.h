@@ -1,6 +1,6 @@
-/* partition/meshlet/ball.h: the smallest ball about a few points. */
-#ifndef FCT_CLUSTER_BALL_H
-#define FCT_CLUSTER_BALL_H
+/* partition/meshlet/ball.h: the smallest ball around points. */
+#ifndef FCT_PARTITION_BALL_H
+#define FCT_PARTITION_BALL_H
 
 #include <stdint.h>
 

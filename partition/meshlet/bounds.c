@@ -1,26 +1,28 @@
-/* partition/meshlet/bounds.c: spheres, cones and boxes for culling.
+/* partition/meshlet/bounds.c: sphere, cone and boxes for culling.
  *
- * Sphere: the smallest. Cone: its axis is the middle of the smallest ball about the unit normals, or their
- * mean where that is better; the apex lies behind the planes of all triangles, so that an eye in the cone
- * behind it is behind every one of them. Box: the least of frames about the mean normal and the principal
- * axes, turned in their plane, and the world's. All is checked and widened on the floats that are stored.
+ * Sphere: the smallest enclosing ball. Cone: its axis is the centre of the smallest ball around the unit
+ * normals, or their mean if that is better. Its apex lies behind the planes of all triangles, so an eye in
+ * the cone behind the apex is behind every triangle. Box: the least surface area among frames around the mean
+ * normal and the principal axes, each turned to TURNS angles, and the axes of the world. Everything is
+ * checked and widened on the floats as stored.
  */
+#include "partition/meshlet/bounds.h"
+
 #include <float.h>
 
 #include "base/math/eigen.h"
 #include "base/math/elementary.h"
 #include "base/math/round.h"
 #include "partition/meshlet/ball.h"
-#include "partition/meshlet/meshlet.h"
 
 enum { TURNS = 8 };
-static const double least_cosine = 0.1; /* of a normal to the axis: wider cones would cull nothing */
-static const double slack = 1e-5;       /* of the cutoff, for tests in floats */
+static const double least_cosine = 0.1; /* of a normal to the axis; wider cones would cull almost nothing */
+static const double slack = 1e-5;       /* margin of the cutoff for tests in floats */
 
 typedef struct patch {
     uint32_t vertex_count, normal_count;
     v3 points[FCT_MESHLET_VERTICES];
-    v3 normals[FCT_MESHLET_TRIANGLES], corners[FCT_MESHLET_TRIANGLES]; /* of triangles with area */
+    v3 normals[FCT_MESHLET_TRIANGLES], corners[FCT_MESHLET_TRIANGLES]; /* of triangles with an area */
     v3 vector;                                                         /* area vector */
 } patch;
 
@@ -39,7 +41,7 @@ static void load_patch(const float *positions, uint32_t vertex_count, const uint
     }
 }
 
-/* Upwards, and never beyond the range of a float. */
+/* The next float above, at most FLT_MAX. */
 static float round_up(double value) {
     float rounded = value < (double)FLT_MAX ? (float)value : FLT_MAX;
     return rounded < FLT_MAX ? nextafterf(rounded, INFINITY) : FLT_MAX;
@@ -56,13 +58,13 @@ static void bound_sphere(const patch *p, fct_meshlet_bounds *out) {
     out->radius = radius > 0 ? round_up(radius) : 0;
 }
 
-static double least_dot(const patch *p, v3 axis) {
+static double find_least_dot(const patch *p, v3 axis) {
     double least = INFINITY;
     for (uint32_t i = 0; i < p->normal_count; ++i) least = fmin(least, v3_dot(p->normals[i], axis));
     return least;
 }
 
-/* Where the apex is, as floats, behind all planes; false where rounding does not let it be. */
+/* Moves the apex back until it is, as floats, behind all planes; false if rounding prevents that. */
 static bool place_apex(const patch *p, v3 axis, double cosine, fct_meshlet_bounds *out) {
     v3 center = v3_load(out->center);
     double back = -INFINITY;
@@ -89,10 +91,10 @@ static void bound_cone(const patch *p, fct_meshlet_bounds *out) {
     double radius;
     fct_smallest_ball(p->normals, p->normal_count, &middle, &radius);
     middle = v3_unit(middle);
-    if (least_dot(p, mean) > least_dot(p, middle)) middle = mean;
-    if (!(least_dot(p, middle) > least_cosine)) return;
+    if (find_least_dot(p, mean) > find_least_dot(p, middle)) middle = mean;
+    if (!(find_least_dot(p, middle) > least_cosine)) return;
     middle = v3_round(middle);
-    double length = v3_norm(middle), cosine = fmin(least_dot(p, middle) / length, 1);
+    double length = v3_norm(middle), cosine = fmin(find_least_dot(p, middle) / length, 1);
     if (!place_apex(p, middle, cosine, out)) {
         for (int i = 0; i < 3; ++i) out->cone_apex[i] = out->center[i];
         return;
@@ -111,7 +113,7 @@ static void bound_world(const patch *p, fct_bounds *out) {
     }
 }
 
-/* Half the surface of the box along a frame, over 4; its middle and half extents along the frame. */
+/* An eighth of the surface area of the box along a frame; its middle and half extents along the frame. */
 static double measure_frame(const patch *p, const v3 frame[3], double middle[3], double half[3]) {
     v3 origin = p->points[0];
     for (int k = 0; k < 3; ++k) {
@@ -125,7 +127,7 @@ static double measure_frame(const patch *p, const v3 frame[3], double middle[3],
     return half[0] * half[1] + half[1] * half[2] + half[2] * half[0];
 }
 
-/* Keeps the frame about `normal`, of all its turns, if its box is the least so far. */
+/* Tries all turns of the frame around `normal`; keeps the one with the least box so far. */
 static void try_frames(const patch *p, v3 normal, double *least, v3 best[3]) {
     v3 t, b;
     if (!(v3_norm2(normal) > 0)) return;
@@ -166,7 +168,7 @@ static void bound_box(const patch *p, fct_box *out) {
             reach = fmax(reach, fabs(v3_dot(v3_sub(p->points[v], center), frame[k])));
             size = fmax(size, fabs(v3_dot(p->points[v], frame[k])));
         }
-        out->half[k] = round_up(reach + 16 * DBL_EPSILON * size); /* whatever order of operations checks it */
+        out->half[k] = round_up(reach + 16 * DBL_EPSILON * size); /* for other orders of operations */
     }
 }
 

@@ -1,17 +1,21 @@
-/* partition/meshlet/grow.c: pieces grown face by face, at the scale the tree tells.
+/* partition/meshlet/grow.c: grows pieces face by face.
  *
- * A piece begins beside the one before, at the face with the fewest free faces around it, else at the next
- * free place of the tree. It takes faces that bring no new vertex first, then those that would be left alone,
- * then the one nearest to its middle and most like it in direction; the size of the subtree that would fit
- * says what is near. With no neighbour left to take it goes on at the next place of the tree, if that is
- * near. Regions of the tree grow on their own, in parallel. O(F x front of a piece).
+ * A piece begins next to the previous piece, at the face whose vertices have the fewest free faces, or at the
+ * next free place of the tree. It takes faces in this order:
+ * 1. faces that bring no new vertex;
+ * 2. faces with a corner that no other free face has;
+ * 3. the face nearest to its middle and most similar in direction. Distances are relative to the size of the
+ *    subtree that would fit.
+ * Without a neighbour to take, it continues at the next place of the tree, if that is near. Regions of the
+ * tree grow independently, in parallel. O(F x front of a piece).
  */
+#include "partition/meshlet/grow.h"
+
 #include <string.h>
 
 #include "base/math/vec.h"
 #include "base/parallel.h"
-#include "partition/chart/chart.h"
-#include "partition/meshlet/meshlet.h"
+#include "partition/face.h"
 
 enum { MOST_FRONT = 3 * FCT_MESHLET_TRIANGLES, LOOKS = 64 };
 
@@ -20,36 +24,36 @@ typedef struct candidate {
     float centroid[3], normal[3];
 } candidate;
 
-/* A region and its piece of the moment. Vertices have numbers of the region's own. */
+/* A region and its current piece. Vertices have numbers within the region. */
 typedef struct grower {
     const fct_packer *packer;
-    const uint32_t *corners; /* by corner of the region: its vertex */
-    uint32_t *live;          /* by vertex: free faces */
-    uint32_t *stamps;        /* by vertex: the piece that has it, of those the last */
+    const uint32_t *corners; /* per corner of the region: its vertex */
+    uint32_t *live;          /* per vertex: free faces */
+    uint32_t *stamps;        /* per vertex: the last piece that has it */
     uint32_t first, end;     /* places of the region */
     uint32_t next_place;
     uint32_t piece, seed, face_count, vertex_count;
-    double reach;      /* squared, of the seed */
-    v3 middle, normal; /* sums of centroids and unit normals */
+    double reach;      /* squared reach of the seed */
+    v3 middle, normal; /* sums of centroids and unit normals of its faces */
     uint32_t front_count;
-    candidate front[MOST_FRONT]; /* free faces beside the piece, and some that are no longer free */
+    candidate front[MOST_FRONT]; /* free faces beside the piece; may contain taken ones */
 } grower;
 
-/* The regions' faces belong to nobody else, not even to be looked at. */
+/* Other threads own the faces of other regions, so the range is tested first. */
 static bool is_free(const grower *g, uint32_t face) {
     return face >= g->first && face < g->end && g->packer->owner[face] == FCT_NONE;
 }
 
-static const uint32_t *corners_of(const grower *g, uint32_t face) {
+static const uint32_t *get_corners(const grower *g, uint32_t face) {
     return g->corners + 3 * (size_t)(face - g->first);
 }
 
-static bool same_material(const grower *g, uint32_t face) {
+static bool has_material(const grower *g, uint32_t face) {
     const uint32_t *materials = g->packer->view->materials;
     return !materials || materials[face] == materials[g->seed];
 }
 
-static candidate describe(const fct_tree_view *view, uint32_t face) {
+static candidate describe_face(const fct_tree_view *view, uint32_t face) {
     const uint32_t *t = view->triangles + 3 * (size_t)face;
     candidate c = {.face = face};
     v3 sum = {0, 0, 0};
@@ -68,13 +72,13 @@ static void push_neighbours(grower *g, uint32_t face) {
             uint32_t i = 0;
             while (i < g->front_count && g->front[i].face != ends[k] / 3) ++i;
             if (i == g->front_count && i < MOST_FRONT)
-                g->front[g->front_count++] = describe(g->packer->view, ends[k] / 3);
+                g->front[g->front_count++] = describe_face(g->packer->view, ends[k] / 3);
         }
     }
 }
 
-static void take(grower *g, const candidate *c) {
-    const uint32_t *t = corners_of(g, c->face);
+static void take_face(grower *g, const candidate *c) {
+    const uint32_t *t = get_corners(g, c->face);
     g->packer->owner[c->face] = g->piece;
     ++g->face_count;
     for (int k = 0; k < 3; ++k) {
@@ -87,9 +91,9 @@ static void take(grower *g, const candidate *c) {
     push_neighbours(g, c->face);
 }
 
-/* 0: brings no vertex; 1: has a corner that no other free face has; 2: else. *fresh: vertices it brings. */
-static int rank_of(const grower *g, uint32_t face, uint32_t *fresh) {
-    const uint32_t *t = corners_of(g, face);
+/* The class of a face, see the top: 0, 1 or 2. *fresh: the number of new vertices. */
+static int rank_face(const grower *g, uint32_t face, uint32_t *fresh) {
+    const uint32_t *t = get_corners(g, face);
     bool last = false;
     *fresh = 0;
     for (int k = 0; k < 3; ++k) {
@@ -99,16 +103,16 @@ static int rank_of(const grower *g, uint32_t face, uint32_t *fresh) {
     return *fresh == 0 ? 0 : last ? 1 : 2;
 }
 
-/* Whether a face looks away from a piece that is nearly flat: backs of two-sided surfaces share vertices with
- * their fronts, and together nothing could be culled. */
+/* Whether a face looks away from a nearly flat piece. The back of a two-sided surface shares vertices with
+ * its front, and a piece with both could never be culled. */
 static bool is_opposed(const grower *g, const candidate *c) {
     double flat = 0.8 * g->face_count;
     return g->packer->def.flatness > 0 && v3_dot(v3_load(c->normal), g->normal) < 0 &&
            v3_norm(g->normal) > flat;
 }
 
-/* The best face of the front that fits; false where there is none. Drops what is no longer free. */
-static bool choose(grower *g, candidate *chosen) {
+/* The best face of the front that fits; false if there is none. Drops faces that are not free. */
+static bool choose_face(grower *g, candidate *chosen) {
     const fct_packer *p = g->packer;
     uint32_t best = FCT_NONE, room = p->def.max_vertices - g->vertex_count;
     int best_rank = 3;
@@ -121,9 +125,9 @@ static bool choose(grower *g, candidate *chosen) {
             continue;
         }
         uint32_t fresh, at = i++;
-        int rank = rank_of(g, c->face, &fresh);
+        int rank = rank_face(g, c->face, &fresh);
         if (is_opposed(g, c)) continue;
-        if (fresh > room || rank > best_rank || !same_material(g, c->face)) continue;
+        if (fresh > room || rank > best_rank || !has_material(g, c->face)) continue;
         double score = v3_norm2(v3_sub(v3_load(c->centroid), middle)) / g->reach;
         score += p->def.flatness * (1 - v3_dot(v3_load(c->normal), normal));
         bool better =
@@ -134,57 +138,57 @@ static bool choose(grower *g, candidate *chosen) {
     return best != FCT_NONE;
 }
 
-static uint32_t next_free(grower *g) {
+static uint32_t find_free(grower *g) {
     while (g->next_place < g->end && !is_free(g, g->next_place)) ++g->next_place;
     return g->next_place;
 }
 
-/* Whether a piece without neighbours to take may go on at a face: of its home, within twice the reach, of its
- * direction and material, and with room for it. */
+/* Whether a piece may continue at a face that is not its neighbour: the face fits, has its material, does not
+ * look away, and lies within twice the reach. */
 static bool may_jump(const grower *g, uint32_t face, v3 middle, candidate *chosen) {
     const fct_packer *p = g->packer;
     uint32_t fresh;
-    rank_of(g, face, &fresh);
+    rank_face(g, face, &fresh);
     if (fresh > p->def.max_vertices - g->vertex_count) return false;
-    if (!same_material(g, face)) return false;
-    *chosen = describe(p->view, face);
+    if (!has_material(g, face)) return false;
+    *chosen = describe_face(p->view, face);
     if (is_opposed(g, chosen)) return false;
     return v3_norm2(v3_sub(v3_load(chosen->centroid), middle)) <= 4 * g->reach;
 }
 
-/* The next free place of the tree where the piece may go on. */
-static bool jump(grower *g, candidate *chosen) {
+/* The next free place of the same home where the piece may continue. */
+static bool choose_jump(grower *g, candidate *chosen) {
     const uint32_t *home = g->packer->home;
-    uint32_t face = next_free(g);
+    uint32_t face = find_free(g);
     v3 middle = v3_scale(g->middle, 1.0 / g->face_count);
     for (int look = 0; look < LOOKS && face < g->end && home[face] == home[g->seed]; ++look, ++face)
         if (is_free(g, face) && may_jump(g, face, middle, chosen)) return true;
     return false;
 }
 
-/* Where the next piece begins; `end` when all is done. */
+/* The face at which the next piece begins; `end` if there is none. */
 static uint32_t choose_seed(grower *g) {
     uint32_t best = FCT_NONE;
     uint64_t fewest = UINT64_MAX;
     for (uint32_t i = 0; i < g->front_count; ++i) {
         uint32_t face = g->front[i].face;
         if (!is_free(g, face)) continue;
-        const uint32_t *t = corners_of(g, face);
+        const uint32_t *t = get_corners(g, face);
         uint64_t around = (uint64_t)g->live[t[0]] + g->live[t[1]] + g->live[t[2]];
         if (around < fewest || (around == fewest && face < best)) best = face, fewest = around;
     }
-    return best != FCT_NONE ? best : next_free(g);
+    return best != FCT_NONE ? best : find_free(g);
 }
 
 static void grow_piece(grower *g, uint32_t seed) {
     const fct_packer *p = g->packer;
-    candidate next = describe(p->view, seed);
+    candidate next = describe_face(p->view, seed);
     g->seed = seed;
     g->reach = fmax((double)p->reach[seed] * (double)p->reach[seed], 1e-300);
     g->middle = g->normal = (v3){0, 0, 0};
     g->front_count = g->face_count = g->vertex_count = 0;
-    do take(g, &next);
-    while (g->face_count < p->def.max_triangles && (choose(g, &next) || jump(g, &next)));
+    do take_face(g, &next);
+    while (g->face_count < p->def.max_triangles && (choose_face(g, &next) || choose_jump(g, &next)));
     ++g->piece;
 }
 
@@ -193,12 +197,12 @@ static void grow_piece(grower *g, uint32_t seed) {
 typedef struct field {
     fct_packer *packer;
     const uint32_t *bounds;
-    uint32_t *corners; /* by corner: its vertex's number in the region */
-    uint32_t *counts;  /* by region: pieces, then the number of the first */
-    grower *growers;   /* by thread */
+    uint32_t *corners; /* per corner: the number of its vertex in the region */
+    uint32_t *counts;  /* per region: number of pieces, then number of its first piece */
+    grower *growers;   /* per thread */
 } field;
 
-/* Numbers the vertices of the region by first use. Returns how many there are. */
+/* Numbers the vertices of the region by first use. Returns their number. */
 static uint32_t number_vertices(const fct_packer *p, uint32_t first, uint32_t end, uint32_t *corners) {
     uint32_t count = 0;
     for (size_t f = first; f < end; ++f) {

@@ -1,25 +1,32 @@
-/* partition/meshlet/meshlet.c: meshlets from a tree: cut, pack, write down.
+/* partition/meshlet/meshlet.c: fct_tree_meshlets.
  *
- * The largest subtrees within the limits are pieces; packing makes fewer of them (meshlet_pack.c); then each
- * becomes a meshlet, in order of the tree: its faces in order of places, its vertices by first use. Vertices
- * of a range are counted as corners whose vertex has no face before it in the range. O(F log F).
+ * 1. Read from the tree which places are near each other and how large a meshlet is there.
+ * 2. Grow pieces (grow.c) and pack them (pack.c).
+ * 3. Write each piece as a meshlet, in order of the tree: faces in order of places, vertices by first use.
+ * A range of places has a new vertex for each corner whose vertex has no earlier face in the range. O(F log
+ * F).
  */
-#include "partition/meshlet/meshlet.h"
-
 #include <string.h>
 
 #include "base/math/vec.h"
 #include "base/parallel.h"
 #include "partition/cut.h"
+#include "partition/meshlet/bounds.h"
+#include "partition/meshlet/grow.h"
+#include "partition/meshlet/pack.h"
 
-enum { GRAIN = 256, NEARBY = 16, REGION = 1 << 17 };
+enum {
+    GRAIN = 256,
+    NEARBY = 16,     /* meshlets per home */
+    REGION = 1 << 17 /* faces per region that grows independently */
+};
 
 fct_meshlet_def fct_meshlet_def_default(void) {
     return (fct_meshlet_def){
         .size = sizeof(fct_meshlet_def), .max_vertices = 64, .max_triangles = 124, .flatness = 1};
 }
 
-static bool fits(void *user, uint32_t node, uint32_t thread) {
+static bool fits_meshlet(void *user, uint32_t node, uint32_t thread) {
     (void)thread;
     const fct_packer *p = user;
     uint32_t first = fct_node_first(p->tree, node), count = fct_node_faces(p->tree, node), vertices = 0;
@@ -70,8 +77,8 @@ static void release_packer(const fct_env *env, fct_packer *p) {
     fct_release(env, p->vertex_counts);
 }
 
-/* Cuts the places into runs of at most `most` faces, each of subtrees that are neighbours: bounds[0] = 0 to
- * bounds[*count - 1], the number of faces. `bounds` holds face_count + 1. */
+/* Cuts the places into runs of successive subtrees with at most `most` faces. `bounds` holds face_count + 1
+ * and receives *count places from 0 to face_count. */
 static fct_result cut_runs(const fct_env *env, const fct_tree *tree, uint32_t most, uint32_t *bounds,
                            uint32_t *count) {
     const fct_tree_view *view = &tree->view;
@@ -79,7 +86,7 @@ static fct_result cut_runs(const fct_env *env, const fct_tree *tree, uint32_t mo
     uint32_t nodes, place = 0, runs = 0;
     fct_result result = fct_cut_tree(env, tree, "meshlets", is_small, &test, bounds, &nodes);
     if (result != FCT_OK) return result;
-    for (uint32_t i = 0, begin = 0; i < nodes; ++i) { /* there are never more runs than nodes read */
+    for (uint32_t i = 0, begin = 0; i < nodes; ++i) { /* writing never overtakes reading */
         uint32_t faces = fct_node_faces(tree, bounds[i]);
         if (place > begin && place + faces - begin > most) {
             bounds[runs++] = begin;
@@ -93,14 +100,13 @@ static fct_result cut_runs(const fct_env *env, const fct_tree *tree, uint32_t mo
     return FCT_OK;
 }
 
-/* What the tree tells of each place: which part of the mesh it is near to, and how large a meshlet is here.
- */
+/* Sets home and reach of each place. */
 static fct_result read_scales(const fct_env *env, const fct_tree *tree, fct_packer *p, uint32_t *scratch) {
     uint32_t count;
     fct_result result = cut_runs(env, tree, NEARBY * p->def.max_triangles, scratch, &count);
     for (uint32_t i = 0; i + 1 < count && result == FCT_OK; ++i)
         for (uint32_t f = scratch[i]; f < scratch[i + 1]; ++f) p->home[f] = i;
-    if (result == FCT_OK) result = fct_cut_tree(env, tree, "meshlets", fits, p, scratch, &count);
+    if (result == FCT_OK) result = fct_cut_tree(env, tree, "meshlets", fits_meshlet, p, scratch, &count);
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         fct_cluster room;
         const fct_cluster *c = fct_node_cluster(tree, scratch[i], &room);
@@ -122,8 +128,8 @@ static void fill_pieces(void *user, size_t begin, size_t end, size_t chunk, uint
         fct_packer_add(run->packer, run->packer->owner[f], f);
 }
 
-/* The lists of the pieces that owner tells of. Those of a run are of this run alone. */
-static fct_result make_lists(const fct_env *env, fct_packer *p, const uint32_t *bounds, uint32_t count) {
+/* Fills the lists of the pieces from `owner`. No piece crosses a bound, so runs are independent. */
+static fct_result fill_lists(const fct_env *env, fct_packer *p, const uint32_t *bounds, uint32_t count) {
     size_t faces = (size_t)p->count * p->def.max_triangles, vertices = (size_t)p->count * p->def.max_vertices;
     const fct_array arrays[] = {FCT_ARRAY(p->faces, faces), FCT_ARRAY(p->vertices, vertices),
                                 FCT_ARRAY(p->uses, vertices), FCT_ARRAY_ZERO(p->face_counts, p->count),
@@ -151,7 +157,7 @@ static fct_result make_pieces(const fct_env *env, const fct_tree *tree, fct_pack
         result = fct_sides_build(env, view->triangles, view->face_count, view->vertex_count, &p->sides);
     if (result == FCT_OK) result = cut_runs(env, tree, REGION, scratch, &count);
     if (result == FCT_OK) result = fct_meshlets_grow(env, p, scratch, count);
-    if (result == FCT_OK) result = make_lists(env, p, scratch, count);
+    if (result == FCT_OK) result = fill_lists(env, p, scratch, count);
     if (result == FCT_OK) result = fct_meshlets_pack(env, p);
     fct_release(env, scratch);
     return result;
@@ -161,11 +167,11 @@ static fct_result make_pieces(const fct_env *env, const fct_tree *tree, fct_pack
 
 typedef struct writer {
     const fct_packer *packer;
-    const uint32_t *pieces; /* of each meshlet */
+    const uint32_t *pieces; /* per meshlet */
     fct_meshlets *out;
 } writer;
 
-/* Vertices by first use. `piece_faces` are places and stay as they are; out->faces becomes input ids. */
+/* Writes vertices by first use and replaces the places in out->faces by input faces. */
 static void write_meshlet(const writer *w, uint32_t m) {
     const fct_tree_view *view = w->packer->view;
     fct_meshlets *out = w->out;
@@ -196,7 +202,7 @@ static void write_meshlets(void *user, size_t begin, size_t end, size_t chunk, u
     for (size_t i = begin; i < end; ++i) write_meshlet(user, (uint32_t)i);
 }
 
-/* Numbers the pieces that are left, by their first face. `numbers` holds a number a piece. */
+/* Numbers the pieces that are not empty, by their first face. `numbers` holds one per piece. */
 static void number_pieces(const fct_packer *p, uint32_t *numbers, uint32_t *pieces) {
     uint32_t count = 0;
     memset(numbers, 0xFF, p->count * sizeof *numbers);
@@ -207,7 +213,7 @@ static void number_pieces(const fct_packer *p, uint32_t *numbers, uint32_t *piec
         }
 }
 
-static void lay_out(const fct_packer *p, const uint32_t *pieces, fct_meshlets *out) {
+static void place_meshlets(const fct_packer *p, const uint32_t *pieces, fct_meshlets *out) {
     uint32_t faces = 0;
     out->vertex_count = 0, out->triangle_bytes = 0;
     for (uint32_t m = 0; m < out->count; ++m) {
@@ -222,15 +228,15 @@ static void lay_out(const fct_packer *p, const uint32_t *pieces, fct_meshlets *o
     out->first_face[out->count] = faces;
 }
 
-static fct_result write_down(const fct_env *env, const fct_packer *p, uint32_t *numbers, uint32_t *pieces,
-                             fct_meshlets *out) {
+static fct_result write_pieces(const fct_env *env, const fct_packer *p, uint32_t *numbers, uint32_t *pieces,
+                               fct_meshlets *out) {
     for (uint32_t i = 0; i < p->count; ++i) out->count += p->face_counts[i] > 0;
     const fct_array arrays[] = {FCT_ARRAY(out->meshlets, out->count), FCT_ARRAY(out->bounds, out->count),
                                 FCT_ARRAY(out->first_face, (size_t)out->count + 1),
                                 FCT_ARRAY(out->faces, p->view->face_count)};
     if (fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "meshlets") != FCT_OK) return FCT_ERROR_MEMORY;
     number_pieces(p, numbers, pieces);
-    lay_out(p, pieces, out);
+    place_meshlets(p, pieces, out);
     const fct_array lists[] = {FCT_ARRAY(out->vertices, out->vertex_count),
                                FCT_ARRAY(out->triangles, out->triangle_bytes)};
     if (fct_allocate_all(env, lists, FCT_LENGTH(lists), "meshlets") != FCT_OK) return FCT_ERROR_MEMORY;
@@ -266,7 +272,7 @@ fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct
     if (result == FCT_OK) result = make_pieces(env, tree, &p);
     uint32_t *numbers = result == FCT_OK ? fct_allocate(env, p.count, 2 * sizeof *numbers) : NULL;
     if (result == FCT_OK && !numbers) result = fct_fail_memory(env, "meshlets");
-    if (result == FCT_OK) result = write_down(env, &p, numbers, numbers + p.count, out);
+    if (result == FCT_OK) result = write_pieces(env, &p, numbers, numbers + p.count, out);
     fct_release(env, numbers);
     release_packer(env, &p);
     if (result != FCT_OK) fct_meshlets_release(env, out);

@@ -1,22 +1,24 @@
-/* partition/meshlet/pack.c: fewer and fuller pieces.
+/* partition/meshlet/pack.c: makes fewer and fuller pieces.
  *
- * Growth leaves small pieces between full ones. From the smallest piece up: it joins the
- * neighbour it shares most vertices with if both fit into one; else its faces go to neighbours one by one,
- * those first that bring no new vertex, and if some cannot be placed, all come back. What has no neighbours
- * joins what is near in the tree. Serial; O(pieces x limits).
+ * Growth leaves small pieces between full ones. From the smallest piece up:
+ * 1. Merge it with the neighbour that shares most vertices with it, if both fit into one piece.
+ * 2. Otherwise give its faces to neighbours one by one, first those that bring no new vertex. If some face
+ * finds no place, take all of them back. Pieces without neighbours merge with others that are near in the
+ * tree. Serial; O(pieces x limits).
  */
+#include "partition/meshlet/pack.h"
+
 #include <string.h>
 
 #include "base/sort.h"
-#include "partition/meshlet/meshlet.h"
 
 enum { MOST_PASSES = 8, NEAR = 16, SIDES = 3 * FCT_MESHLET_TRIANGLES };
 
-/* What may happen to a face of the piece that is being shared out: through each side it may go to the piece
- * there, which has the face's far corner or must take it in. */
+/* Where a face may go through one of its sides: the piece there, which has the face's opposite corner or must
+ * add it. */
 typedef struct option {
-    uint32_t receiver; /* FCT_NONE: none through this side */
-    uint32_t corner;   /* FCT_NONE: the receiver has it */
+    uint32_t receiver; /* FCT_NONE: no piece */
+    uint32_t corner;   /* the corner to add, or FCT_NONE */
 } option;
 
 typedef struct move {
@@ -25,7 +27,7 @@ typedef struct move {
 } move;
 
 typedef struct sharing {
-    uint32_t count; /* faces that are left */
+    uint32_t count; /* faces without a new place */
     uint32_t faces[FCT_MESHLET_TRIANGLES];
     option options[FCT_MESHLET_TRIANGLES][3];
     uint32_t move_count;
@@ -57,7 +59,7 @@ void fct_packer_add(fct_packer *p, uint32_t piece, uint32_t face) {
     }
 }
 
-/* Undoes the last fct_packer_add of a piece: its vertices are at the end where nobody else uses them. */
+/* Undoes the last fct_packer_add of a piece. The vertices that it added are the last ones. */
 static void remove_last_face(fct_packer *p, uint32_t piece) {
     size_t base = (size_t)piece * p->def.max_vertices;
     uint32_t face = p->faces[(size_t)piece * p->def.max_triangles + --p->face_counts[piece]];
@@ -69,8 +71,9 @@ static void remove_last_face(fct_packer *p, uint32_t piece) {
 
 /* --- Joining two pieces --- */
 
-/* Whether two pieces fit into one, and how many vertices they share. Given up as soon as too few are left. */
-static bool fit_together(const fct_packer *p, uint32_t a, uint32_t b, uint32_t *shared) {
+/* Whether two pieces fit into one; *shared: the vertices that they share. Stops as soon as they cannot fit.
+ */
+static bool fit_pieces(const fct_packer *p, uint32_t a, uint32_t b, uint32_t *shared) {
     if ((uint32_t)p->face_counts[a] + p->face_counts[b] > p->def.max_triangles) return false;
     if (!fct_packer_material(p, p->faces[(size_t)a * p->def.max_triangles], b)) return false;
     uint32_t count = p->vertex_counts[a], both = count + p->vertex_counts[b];
@@ -82,42 +85,42 @@ static bool fit_together(const fct_packer *p, uint32_t a, uint32_t b, uint32_t *
     return both - *shared <= p->def.max_vertices;
 }
 
-static void join(fct_packer *p, uint32_t from, uint32_t to) {
+static void join_pieces(fct_packer *p, uint32_t from, uint32_t to) {
     for (uint32_t i = 0; i < p->face_counts[from]; ++i)
         fct_packer_add(p, to, p->faces[(size_t)from * p->def.max_triangles + i]);
     p->face_counts[from] = 0, p->vertex_counts[from] = 0;
 }
 
-/* The piece on the other side of a side of a face of `piece`; FCT_NONE at a border. */
-static uint32_t across(const fct_packer *p, uint32_t side, uint32_t piece) {
+/* The other piece at a side of a face of `piece`; FCT_NONE at a border. */
+static uint32_t find_across(const fct_packer *p, uint32_t side, uint32_t piece) {
     uint32_t before = p->sides.before[side], after = p->sides.after[side];
     if (before != FCT_NONE && p->owner[before / 3] != piece) return p->owner[before / 3];
     if (after != FCT_NONE && p->owner[after / 3] != piece) return p->owner[after / 3];
     return FCT_NONE;
 }
 
-/* Joins a piece to the neighbour with which it shares most vertices, if one has room for it. */
+/* Merges a piece with the neighbour that has room for it and shares most vertices with it. */
 static bool join_neighbour(fct_packer *p, uint32_t piece) {
     uint32_t seen[SIDES], count = 0, best = FCT_NONE, most = 0;
     const uint32_t *faces = p->faces + (size_t)piece * p->def.max_triangles;
     for (uint32_t i = 0; i < p->face_counts[piece]; ++i)
         for (uint32_t side = 3 * faces[i]; side < 3 * faces[i] + 3; ++side) {
-            uint32_t other = across(p, side, piece), at = 0, shared;
+            uint32_t other = find_across(p, side, piece), at = 0, shared;
             while (at < count && seen[at] != other) ++at;
             if (other == FCT_NONE || at < count) continue;
             seen[count++] = other;
-            if (!fit_together(p, piece, other, &shared) || shared < most) continue;
+            if (!fit_pieces(p, piece, other, &shared) || shared < most) continue;
             if (shared == most && best < other) continue;
             best = other, most = shared;
         }
-    if (best != FCT_NONE) join(p, piece, best);
+    if (best != FCT_NONE) join_pieces(p, piece, best);
     return best != FCT_NONE;
 }
 
 /* --- Sharing out the faces of a piece --- */
 
-static option option_through(const fct_packer *p, uint32_t side, uint32_t piece) {
-    option o = {across(p, side, piece), FCT_NONE};
+static option find_option(const fct_packer *p, uint32_t side, uint32_t piece) {
+    option o = {find_across(p, side, piece), FCT_NONE};
     if (o.receiver == FCT_NONE) return o;
     uint32_t corner = p->view->triangles[side % 3 == 0 ? side + 2 : side - 1];
     if (!fct_packer_material(p, side / 3, o.receiver))
@@ -127,7 +130,7 @@ static option option_through(const fct_packer *p, uint32_t side, uint32_t piece)
     return o;
 }
 
-/* The best of all moves: no new vertex before one, then the receiver with most room. */
+/* The best move: first without a new vertex, then to the receiver with most room. */
 static bool choose_move(const fct_packer *p, const sharing *s, uint32_t *index, option *chosen) {
     uint32_t best = 0;
     for (uint32_t i = 0; i < s->count; ++i)
@@ -143,7 +146,7 @@ static bool choose_move(const fct_packer *p, const sharing *s, uint32_t *index, 
     return best > 0;
 }
 
-/* Brings the options of what is left up to date after a face went to a receiver. */
+/* Updates the options of the remaining faces after a face moved. */
 static void update_options(const fct_packer *p, sharing *s, uint32_t piece, uint32_t face, option moved) {
     for (uint32_t i = 0; i < s->count; ++i)
         for (uint32_t k = 0; k < 3; ++k) {
@@ -151,19 +154,19 @@ static void update_options(const fct_packer *p, sharing *s, uint32_t piece, uint
             uint32_t side = 3 * s->faces[i] + k;
             uint32_t before = p->sides.before[side], after = p->sides.after[side];
             if ((before != FCT_NONE && before / 3 == face) || (after != FCT_NONE && after / 3 == face))
-                *o = option_through(p, side, piece);
+                *o = find_option(p, side, piece);
             else if (o->receiver == moved.receiver && o->corner == moved.corner)
                 o->corner = FCT_NONE;
         }
 }
 
-static bool share_out(fct_packer *p, uint32_t piece, sharing *s) {
+static bool distribute_faces(fct_packer *p, uint32_t piece, sharing *s) {
     uint32_t vertices = p->vertex_counts[piece], faces = p->face_counts[piece], index = 0;
     option chosen = {FCT_NONE, FCT_NONE};
     s->count = faces, s->move_count = 0;
     for (uint32_t i = 0; i < faces; ++i) {
         s->faces[i] = p->faces[(size_t)piece * p->def.max_triangles + i];
-        for (uint32_t k = 0; k < 3; ++k) s->options[i][k] = option_through(p, 3 * s->faces[i] + k, piece);
+        for (uint32_t k = 0; k < 3; ++k) s->options[i][k] = find_option(p, 3 * s->faces[i] + k, piece);
     }
     while (s->count > 0 && choose_move(p, s, &index, &chosen)) {
         uint32_t face = s->faces[index];
@@ -187,7 +190,7 @@ static bool share_out(fct_packer *p, uint32_t piece, sharing *s) {
 
 /* --- The passes --- */
 
-/* Pieces that are left, in order of their number of faces, then of their numbers. */
+/* Lists the pieces that are not empty, by number of faces, then by number. */
 static uint32_t sort_pieces(const fct_packer *p, uint32_t *order) {
     uint32_t places[FCT_MESHLET_TRIANGLES + 2] = {0}, total = 0;
     for (uint32_t i = 0; i < p->count; ++i) ++places[p->face_counts[i]];
@@ -202,7 +205,7 @@ static uint32_t sort_pieces(const fct_packer *p, uint32_t *order) {
     return total;
 }
 
-/* Pieces above the mean are left alone: to try them, too, takes three times as long for 1 % fewer. */
+/* Skips pieces larger than the mean: to try them too takes three times as long for 1 % fewer pieces. */
 static fct_result pack_neighbours(const fct_env *env, fct_packer *p, uint32_t *order, sharing *s) {
     uint32_t removed = 1;
     for (int pass = 0; pass < MOST_PASSES && removed > 0; ++pass) {
@@ -214,14 +217,13 @@ static fct_result pack_neighbours(const fct_env *env, fct_packer *p, uint32_t *o
                 if (result != FCT_OK) return result;
             }
             if (p->face_counts[order[i]] > mean) break;
-            removed += join_neighbour(p, order[i]) || share_out(p, order[i], s);
+            removed += join_neighbour(p, order[i]) || distribute_faces(p, order[i], s);
         }
     }
     return FCT_OK;
 }
 
-/* First fit among the last few of the same home, the larger pieces first: what is left of parts that touch
- * nothing more. */
+/* First fit among the last NEAR pieces of the same home, larger pieces first. */
 static fct_result pack_near(const fct_env *env, fct_packer *p, uint32_t *order) {
     uint64_t *keys = fct_allocate(env, p->count, sizeof *keys);
     if (!keys) return fct_fail_memory(env, "packing meshlets");
@@ -236,9 +238,9 @@ static fct_result pack_near(const fct_env *env, fct_packer *p, uint32_t *order) 
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         uint32_t piece = order[i], at = 0, shared;
         if (i > 0 && keys[i] >> 10 != keys[i - 1] >> 10) kept = 0;
-        while (at < kept && !fit_together(p, piece, recent[at], &shared)) ++at;
+        while (at < kept && !fit_pieces(p, piece, recent[at], &shared)) ++at;
         if (at < kept) {
-            join(p, piece, recent[at]);
+            join_pieces(p, piece, recent[at]);
         } else {
             if (kept == NEAR) memmove(recent, recent + 1, --kept * sizeof *recent);
             recent[kept++] = piece;

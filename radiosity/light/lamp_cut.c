@@ -12,6 +12,7 @@
 
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
+#include "facetree/partition.h"
 #include "radiosity/light/polygon.h"
 #include "scene/transform.h"
 

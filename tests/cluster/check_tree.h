@@ -6,6 +6,7 @@
 
 #include "base/math/vec.h"
 #include "cluster/tree/tree.h"
+#include "facetree/partition.h"
 
 static inline void check_node_geometry(const fct_tree_view *view, const fct_cluster *c) {
     fct_box box;

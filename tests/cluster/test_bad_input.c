@@ -4,7 +4,7 @@
 
 #include "check_tree.h"
 
-#include "facetree/cluster.h"
+#include "facetree/partition.h"
 
 static fct_mesh make(const fct_env *env, uint32_t vertices, uint32_t faces) {
     fct_mesh mesh;

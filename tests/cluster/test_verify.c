@@ -6,6 +6,7 @@
 
 #include "base/io/file.h"
 #include "cluster/file/format.h"
+#include "cluster/tree/check/edges.h"
 
 typedef struct mistake {
     const char *message;

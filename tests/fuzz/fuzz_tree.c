@@ -5,6 +5,7 @@
 
 #include "cluster/file/format.h"
 #include "facetree/bvh.h"
+#include "facetree/partition.h"
 #include "fuzz/fuzz.h"
 
 static void mend(const fct_env *env, uint8_t *data, size_t size) {

@@ -3,8 +3,8 @@
 #include "cluster/check_tree.h"
 
 #include "base/math/vec.h"
-#include "facetree/cluster.h"
 #include "facetree/dual.h"
+#include "facetree/partition.h"
 
 static const double pi = 3.14159265358979323846;
 

@@ -1,50 +1,57 @@
-/* cluster/file/verify.c: everything a finished tree promises, read from end to end: checksums, structure, the
- * header's counts, and of every node the sums over its faces: its box holds its vertices and no more, its
- * cone the normals; area, area vector, moment and centroid are those of its faces, its plane is a
- * least-squares plane, whose normal is along the area vector. O(F log F), parallel.
+/* cluster/tree/check/verify.c: compares every number of a tree with its triangles.
  *
- * Tolerances are those of floats, relative to the cluster's size. Where nearly all of a cluster's faces have
- * no area, its centroid need only lie in the box and its plane hold the centroid.
+ * For each node, direct sums over its faces give area, area vector S, moment M and centroid. The box must
+ * contain all vertices and end at one on each axis, the cone must contain all normals, and the plane must
+ * have the least E_fit (8.1), pass through the centroid and point along S. O(F log F), parallel.
+ *
+ * Tolerances are those of floats relative to the size of the cluster. Where almost none of the faces have an
+ * area, the centroid need only lie in the box, and the plane need only hold the centroid.
  */
+#include "cluster/tree/check/verify.h"
+
 #include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "base/math/eigen.h"
 #include "base/math/elementary.h"
 #include "base/parallel.h"
-#include "cluster/file/file.h"
+#include "cluster/tree/check/edges.h"
+#include "cluster/tree/check/structure.h"
 
 enum {
     GRAIN = 64,
-    TOP = 4096 /* nodes of so many faces that each is a task */
+    TOP = 4096 /* the first nodes have many faces: each is a task of its own */
 };
 
 typedef struct verifier {
     const fct_tree_view *view;
     const fct_cluster *clusters;
-    size_t first;           /* of the nodes looked at */
-    const uint32_t *leaves; /* ids, of which only leaves are looked at; NULL: all are nodes */
-    const char **faults;    /* per chunk */
+    size_t first; /* first record that is checked */
+    const uint32_t
+        *leaves;         /* ids of records of the cut, of which only leaves are checked; NULL: all records */
+    const char **faults; /* per chunk */
     uint32_t *nodes;
 } verifier;
 
-/* Sums over faces; lengths are measured from the box's centre. */
+/* Sums over the faces of a node. Points are relative to the centre of the box. */
 typedef struct totals {
     double area, weight, moment[6], second[6], lower[3], upper[3], narrowest;
     v3 vector, first;
 } totals;
 
+/* The frame of the node's box. */
 typedef struct frame {
     v3 center, axes[3];
 } frame;
 
-/* Within rounding of a float and of the largest term. */
-static bool alike(double stored, double value, double size) {
-    if (size > FLT_MAX) return true; /* held at the end of the range */
+/* Equal up to the rounding of a float of magnitude `size`. */
+static bool is_close(double stored, double value, double size) {
+    if (size > FLT_MAX) return true; /* describe.c stored the end of the range */
     return fabs(stored - value) <= 1e-5 * size + FLT_MIN;
 }
 
-/* Library calls of these would be half of the time. */
+/* Calls of fmin and fmax took half of the time. */
 static inline double least(double a, double b) {
     return a < b ? a : b;
 }
@@ -53,7 +60,7 @@ static inline double most(double a, double b) {
 }
 
 static void add_face(const fct_tree_view *view, size_t place, const frame *box, v3 cone, totals *t) {
-    v3 q[3], p[3]; /* p from the centre, where small faces may have no digits left */
+    v3 q[3], p[3]; /* q keeps the digits that small faces lose when p is taken from the centre */
     for (size_t k = 0; k < 3; ++k) {
         q[k] = v3_load(view->positions + 3 * (size_t)view->triangles[3 * place + k]);
         p[k] = v3_sub(q[k], box->center);
@@ -78,7 +85,8 @@ static void add_face(const fct_tree_view *view, size_t place, const frame *box, 
     for (int k = 0; k < 3; ++k) sym3_add_outer(t->second, weight / 12, v3_sub(p[k], middle));
 }
 
-static const char *box_fault(const fct_cluster *c, const fct_box *box, const totals *t, double diagonal) {
+static const char *find_box_fault(const fct_cluster *c, const fct_box *box, const totals *t,
+                                  double diagonal) {
     const float *q = c->box_rotation;
     double norm2 = 0;
     for (int i = 0; i < 4; ++i) norm2 += (double)q[i] * (double)q[i];
@@ -92,19 +100,20 @@ static const char *box_fault(const fct_cluster *c, const fct_box *box, const tot
     return NULL;
 }
 
-static const char *sums_fault(const fct_cluster *c, const totals *t) {
-    if (!alike((double)c->area, t->area, t->area)) return "an area that is not that of its faces";
+static const char *find_sums_fault(const fct_cluster *c, const totals *t) {
+    if (!is_close((double)c->area, t->area, t->area)) return "an area that is not that of its faces";
     const double vector[3] = {t->vector.x, t->vector.y, t->vector.z};
     for (int i = 0; i < 3; ++i)
-        if (!alike((double)c->area_vector[i], vector[i], t->area))
+        if (!is_close((double)c->area_vector[i], vector[i], t->area))
             return "an area vector that is not that of its faces";
     for (int i = 0; i < 6; ++i)
-        if (!alike((double)c->moment[i], t->moment[i], t->area))
+        if (!is_close((double)c->moment[i], t->moment[i], t->area))
             return "a moment that is not that of its faces";
     return NULL;
 }
 
-static const char *plane_fault(const fct_cluster *c, const fct_box *box, const totals *t, double diagonal) {
+static const char *find_plane_fault(const fct_cluster *c, const fct_box *box, const totals *t,
+                                    double diagonal) {
     v3 normal = v3_load(c->plane), center = v3_load(box->center);
     if (fabs(v3_norm2(normal) - 1) > 1e-5) return "a plane without a unit normal";
     v3 stored = v3_sub(v3_load(c->centroid), center), mean = stored;
@@ -130,7 +139,7 @@ static const char *plane_fault(const fct_cluster *c, const fct_box *box, const t
                                                                            : NULL;
 }
 
-static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
+static const char *find_record_fault(const fct_tree_view *view, const fct_cluster *c) {
     fct_box box;
     fct_cluster_box(c, &box);
     v3 cone = v3_unit(v3_load(c->area_vector));
@@ -140,14 +149,14 @@ static const char *node_fault(const fct_tree_view *view, const fct_cluster *c) {
     for (int i = 0; i < 3; ++i) t.lower[i] = INFINITY, t.upper[i] = -INFINITY;
     for (size_t place = c->first; place < (size_t)c->first + c->count; ++place)
         add_face(view, place, &f, cone, &t);
-    const char *fault = box_fault(c, &box, &t, diagonal);
+    const char *fault = find_box_fault(c, &box, &t, diagonal);
     if (fault) return fault;
-    fault = sums_fault(c, &t);
+    fault = find_sums_fault(c, &t);
     if (fault) return fault;
     if (!(c->cone_angle >= 0 && c->cone_angle < 3.1416F)) return "a cone of no angle";
     if (v3_norm2(cone) > 0 && fct_acos(fmax(t.narrowest, -1)) > (double)c->cone_angle + 1e-7)
         return "a face outside its cone of normals";
-    return plane_fault(c, &box, &t, diagonal);
+    return find_plane_fault(c, &box, &t, diagonal);
 }
 
 static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -156,7 +165,7 @@ static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = v->first + begin; i < v->first + end && !v->faults[chunk]; ++i) {
         v->nodes[chunk] = v->leaves ? v->leaves[i] : (uint32_t)i;
         if (!v->leaves || v->leaves[i] >= v->view->node_count)
-            v->faults[chunk] = node_fault(v->view, &v->clusters[i]);
+            v->faults[chunk] = find_record_fault(v->view, &v->clusters[i]);
     }
 }
 
@@ -209,9 +218,8 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
     return FCT_OK;
 }
 
-fct_result fct_tree_verify(const fct_env *env, const fct_tree *tree) {
-    fct_result result = fct_tree_check_sums(env, tree);
-    if (result == FCT_OK) result = fct_tree_check_structure(env, tree);
+fct_result fct_tree_verify_contents(const fct_env *env, const fct_tree *tree) {
+    fct_result result = fct_tree_check_structure(env, tree);
     fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_USUAL);
     if (result == FCT_OK) result = check_counts(env, tree);
     return result == FCT_OK ? check_geometry(env, tree) : result;

@@ -1,48 +1,49 @@
-/* cluster/tree/edges.c: what the edges of a tree's mesh say of it: how many have one face, how many three or
- * more, and how many parts they connect, as the dual graph has it (dual.h).
+/* cluster/tree/check/edges.c: counts boundary edges, non-manifold edges and components, as the dual graph has
+ * them (dual.h).
  *
- * Sides are sorted by vertex pair, in as many lots as keep the memory at a portion of them, so that a mesh of
- * 10^8 triangles can be verified where its dual graph would not fit: a lot has the pairs whose hash falls to
- * it, and all of a pair's faces. 4 bytes a face and 24 a side of a lot. A build knows all this already.
+ * Sorts the sides of faces by vertex pair, in lots that bound the memory: a hash of the pair chooses the lot,
+ * so all faces of a pair are in one lot. This verifies a mesh of 10^8 triangles whose dual graph would not
+ * fit. 4 bytes per face and 24 per side of a lot.
  */
+#include "cluster/tree/check/edges.h"
 #include "base/key.h"
+
 #include "base/sort.h"
 #include "base/union_find.h"
-#include "cluster/tree/tree.h"
 
 typedef struct side_list {
     const fct_tree_view *view;
     uint64_t *keys;
     uint32_t *faces;
-    uint32_t *parents; /* of faces, towards smaller numbers */
+    uint32_t *parents; /* disjoint sets of faces */
     uint32_t lots;
 } side_list;
 
-/* The side's vertex pair; 0, which no pair is, for a side from a vertex to itself. */
-static uint64_t side_key(const uint32_t triangle[3], int k) {
+/* The vertex pair of a side; 0, which is no pair, for a side from a vertex to itself. */
+static uint64_t make_side_key(const uint32_t triangle[3], int k) {
     uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
     if (a == b) return 0;
     return fct_pair_key(a, b);
 }
 
-static uint32_t lot_of(uint64_t key, uint32_t lots) {
+static uint32_t choose_lot(uint64_t key, uint32_t lots) {
     return (uint32_t)((key * 0x9E3779B97F4A7C15u >> 32) * lots >> 32);
 }
 
-/* Lists the sides of a lot, or only counts them where there is no list yet. */
+/* Lists the sides of a lot, or only counts them while there is no list. */
 static size_t list_sides(const side_list *list, uint32_t lot) {
     size_t count = 0;
     for (uint32_t f = 0; f < list->view->face_count; ++f)
         for (int k = 0; k < 3; ++k) {
-            uint64_t key = side_key(list->view->triangles + 3 * (size_t)f, k);
-            if (!key || (list->lots > 1 && lot_of(key, list->lots) != lot)) continue;
+            uint64_t key = make_side_key(list->view->triangles + 3 * (size_t)f, k);
+            if (!key || (list->lots > 1 && choose_lot(key, list->lots) != lot)) continue;
             if (list->keys) list->keys[count] = key, list->faces[count] = f;
             ++count;
         }
     return count;
 }
 
-/* Runs of one pair; a face that has it twice counts once. */
+/* Counts the faces of each vertex pair; a face that has the pair twice counts once. */
 static void count_runs(side_list *list, size_t count, fct_edge_counts *out) {
     for (size_t i = 0, end; i < count; i = end) {
         uint32_t faces = 1;

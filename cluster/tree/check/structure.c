@@ -1,19 +1,71 @@
-/* cluster/tree/structure.c: can this tree be walked safely?
+/* cluster/tree/check/structure.c: checks that a tree can be walked safely.
  *
- * Every inner node's children have larger ids and their ranges are the two parts of its own; roots tile the
- * faces. From that follows that each node is reached exactly once: ranges of different subtrees are disjoint,
- * and F - R inner nodes above F leaves are exactly as many as there are. All numbers are finite. Chunks note
- * the first thing wrong; the first chunk that has one is reported, whatever the threads. O(F).
+ * In a valid tree the children of each inner node have larger ids, their ranges are the two parts of its own,
+ * and the roots partition the places. It follows that each node is reached exactly once: the ranges of
+ * different subtrees are disjoint, and F leaves under R roots have F - R inner nodes, which is their number.
+ * Each chunk records its first fault, and the fault of the first chunk is reported, so the message does not
+ * depend on the threads. O(F).
  */
+#include "cluster/tree/check/structure.h"
+
+#include <math.h>
 #include <string.h>
 
 #include "base/parallel.h"
-#include "cluster/file/file.h"
 
 enum { GRAIN = 1 << 14 };
 
+/* Compares exponents, because the compiler vectorises that and not isfinite. */
+static bool all_finite(const void *floats, size_t count) {
+    const uint32_t exponent = 0x7F800000;
+    const uint32_t *bits = floats;
+    uint32_t infinite = 0;
+    for (size_t i = 0; i < count; ++i) infinite |= (bits[i] & exponent) == exponent;
+    return infinite == 0;
+}
+
+const char *fct_tree_node_fault(const fct_tree_view *view, uint32_t node, const fct_cluster *c) {
+    uint32_t nodes = view->node_count, faces = view->face_count;
+    if (!all_finite(c, offsetof(fct_cluster, child) / sizeof(float))) return "a number that is not finite";
+    if (node >= nodes)
+        return c->first == node - nodes && c->count == 1 && c->child[0] == FCT_NONE && c->child[1] == FCT_NONE
+                   ? NULL
+                   : "a face that is not its own";
+    if (c->count < 2 || c->count > faces || c->first > faces - c->count) return "range outside the faces";
+    for (int k = 0; k < 2; ++k)
+        if (c->child[k] <= node || c->child[k] >= nodes + faces) return "child out of order";
+    return NULL;
+}
+
+const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], const uint32_t count[2]) {
+    if (first[0] != c->first || count[0] >= c->count || first[1] != c->first + count[0] || count[1] == 0)
+        return "child's range is not part of its own";
+    return count[0] + count[1] == c->count && count[0] ? NULL : "children do not fill its range";
+}
+
+fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean) {
+    const fct_tree_view *view = &tree->view;
+    *depth = 0, *mean = 0;
+    uint8_t *depths = fct_allocate_zero(env, view->node_count, 1);
+    if (!depths) return fct_fail_memory(env, "the tree");
+    uint64_t total = 0;
+    for (uint32_t i = 0; i < view->node_count; ++i)
+        for (int k = 0; k < 2; ++k) {
+            uint32_t child = tree->nodes[i].child[k], below = depths[i] + 1u;
+            if (child < view->node_count) {
+                depths[child] = (uint8_t)(below < 255 ? below : 255);
+            } else {
+                total += below;
+                if (below > *depth) *depth = below;
+            }
+        }
+    fct_release(env, depths);
+    *mean = (double)total / view->face_count;
+    return FCT_OK;
+}
+
 typedef struct fault {
-    const char *what; /* NULL: nothing wrong */
+    const char *what; /* NULL: none */
     uint32_t id;
 } fault;
 
@@ -21,14 +73,14 @@ typedef struct checker {
     const fct_tree *tree;
     const fct_tree_view *view;
     fault *faults;
-    uint32_t *seen; /* bits */
+    uint32_t *seen; /* a bit per id */
 } checker;
 
 static bool is_finite(const float p[3]) {
     return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
 }
 
-static const char *node_fault(const fct_tree *tree, uint32_t i) {
+static const char *find_node_fault(const fct_tree *tree, uint32_t i) {
     const fct_tree_view *view = &tree->view;
     const fct_cluster *c = &tree->nodes[i];
     const char *own = fct_tree_node_fault(view, i, c);
@@ -43,8 +95,8 @@ static const char *node_fault(const fct_tree *tree, uint32_t i) {
     return fct_tree_parts_fault(c, first, count);
 }
 
-/* Children lie anywhere: asked for a few nodes ahead, they are there in time. */
-static void fetch_children(const fct_tree *tree, size_t i) {
+/* Prefetches the children of a node, which lie anywhere. */
+static void prefetch_children(const fct_tree *tree, size_t i) {
     if (i >= tree->view.node_count) return;
     for (int k = 0; k < 2; ++k) {
         uint32_t child = tree->nodes[i].child[k];
@@ -56,8 +108,8 @@ static void check_nodes(void *user, size_t begin, size_t end, size_t chunk, uint
     (void)thread;
     checker *check = user;
     for (size_t i = begin; i < end && !check->faults[chunk].what; ++i) {
-        fetch_children(check->tree, i + 16);
-        check->faults[chunk] = (fault){node_fault(check->tree, (uint32_t)i), (uint32_t)i};
+        prefetch_children(check->tree, i + 16);
+        check->faults[chunk] = (fault){find_node_fault(check->tree, (uint32_t)i), (uint32_t)i};
     }
 }
 
@@ -84,8 +136,8 @@ static void check_positions(void *user, size_t begin, size_t end, size_t chunk, 
             check->faults[chunk] = (fault){"a color that is not finite", (uint32_t)v};
 }
 
-static fct_result run(const fct_env *env, const char *name, const char *kind, size_t count, checker *check,
-                      fct_chunk_body *body) {
+static fct_result run_checks(const fct_env *env, const char *name, const char *kind, size_t count,
+                             checker *check, fct_chunk_body *body) {
     size_t chunks = fct_chunk_count(count, GRAIN);
     memset(check->faults, 0, chunks * sizeof *check->faults);
     fct_parallel_for(env, count, GRAIN, body, check);
@@ -126,7 +178,7 @@ static fct_result check_roots(const fct_env *env, const char *name, const fct_tr
     return fct_fail(env, FCT_ERROR_DATA, "%s: the roots hold %u of %u faces", name, place, view->face_count);
 }
 
-/* The cut is the partition of its size, and its records are those of the nodes. */
+/* The cut must be the partition of its size, with the records of the nodes. */
 static fct_result check_cut(const fct_env *env, const char *name, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     uint32_t opened = tree->cut_count - view->root_count;
@@ -160,11 +212,13 @@ static fct_result check_depth(const fct_env *env, const char *name, const fct_tr
 
 static fct_result check_all(const fct_env *env, const char *name, const fct_tree *tree, checker *check) {
     const fct_tree_view *view = &tree->view;
-    fct_result result = run(env, name, "node", view->node_count, check, check_nodes);
+    fct_result result = run_checks(env, name, "node", view->node_count, check, check_nodes);
     if (result == FCT_OK) result = check_roots(env, name, tree);
     if (result == FCT_OK) result = check_cut(env, name, tree);
-    if (result == FCT_OK) result = run(env, name, "face at place", view->face_count, check, check_triangles);
-    if (result == FCT_OK) result = run(env, name, "vertex", view->vertex_count, check, check_positions);
+    if (result == FCT_OK)
+        result = run_checks(env, name, "face at place", view->face_count, check, check_triangles);
+    if (result == FCT_OK)
+        result = run_checks(env, name, "vertex", view->vertex_count, check, check_positions);
     if (result == FCT_OK)
         result = check_permutation(env, name, "the face", view->face_ids, view->face_count, check->seen);
     if (result == FCT_OK)
@@ -177,13 +231,11 @@ fct_result fct_tree_check_structure(const fct_env *env, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     size_t most = view->face_count > view->vertex_count ? view->face_count : view->vertex_count;
     checker check = {.tree = tree, .view = view};
-    check.faults = fct_allocate(env, fct_chunk_count(most, GRAIN), sizeof *check.faults);
-    check.seen = fct_allocate(env, most / 32 + 1, sizeof *check.seen);
-    fct_result result = check.faults && check.seen
-                            ? check_all(env, tree->path ? tree->path : "tree", tree, &check)
-                            : fct_fail_memory(env, "checking a hierarchy");
-    fct_release(env, check.faults);
-    fct_release(env, check.seen);
+    const fct_array arrays[] = {FCT_ARRAY(check.faults, fct_chunk_count(most, GRAIN)),
+                                FCT_ARRAY(check.seen, most / 32 + 1)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "checking a hierarchy");
+    if (result == FCT_OK) result = check_all(env, tree->path ? tree->path : "tree", tree, &check);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 
@@ -192,7 +244,7 @@ fct_result fct_tree_check(const fct_env *env, const fct_tree *tree) {
     fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_WHOLE);
     fct_result result = fct_tree_check_structure(env, tree);
     fct_file_advise(&tree->file, 0, tree->file.size, FCT_FILE_USUAL);
-    /* Trees are made by fct_tree_new alone, so that none is const from its birth. */
+    /* The cast is safe: fct_tree_new makes all trees, and none of them is a const object. */
     if (result == FCT_OK) atomic_store_explicit(&((fct_tree *)tree)->unchecked, false, memory_order_release);
     return result;
 }
