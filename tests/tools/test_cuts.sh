@@ -53,7 +53,7 @@ expect 0 info charts.glb --json
 holds "$(value faces) == 960"
 expect 64 partition sphere.fct --charts 200 -o x.txt
 expect 64 partition sphere.fct --charts 20 -k 3 -o x.txt
-says "expected one of"
+says "expected exactly one of"
 expect 64 partition sphere.fct -o x.txt
 expect 64 partition sphere.fct -k 3 --max-faces 9 -o x.txt
 expect 64 partition sphere.fct --charts 20 --refine 2 -o x.txt
