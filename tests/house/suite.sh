@@ -1,5 +1,5 @@
 #!/bin/sh
-# Configures and builds a preset and runs its tests; the preset `fuzz` is built only.
+# Configures and builds a preset and runs its tests. The preset `fuzz` has no tests of its own. Uses ccache if it is installed.
 # usage: suite.sh PRESET [CTEST-ARGUMENT...]
 set -eu
 preset=$1
@@ -7,6 +7,8 @@ shift
 if command -v ccache >/dev/null; then
     export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
-cmake --preset "$preset"
+tests=ON
+[ "$preset" != fuzz ] || tests=OFF
+cmake --preset "$preset" -DFACETREE_TESTS=$tests
 cmake --build --preset "$preset"
 [ "$preset" = fuzz ] || ctest --preset "$preset" -j "$(nproc)" "$@"
