@@ -4,6 +4,13 @@ commands="bake boxes closest cluster compare info make partition raycast render 
 
 expect 0 --version
 check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+ \((baseline|avx2)\)$' out
+export FACETREE_SIMD=baseline
+expect 0 --version
+check "FACETREE_SIMD chooses the variant" grep -q '(baseline)$' out
+export FACETREE_SIMD=sse9
+expect 64 --version
+says "FACETREE_SIMD: expected baseline or avx2, found 'sse9'"
+unset FACETREE_SIMD
 expect 0 --help
 for command in $commands; do check "--help lists $command" grep -q "^  $command " out; done
 expect 0 help
