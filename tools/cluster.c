@@ -232,7 +232,7 @@ int tool_cluster(int argc, char **argv) {
                 "folder of them, are clustered on all cores; -o then names a folder, which receives one "
                 "NAME.fct per file. A "
                 "scene that finds NAME.fct beside a model NAME.ply opens it.\n\n"
-                "A mesh that does not fit into --max-memory (about 250 bytes per triangle) is cut into "
+                "A mesh that does not fit into --max-memory (about 225 bytes per triangle) is cut into "
                 "parts, which are clustered "
                 "one by one. Temporary files then take as much disk space as OUT.fct. Only binary PLY files "
                 "of triangles can be "

@@ -1,8 +1,9 @@
-/* cluster/large/contract.c: contracts the tops of all parts of a large mesh to one tree, in memory, with the
- * very code that contracts faces, and numbers the tree's nodes by falling cost.
+/* cluster/large/contract.c: contracts the tops of all parts of a large mesh to one tree, in memory, and
+ * numbers the upper nodes by falling cost.
  *
- * A top is a slot that begins with the record, the count and the height of its cluster. Costs never fall from
- * child to parent, tops included. Components are counted by the edges, before heights or proximity matter.
+ * The code of cluster/merge contracts tops instead of faces: slot i begins with the record, count and height
+ * of top i. Within a phase, a parent costs at least as much as its children, tops included. Components are
+ * counted from the edges, so limits of height and joins by proximity do not change the count.
  */
 #include <math.h>
 #include <string.h>
@@ -20,7 +21,7 @@ typedef struct upper {
     uint32_t *materials;
 } upper;
 
-/* A slot for each top; edges come later. */
+/* Creates one slot per top. take_edges adds the edges. */
 static fct_result open_work(const fct_env *env, const fct_metric *metric, const fct_top *tops,
                             const fct_mean_record *means, uint32_t count, fct_work *work) {
     *work = (fct_work){.env = env, .metric = *metric, .face_count = count};
@@ -42,7 +43,8 @@ static fct_result open_work(const fct_env *env, const fct_metric *metric, const 
     return FCT_OK;
 }
 
-/* Joins what is left of the work by proximity; the boxes of tops go as faces from corner to corner. */
+/* Joins the remaining clusters by proximity. The box of each top stands in for its faces, as one triangle
+ * from corner to corner. */
 static fct_result join_work(fct_work *work, const fct_top *tops) {
     uint32_t count = work->face_count;
     const fct_env *env = work->env;
@@ -86,7 +88,8 @@ fct_result fct_large_join(const fct_env *env, const fct_metric *metric, const fc
 
 /* --- Edges --- */
 
-/* Adds up edges between the same tops; tops of clusters that were joined without an edge keep none. */
+/* Adds up the edges between the same two tops. A top that was joined by proximity keeps no edges, because its
+ * faces are not connected. */
 static fct_result read_edges(upper *u, const fct_top_edge *from, uint32_t count, uint64_t *keys,
                              uint32_t *order, uint32_t *parents) {
     fct_work *work = &u->work;
@@ -158,7 +161,7 @@ static fct_result contract(upper *u) {
     return result;
 }
 
-/* Costs do not fall from child to parent of the same phase. */
+/* Raises the cost of each merge to at least that of its children in the same phase. */
 static void make_monotone(upper *u) {
     fct_work *work = &u->work;
     uint32_t count = work->face_count;
@@ -175,7 +178,7 @@ static void make_monotone(upper *u) {
     }
 }
 
-/* The upper nodes by id, with links, costs and counts. */
+/* Sets children, costs and counts of the upper nodes. ids: node id per merge. */
 static void link_nodes(upper *u, const uint32_t *ids) {
     const fct_work *work = &u->work;
     fct_large *l = u->large;
@@ -194,12 +197,12 @@ static void link_nodes(upper *u, const uint32_t *ids) {
         l->upper_phase_counts[k] = work->phase_ends[k] - (k ? work->phase_ends[k - 1] : 0);
 }
 
-/* Hands places down from the root, whose id is 0. */
+/* Assigns ranges of places from the root, node 0, downwards. */
 static fct_result place_tops(fct_large *l) {
     uint32_t count = l->upper_count;
     uint64_t *keys = fct_allocate(l->env, l->top_count, sizeof *keys);
     if (!keys) return fct_fail_memory(l->env, "ordering the tree");
-    keys[0] = 0; /* the only top, where there is one */
+    keys[0] = 0; /* if there is only one top, no node sets its key */
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t first = l->upper[i].first;
         for (int k = 0; k < 2; ++k) {
@@ -218,7 +221,8 @@ static fct_result place_tops(fct_large *l) {
     return result;
 }
 
-/* Node ids by falling (phase, cost); of equal ones the later merge comes first. */
+/* Numbers nodes by falling (phase, cost). Among equal ones the later merge comes first, so that parents
+ * precede children. */
 static fct_result number_nodes(upper *u, uint64_t *keys, uint32_t *order, uint32_t *ids) {
     const fct_work *work = &u->work;
     uint32_t count = work->merge_count;
@@ -263,7 +267,7 @@ static fct_result run(upper *u, fct_mean_record *means) {
     result = open_work(l->env, &metric, l->all_tops, means, count, &u->work);
     if (result != FCT_OK) return result;
     if (u->materials) {
-        /* clusters of several materials are foreign to all others */
+        /* a cluster of several materials gets a material of its own, which equals no other */
         for (uint32_t i = 0; i < count; ++i) {
             uint32_t material = l->all_tops[i].material;
             u->materials[i] = material == FCT_NONE ? FCT_NONE - i : material;

@@ -1,9 +1,13 @@
 /* cluster/large/cut.c: cuts a mesh along a space-filling curve into parts of a given size.
  *
- * A vertex gets the number of its cell on a Hilbert curve of 1024^3 cells through the model's box, a face
- * that of its first vertex. Faces are counted by 2^20 stretches of the curve, the counts cut the curve, and a
- * second pass writes each face to its part's run in the spool. A stretch with more faces than a part may have
- * is cut by the order of the faces. Memory: 6 bytes a vertex and buffers.
+ * 1. Each vertex gets its number on a Hilbert curve through 1024^3 cells of the model's cube. A face has the
+ *    number of its first vertex.
+ * 2. A pass over the faces counts the faces in each of 2^20 stretches of the curve.
+ * 3. Consecutive stretches with about part_faces faces become one part.
+ * 4. A second pass writes each face to the spool, in runs of one part.
+ *
+ * If the faces of a group of stretches exceed a part by a quarter, further faces go to a new part, in the
+ * order of the file. Memory: 6 bytes per vertex and buffers.
  */
 #include <math.h>
 #include <string.h>
@@ -15,22 +19,24 @@ enum { BITS = FCT_CURVE_BITS, STRETCH_BITS = 20, STRETCHES = 1 << STRETCH_BITS, 
 
 typedef struct cutter {
     fct_large *large;
-    uint32_t *codes;  /* per vertex: place on the curve */
-    uint16_t *owners; /* per vertex: the part of the first face seen, 65535: none */
-    uint32_t *counts; /* per stretch: faces, then the index of its current part */
-    uint32_t *used;   /* bits of vertices */
+    uint32_t *codes;  /* per vertex: number on the curve */
+    uint16_t *owners; /* per vertex: part of its first face; UINT16_MAX: none yet */
+    uint32_t *counts; /* per stretch: number of faces, later the stretch's group */
+    uint32_t *used;   /* one bit per vertex: a face uses it */
     float *positions;
-    uint32_t *triangles, *materials; /* ROWS of them */
+    uint32_t *triangles, *materials; /* room for ROWS faces */
     double origin[3], scale;
-    uint32_t first;                 /* vertex of the block that is being coded */
-    uint32_t *current, group_count; /* per group of stretches: the part being filled */
-    uint32_t run_rows, row_words;   /* faces of a buffer, words of a face */
-    uint32_t *buffers, *fills;      /* per part */
+    uint32_t first;                 /* vertex of the block that code_vertices works on */
+    uint32_t *current, group_count; /* per group of stretches: the part that receives its faces */
+    uint32_t run_rows, row_words;   /* faces per buffer, words per face */
+    uint32_t *buffers, *fills;      /* per part: run_rows faces, faces in use */
     size_t buffer_capacity, fill_capacity;
 } cutter;
 
-/* The place on the curve of the cell at x: the cell's path down the octree, each octant's axes exchanged and
- * turned as the curve runs through it, and the Gray code of that path undone. */
+/* 1. From the root of the octree down, exchange and invert the lower bits of the coordinates, as the curve is
+ *    mirrored and turned in each octant.
+ * 2. Undo the Gray code.
+ * 3. Interleave the bits of the three coordinates. */
 uint32_t fct_curve_code(uint32_t x[3]) {
     for (uint32_t q = 1u << (BITS - 1); q > 1; q >>= 1) {
         uint32_t p = q - 1;
@@ -76,7 +82,7 @@ static bool is_set(const uint32_t *bits, uint32_t i) {
     return bits[i / 32] >> i % 32 & 1;
 }
 
-/* Bounds of all vertices, or of those in use. */
+/* Bounds of all vertices, or only of those that faces use. */
 static fct_result find_bounds(cutter *c, bool used, fct_bounds *out) {
     fct_large *l = c->large;
     fct_bounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -114,7 +120,7 @@ static uint32_t stretch_of(const cutter *c, uint32_t vertex) {
     return c->codes[vertex] >> (3 * BITS - STRETCH_BITS);
 }
 
-/* Counts faces by stretch; marks used vertices; the number of materials where they have no names. */
+/* Counts the faces of each stretch, marks used vertices, and raises material_count to the highest id + 1. */
 static fct_result count_faces(cutter *c) {
     fct_large *l = c->large;
     for (uint32_t f = 0; f < l->info.face_count; f += ROWS) {
@@ -133,7 +139,7 @@ static fct_result count_faces(cutter *c) {
     return FCT_OK;
 }
 
-/* Stretches become groups of about the same number of faces. */
+/* Groups consecutive stretches so that all groups have about the same number of faces. */
 static fct_result cut_curve(cutter *c) {
     fct_large *l = c->large;
     uint64_t faces = l->info.face_count, groups = (faces + l->part_faces - 1) / l->part_faces, before = 0;

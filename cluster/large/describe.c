@@ -1,11 +1,10 @@
-/* cluster/large/describe.c: attributes and boxes of the clusters above the parts of a large mesh.
+/* cluster/large/describe.c: attributes and boxes of the upper nodes of a large mesh.
  *
- * Sums come from the tops upwards. Subtrees of at most FCT_BLOCK faces are described from their faces, as in
- * describe.c. Larger clusters do not read theirs: extents along an axis, and the widest normal, are found
- * from a sample of faces and by opening only those clusters below whose own box, or cone, reaches farther
- * than what has been found. A box is left closed when it could add less than floats resolve, a cone when it
- * could add less than a thousandth of a radian, and the result is enlarged by as much; so it holds
- * everything.
+ * Sums are added from the tops upwards. A cluster of at most FCT_BLOCK faces is described from its faces. For
+ * a larger one, a search finds the extents along each axis and the widest normal: it starts with a sample of
+ * faces and opens only clusters whose box or cone reaches beyond the result so far. It skips a box that adds
+ * less than the resolution of floats, and a cone that adds less than 1/1000 radian. The final box and cone
+ * grow by the same amount, so they contain every vertex and every normal.
  */
 #include <string.h>
 
@@ -14,8 +13,13 @@
 #include "cluster/shape/box.h"
 #include "cluster/shape/cone.h"
 
-/* More than MOST opened clusters: the rest counts by its boxes. */
-enum { SAMPLES = 64, STACK = 512, MOST = 1 << 18, HARD = 1 << 11, FRAMES = 4 };
+enum {
+    SAMPLES = 64,   /* faces per large cluster */
+    STACK = 512,    /* clusters waiting in a search; beyond that, boxes and cones count as they are */
+    MOST = 1 << 18, /* opened clusters per search; beyond that, boxes count as they are */
+    HARD = 1 << 11, /* opened clusters from which on fit_box tries two frames only */
+    FRAMES = 4      /* candidates: principal axes of the samples, the world's, the two children's */
+};
 
 typedef struct block_faces {
     fct_octet_row corners[3 * FCT_BLOCK];
@@ -25,13 +29,13 @@ typedef struct block_faces {
 typedef struct describer {
     fct_large *large;
     fct_lookup lookup;
-    fct_sums *tops, *upper; /* sums of all */
+    fct_sums *tops, *upper; /* per top, per upper node */
     block_faces *faces;
 } describer;
 
-/* A cluster anywhere: an upper node, or a node of a part. */
+/* An upper node, or a node of a part. */
 typedef struct place {
-    const fct_part *part; /* NULL: upper */
+    const fct_part *part; /* NULL for an upper node */
     uint32_t node;
 } place;
 
@@ -42,7 +46,7 @@ static place child_of_upper(const describer *d, uint32_t child) {
     return (place){&l->parts[top->part], top->node};
 }
 
-/* The record, or NULL: a face, or a failure. */
+/* The cluster's record. NULL for a face and after an error. */
 static const fct_cluster *cluster_at(describer *d, place p) {
     if (!p.part) return &d->large->upper[p.node];
     return p.node < p.part->node_count ? fct_lookup_node(&d->lookup, p.part, p.node) : NULL;
@@ -57,7 +61,7 @@ static void push_children(const describer *d, place p, const uint32_t child[2], 
         stack[(*top)++] = p.part ? (place){p.part, child[k]} : child_of_upper(d, child[k]);
 }
 
-/* Index in the order of tops of the one that holds a place. */
+/* Index in top_order of the top whose range contains the place. */
 static uint32_t top_at(const fct_large *l, uint32_t at) {
     uint32_t low = 0, high = l->top_count;
     while (high - low > 1) {
@@ -114,10 +118,10 @@ static bool describe_block(describer *d, uint32_t root) {
 typedef struct search {
     fct_extents extents;
     double axes[3][3];
-    double slack; /* what a float of this size does not resolve */
+    double slack; /* rounding of floats of this size */
 } search;
 
-/* Takes a corner in; returns nothing of interest. */
+/* Extends the extents by a vertex. */
 static void take_corner(search *s, const float *p) {
     for (int k = 0; k < 3; ++k) {
         double x = (double)p[0] * s->axes[k][0] + (double)p[1] * s->axes[k][1] + (double)p[2] * s->axes[k][2];
@@ -126,7 +130,7 @@ static void take_corner(search *s, const float *p) {
     }
 }
 
-/* Whether the cluster's box reaches beyond what was found; with `take` the reach is taken as found. */
+/* Whether the cluster's box reaches beyond the extents. If `take`, also extends them by the box. */
 static bool reaches(search *s, const fct_cluster *c, bool take) {
     fct_box box;
     bool beyond = false;
@@ -198,7 +202,7 @@ static bool fit_box(describer *d, uint32_t node, const float samples[][9]) {
     memcpy(rotations[0], c->box_rotation, sizeof rotations[0]);
     memcpy(rotations[1], world, sizeof world);
     for (int k = 0; k < 2; ++k) rotation_of(d, child_of_upper(d, c->child[k]), rotations[2 + k]);
-    bool hard = false; /* thousands of clusters tie for the farthest point: two frames must do */
+    bool hard = false; /* thousands of clusters tie for the farthest point, so try two frames only */
     for (int f = 0; f < FRAMES && !(hard && f > 1); ++f) {
         fct_box_axes(rotations[f], axes[f]);
         if (!find_extents(d, node, samples, (const float(*)[3])axes[f], &extents[f], &hard)) return false;
@@ -264,7 +268,7 @@ static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
 
 /* --- All --- */
 
-/* By its samples, whose cone and box are then replaced by its own. */
+/* Sets all attributes from sums and samples, then replaces box and cone by those of the whole cluster. */
 static bool describe_large(describer *d, uint32_t node) {
     static const uint32_t triangle[3] = {0, 1, 2};
     fct_cluster *c = &d->large->upper[node];
@@ -293,7 +297,8 @@ static void sum_up(describer *d) {
     }
 }
 
-/* Roots of blocks and larger nodes in preorder; what is inside blocks is left out. Returns how many. */
+/* Lists all nodes larger than a block, and the topmost node of each block, in preorder. Returns their number.
+ */
 static uint32_t list_nodes(const fct_large *l, uint32_t *order, uint32_t *stack) {
     uint32_t count = 0, top = 0;
     if (l->upper_count > 0) stack[top++] = 0;
@@ -307,7 +312,7 @@ static uint32_t list_nodes(const fct_large *l, uint32_t *order, uint32_t *stack)
     return count;
 }
 
-/* In reverse preorder, so that what children have looked up is still there for their parents. */
+/* In reverse preorder, so that parents find in the caches what their children have read. */
 static fct_result describe_all(describer *d, uint32_t *order, uint32_t *stack) {
     fct_large *l = d->large;
     sum_up(d);
@@ -333,7 +338,7 @@ fct_result fct_large_describe(fct_large *large) {
     d.faces = fct_allocate(env, 1, sizeof *d.faces);
     uint32_t *order = fct_allocate(env, large->upper_count, sizeof *order);
     uint32_t *stack = fct_allocate(env, large->upper_count, sizeof *stack);
-    size_t used = (size_t)large->top_count * 600; /* tops, upper nodes, and their sums */
+    size_t used = (size_t)large->top_count * 600; /* bytes per top: tops, upper nodes and their sums */
     fct_result result;
     if (!d.tops || !d.upper || !d.faces || !order || !stack)
         result = fct_fail_memory(env, "boxes");

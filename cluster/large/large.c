@@ -1,4 +1,5 @@
-/* cluster/large/large.c: fct_tree_build_file: what of the memory each step may take, and the steps. */
+/* cluster/large/large.c: fct_tree_build_file: divides the allowed memory between the steps, then runs them.
+ */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,15 +8,14 @@
 
 #include "cluster/tree/build.h"
 
-/* Bytes, measured: for a face of a part from its loading to its boxes, with 80 for the MEAN cost's sums; for
- * a top; buffers of all kinds. */
+/* Peak memory, measured, in bytes. */
 enum {
-    PART_BYTES = 235,
-    VERTEX_BYTES = 32,
-    MEAN_BYTES = 80,
-    TOP_BYTES = 640,
-    BUFFER_BYTES = 12 << 20,
-    LEAST_PART = 1 << 16
+    PART_BYTES = 235,        /* per face of a part */
+    VERTEX_BYTES = 32,       /* per vertex of a part */
+    MEAN_BYTES = 80,         /* more per face with the cost MEAN */
+    TOP_BYTES = 640,         /* per top */
+    BUFFER_BYTES = 12 << 20, /* of all buffers */
+    LEAST_PART = 1 << 16     /* faces of the smallest part that least_bytes plans for */
 };
 
 fct_large_def fct_large_def_default(void) {
@@ -26,8 +26,8 @@ static uint64_t larger(uint64_t a, uint64_t b) {
     return a > b ? a : b;
 }
 
-/* Memory that has to be there whatever the parts: codes and owners of vertices while faces are cut, bits of
- * vertices beside a part, numbers of nodes and vertices while the file is written. */
+/* Bytes that every step needs, whatever the size of the parts: buffers, and three bits per vertex (the shared
+ * vertices, and the used ones with their counts while a part is loaded). */
 static uint64_t fixed_bytes(uint64_t vertices) {
     return BUFFER_BYTES + 3 * vertices / 8;
 }
@@ -39,7 +39,8 @@ static uint64_t face_bytes(uint64_t faces, uint64_t vertices, bool mean) {
 static uint64_t least_bytes(uint64_t faces, uint64_t vertices, bool mean) {
     uint64_t part = faces < LEAST_PART ? faces : LEAST_PART;
     uint64_t piece = part * face_bytes(faces, vertices, mean);
-    /* 6 bytes a vertex while cutting, 5 a face and then 4 a vertex while writing, beside buffers and tops */
+    /* cut.c takes 6 bytes per vertex, write.c 5 per face and then mesh.c 4 per vertex, besides buffers and
+     * tops */
     uint64_t whole = larger(faces, vertices) * 15 / 2;
     return (fixed_bytes(vertices) + larger(whole, piece)) / 7 * 8;
 }
@@ -65,7 +66,7 @@ static fct_result plan(fct_large *l, const fct_large_def *def) {
     uint64_t room = limit / 8 * 7 - fixed_bytes(vertices);
     l->budget = (size_t)room;
     uint64_t part = room / face_bytes(faces, vertices, mean);
-    part = part / 5 * 4; /* a part may have a quarter more */
+    part = part / 5 * 4; /* because cut.c lets a part have a quarter more */
     l->part_faces = (uint32_t)(def->part_faces ? def->part_faces : part < INT32_MAX ? part : INT32_MAX);
     uint64_t tops = room / 2 / TOP_BYTES;
     l->top_limit = (uint32_t)(tops < INT32_MAX ? tops : INT32_MAX);

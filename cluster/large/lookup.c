@@ -1,9 +1,9 @@
-/* cluster/large/lookup.c: see large_lookup.h. */
+/* cluster/large/lookup.c: nodes, triangles and vertices through caches of blocks. */
 #include "cluster/large/lookup.h"
 
 #include <string.h>
 
-enum { NODES = 8, TRIANGLES = 128, VERTICES = 256 }; /* of a block */
+enum { NODES = 8, TRIANGLES = 128, VERTICES = 256 }; /* per block of a cache */
 
 static fct_result fill_nodes(void *user, uint64_t block, void *data) {
     const fct_spool *spool = user;

@@ -1,13 +1,13 @@
-/* cluster/large/mesh.c: the faces and vertices of a large mesh into its hierarchy file.
+/* cluster/large/mesh.c: writes the faces and vertices of a large mesh to its hierarchy file.
  *
- * Faces come in the order of the roots, and below them of the tops; a vertex gets its number, and is written,
- * with the first face that uses it. 4 bytes a vertex.
+ * Faces are in the order of the roots, and within a root in the order of the tops. A vertex is numbered and
+ * written with the first face that uses it; unused vertices come last. Memory: 4 bytes per vertex.
  */
 #include <string.h>
 
 #include "cluster/large/lookup.h"
 
-enum { ROWS = 1 << 14 }; /* at a time */
+enum { ROWS = 1 << 14 }; /* faces or vertices per read and write */
 
 typedef struct mesh_writer {
     fct_large *large;
@@ -16,13 +16,13 @@ typedef struct mesh_writer {
     uint32_t root_count;
 } mesh_writer;
 
-/* Reads an array of the faces' spools in the order of the file, some rows at a time. */
+/* Reads a spool with one row per face in the order of the file, some rows at a time. */
 typedef struct face_order {
     const mesh_writer *w;
     const fct_spool *spool;
-    size_t size;       /* of a row */
-    uint32_t root, at; /* the next: root and place in the one tree */
-    uint32_t top;      /* index in the order of tops */
+    size_t size;       /* bytes per row */
+    uint32_t root, at; /* of the next row: root, and place in the tree with one root */
+    uint32_t top;      /* index in top_order; FCT_NONE: not yet known */
 } face_order;
 
 static face_order open_order(const mesh_writer *w, const fct_spool *spool, size_t size) {
@@ -41,7 +41,7 @@ static uint32_t find_top(const fct_large *l, uint32_t at) {
     return low;
 }
 
-/* Up to `rows` rows; fewer at the end only. */
+/* Reads up to `count` rows; *got is smaller only at the end. */
 static fct_result read_rows(face_order *o, void *rows, uint32_t count, uint32_t *got) {
     const mesh_writer *w = o->w;
     const fct_large *l = w->large;
@@ -83,7 +83,7 @@ static fct_result copy_section(const mesh_writer *w, const fct_spool *spool, fct
 typedef struct vertex_writer {
     const mesh_writer *mesh;
     fct_lookup lookup;
-    uint32_t *renamed; /* per input vertex: its new number */
+    uint32_t *renamed; /* per input vertex: number in the file; FCT_NONE: none yet */
     uint32_t used, waiting, ids[ROWS];
     float positions[3 * ROWS], colors[3 * ROWS];
 } vertex_writer;

@@ -1,12 +1,12 @@
-/* cluster/large/piece.c: one part of a large mesh: its faces from the spool, contracted and described, its
- * nodes and tops into spools.
+/* cluster/large/piece.c: reads one part of a large mesh from the spool, contracts and describes it, and
+ * spools its nodes and tops.
  *
- * Faces with a side on the cut are frozen, and a cluster whose cheapest partner is frozen waits, so that a
- * merge is made only where both partners prefer each other to all there will ever be beside them: what stays
- * are small clusters near the cut and larger ones further away, and the whole model's contraction goes on
- * from there as if there had been no cut. A part that would leave too many tops (loose triangles, a file in
- * no order) first joins those that no edge leads out of, then is contracted without regard to the cut, then
- * joined whole.
+ * Faces with a side on the cut are frozen: they offer prices but do not merge. A cluster whose cheapest
+ * partner is frozen waits too. So both clusters of a merge prefer each other to all neighbours that they will
+ * have in the whole model. The clusters that remain, the tops, are small near the cut and large inside.
+ *
+ * If a part leaves more tops than its share of top_limit, press() goes on, until they fit: contract without
+ * frozen faces, join clusters without neighbours by proximity, then join all clusters.
  */
 #include <stdio.h>
 #include <string.h>
@@ -22,26 +22,26 @@
 
 typedef struct piece {
     fct_large *large;
-    fct_env env; /* the large mesh's, with a progress of its own */
+    fct_env env; /* that of the large mesh, with show_progress */
     char phase[32];
     uint32_t phase_count;
     fct_part *part;
     uint32_t number;
-    uint32_t *face_ids;   /* of the input */
-    uint32_t *vertex_ids; /* of the input, ascending */
+    uint32_t *face_ids;   /* per face: id in the input */
+    uint32_t *vertex_ids; /* per vertex: id in the input, ascending */
     fct_mesh mesh;
     fct_work work;
-    fct_metric metric; /* the work's */
+    fct_metric metric; /* copy of the work's */
     fct_tree *tree;
-    uint8_t *frozen; /* per face; what the work has may have spread */
-    uint8_t *on_cut; /* the same, kept */
-    fct_top *tops;   /* in the order of the tree's roots */
-    fct_sums *sums;  /* of the tops */
+    uint8_t *frozen; /* per face; the contraction marks waiting clusters in it, too */
+    uint8_t *on_cut; /* per face: has a side on the cut */
+    fct_top *tops;   /* in the order of the tree's roots; before order_tops, of slots */
+    fct_sums *sums;  /* per top */
     fct_mean_record *means;
-    uint32_t *top_of; /* per face */
+    uint32_t *top_of; /* per face of the part */
     fct_edge *edges;
     uint32_t edge_count;
-    fct_seam_side *sides; /* until tops are known, `top` is the face in the part */
+    fct_seam_side *sides; /* `top` is a face of the part until put_sides */
     uint32_t side_count;
 } piece;
 
@@ -49,7 +49,7 @@ static bool is_set(const uint32_t *bits, uint32_t i) {
     return bits[i / 32] >> i % 32 & 1;
 }
 
-/* The steps of a part, each from 0 to 1, as a share of all parts. */
+/* Converts the progress of one step of a part to that of all parts. */
 static bool show_progress(void *user, const char *phase, double done) {
     enum { STEPS = 6 };
     piece *p = user;
@@ -63,7 +63,7 @@ static bool show_progress(void *user, const char *phase, double done) {
 
 /* --- The mesh --- */
 
-/* Faces of the part, with vertices of the whole mesh. */
+/* Reads the faces of the part. Their corners are vertices of the whole mesh. */
 static fct_result load_faces(piece *p, uint32_t *rows) {
     fct_large *l = p->large;
     size_t words = l->info.materials ? 5 : 4, at = 0;
@@ -82,8 +82,8 @@ static fct_result load_faces(piece *p, uint32_t *rows) {
     return FCT_OK;
 }
 
-/* Lists the vertices in use and renumbers the triangles' corners; counts: per 32 vertices of the whole mesh
- * the number of the first one. */
+/* Lists the vertices of the part and renumbers the corners of its triangles. bits: one per vertex of the
+ * whole mesh. counts: per word of bits, the number of bits set before it. */
 static fct_result number_vertices(piece *p, uint32_t *bits, uint32_t *counts) {
     size_t words = (size_t)p->large->info.vertex_count / 32 + 1, corners = 3 * (size_t)p->mesh.face_count;
     uint32_t *t = p->mesh.triangles, count = 0;
@@ -105,7 +105,7 @@ static fct_result number_vertices(piece *p, uint32_t *bits, uint32_t *counts) {
     return FCT_OK;
 }
 
-/* Vertices that lie close together in the file are read at once. */
+/* One read covers vertices that are fewer than 64 apart in the file. */
 static fct_result load_positions(piece *p, float *buffer, uint32_t rows) {
     uint32_t count = p->mesh.vertex_count;
     for (uint32_t v = 0; v < count;) {
@@ -177,8 +177,7 @@ static uint32_t live_count(const fct_work *work) {
     return work->face_count - work->merge_count;
 }
 
-/* Boxes in the unit model and materials of live clusters, by the clusters' faces; owner: the top of each
- * build id. */
+/* Sets the boxes of tops in the unit model from their faces. owner: per face, its top or FCT_NONE. */
 static void bound_tops(const piece *p, const uint32_t *owner, fct_top *tops, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i)
         for (int k = 0; k < 3; ++k) tops[i].lower[k] = INFINITY, tops[i].upper[k] = -INFINITY;
@@ -197,7 +196,7 @@ static void bound_tops(const piece *p, const uint32_t *owner, fct_top *tops, uin
     }
 }
 
-/* Merges the listed slots into one cluster. */
+/* Joins the clusters in the listed slots to one by proximity. */
 static fct_result join_slots(piece *p, const uint32_t *slots, uint32_t count) {
     fct_work *work = &p->work;
     const fct_env *env = p->large->env;
@@ -225,7 +224,7 @@ static fct_result join_slots(piece *p, const uint32_t *slots, uint32_t count) {
             owner[work->children[m][0]] = owner[work->children[m][1]] = owner[work->face_count + m];
     bound_tops(p, owner, tops, count);
     result = fct_large_join(env, &work->metric, tops, means, count, children, costs);
-    for (uint32_t i = 0; i < count; ++i) at[i] = slots[i]; /* slot of each of the join's clusters */
+    for (uint32_t i = 0; i < count; ++i) at[i] = slots[i]; /* per cluster of the join: its slot */
     for (uint32_t m = 0; result == FCT_OK && m + 1 < count; ++m) {
         at[count + m] = at[children[m][0]];
         fct_work_merge(work, at[children[m][0]], at[children[m][1]], 0, costs[m]);
@@ -240,8 +239,8 @@ done:
     return result;
 }
 
-/* Joins the listed slots in groups of neighbours along the curve, for joining takes four times the memory of
- * contraction. */
+/* Joins the listed slots in groups of neighbours along the Hilbert curve. Groups bound the memory, because
+ * joining takes four times the memory of contraction per cluster. */
 static fct_result join_groups(piece *p, uint32_t *slots, uint32_t count) {
     const fct_env *env = p->large->env;
     uint32_t group = p->mesh.face_count / 8 + 4096;
@@ -249,7 +248,7 @@ static fct_result join_groups(piece *p, uint32_t *slots, uint32_t count) {
     if (!keys) return fct_fail_memory(env, "joining a part");
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t cell[3];
-        for (int k = 0; k < 3; ++k) { /* in the unit model, within 1/2 of the origin */
+        for (int k = 0; k < 3; ++k) { /* the unit model lies within 1/2 of the origin */
             float x = (p->work.records[slots[i]].centroid[k] + 0.5f) * (1 << FCT_CURVE_BITS);
             cell[k] = x > 0 ? x < (1 << FCT_CURVE_BITS) ? (uint32_t)x : (1 << FCT_CURVE_BITS) - 1 : 0;
         }
@@ -262,7 +261,7 @@ static fct_result join_groups(piece *p, uint32_t *slots, uint32_t count) {
     return result;
 }
 
-/* Lists the live clusters that no edge leads out of and that have no face on the cut. */
+/* Lists the live clusters that have no neighbour and no face on the cut. */
 static fct_result find_loose(const piece *p, uint32_t *slots, uint32_t *count) {
     const fct_work *work = &p->work;
     const fct_env *env = p->large->env;
@@ -285,7 +284,7 @@ static fct_result contract_edges(piece *p, bool across) {
                                                        : fct_work_greedy(&p->work, across);
 }
 
-/* Leaves at most `limit` clusters, or a few. */
+/* Reduces the live clusters to about `limit`. slots: room for all live clusters. */
 static fct_result press(piece *p, uint32_t limit, uint32_t *slots) {
     fct_work *work = &p->work;
     uint32_t loose;
@@ -321,9 +320,10 @@ static fct_result contract(piece *p) {
     return result;
 }
 
-/* --- What is left --- */
+/* --- Tops --- */
 
-/* Notes records, heights and edges of live clusters, by slot; the slots go into `node`. */
+/* Copies records and heights of live clusters to p->tops, in the order of slots, with the slot in `node`.
+ * Takes over the edges. */
 static fct_result note_live(piece *p) {
     fct_work *work = &p->work;
     const fct_env *env = p->large->env;
@@ -349,7 +349,7 @@ static uint8_t phase_of(const fct_part *part, uint32_t node) {
     return node < part->phase_counts[2] ? 2 : node < part->phase_counts[2] + part->phase_counts[1] ? 1 : 0;
 }
 
-/* Brings the noted clusters into the order of the roots and completes them. */
+/* Sorts the tops of note_live into the order of the tree's roots and sets their other fields. */
 static fct_result order_tops(piece *p) {
     fct_tree_view view = p->tree->view;
     const fct_env *env = p->large->env;
@@ -420,7 +420,7 @@ static void sum_tops(void *user, size_t begin, size_t end, size_t chunk, uint32_
     }
 }
 
-/* --- Into the spools --- */
+/* --- Spools --- */
 
 static fct_result note_sides(piece *p) {
     fct_large *l = p->large;
@@ -465,7 +465,7 @@ static fct_result put_edges(piece *p) {
     return result;
 }
 
-/* Costs apart from nodes, faces and triangles with the input's numbers. */
+/* Spools nodes, costs (alone, for write.c), tops, and faces with the ids of the input. */
 static fct_result put_tree(piece *p) {
     fct_large *l = p->large;
     fct_tree_view view = p->tree->view;
@@ -507,7 +507,7 @@ static void release_piece(piece *p) {
     fct_release(env, p->sides);
 }
 
-/* The forest of the part's merges in the tree's numbering. */
+/* Turns the merges of the part into a tree whose roots are the tops. */
 static fct_result order(piece *p) {
     const fct_env *env = p->large->env;
     fct_tree_def def = *p->large->def;

@@ -1,10 +1,11 @@
 /* cluster/large/seam.c: edges between tops across the cuts of a large mesh.
  *
- * The sides of all faces on cuts are sorted by their vertices, then by face. Where those of one mesh edge
- * belong to several parts, the edge's faces are connected as in the dual graph: in a chain in order of face
- * id, with half the length each where there are three or more. What parts had connected on their own there
- * (two of an edge's faces in the same part) goes off again, as edges of negative length, for all edges
- * between the same tops are added up.
+ * 1. Sort the sides of all faces on cuts by their vertices, then by face. The sides of one mesh edge become
+ *    neighbours.
+ * 2. If the sides of a mesh edge belong to several parts, connect its faces as the dual graph does: in a
+ * chain in the order of face ids. If the chain has three or more faces, each connection has half the length.
+ * 3. Take back the connections that a part made at this mesh edge by itself: emit the same edges with
+ * negative length. contract.c adds up all edges between the same tops.
  */
 #include <string.h>
 
@@ -13,15 +14,18 @@
 
 typedef struct seam {
     fct_large *large;
-    fct_seam_side *sides; /* as they were found */
-    uint32_t *by_face;    /* by vertices, then face */
-    uint32_t *by_part;    /* by vertices, then part, then face */
+    fct_seam_side *sides; /* by part, then by face within the part */
+    uint32_t *by_face;    /* sides sorted by vertices, then face */
+    uint32_t *by_part;    /* sides sorted by vertices, then part, then face */
     uint32_t count;
     double scale;
-    fct_top_edge *edges; /* room for twice as many as sides */
+    fct_top_edge
+        *edges; /* room for 2 x count: a chain adds fewer than it has sides, and has one sign or the other */
     size_t edge_count;
 } seam;
 
+/* Adds an edge between the faces of two groups of sides (one face each). A face in the middle of the chain
+ * shares its sides with two neighbours. */
 static void connect(seam *s, const uint32_t *from, uint32_t count, bool first, bool last, const uint32_t *to,
                     uint32_t to_count, double sign) {
     const fct_seam_side *a = &s->sides[*from], *b = &s->sides[*to];
@@ -31,7 +35,7 @@ static void connect(seam *s, const uint32_t *from, uint32_t count, bool first, b
         s->edges[s->edge_count++] = (fct_top_edge){a->top, b->top, (float)((double)length * s->scale * sign)};
 }
 
-/* Connects the faces of the listed sides, which are in order of faces; returns how many faces there are. */
+/* Connects the faces of the listed sides, which are in the order of faces. Returns the number of faces. */
 static uint32_t chain(seam *s, const uint32_t *list, uint32_t count, double sign) {
     uint32_t faces = 0;
     for (uint32_t i = 0, before = 0; i < count;) {
@@ -44,7 +48,7 @@ static uint32_t chain(seam *s, const uint32_t *list, uint32_t count, double sign
     return faces;
 }
 
-/* The sides [begin, end) of one mesh edge, in both orders. */
+/* Connects the faces of one mesh edge, whose sides are [begin, end) in both orders. */
 static void join_group(seam *s, uint32_t begin, uint32_t end) {
     fct_large *l = s->large;
     const uint32_t *list = s->by_part;
@@ -68,7 +72,7 @@ static fct_result find_edges(seam *s, uint64_t *keys) {
     const fct_env *env = s->large->env;
     for (uint32_t i = 0; i < s->count; ++i) {
         keys[i] = s->sides[i].face;
-        s->by_part[i] = s->by_face[i] = i; /* the spool goes by part and by face in it */
+        s->by_part[i] = s->by_face[i] = i; /* the spool is in the order of parts, then of faces in a part */
     }
     fct_result result = fct_sort_pairs(env, keys, s->by_face, s->count);
     if (result == FCT_OK) result = sort_by_edge(s, keys, s->by_face);

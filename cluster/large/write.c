@@ -1,11 +1,13 @@
-/* cluster/large/write.c: numbers the nodes of all parts and of the tree above them by falling cost, and
- * writes the hierarchy file of a large mesh from front to back.
+/* cluster/large/write.c: numbers the nodes of all parts and the upper nodes by falling cost, and writes the
+ * hierarchy file of a large mesh from front to back.
  *
- * The nodes of each part, and the upper ones, are lists in falling order already: merging the lists by cost
- * alone gives each node its id, 4 bytes a node. Then windows of ids are filled from all lists, with links,
- * places and costs of the whole tree, and written. Faces follow in the order of the tops, and a vertex comes
- * with the first face that uses it. Where several roots are asked for, the first ids are left out, and the
- * roots' faces are put in the order of the roots.
+ * 1. The nodes of each part, and the upper nodes, are lists in the order of falling (phase, cost). A merge of
+ * the lists by their costs alone gives each node its number: 4 bytes per node.
+ * 2. If several roots are asked for, the first numbers are dropped, and the faces follow the order of the
+ * roots.
+ * 3. For one window of ids after another, take the nodes from all lists, replace children, places and costs
+ * by those of the whole tree, and write them.
+ * 4. mesh.c writes faces and vertices.
  */
 #include <string.h>
 
@@ -16,15 +18,15 @@
 #include "cluster/file/file.h"
 #include "cluster/large/large.h"
 
-enum { WINDOW = 1 << 18 }; /* nodes, at most */
+enum { WINDOW = 1 << 18 }; /* most nodes per window */
 
-/* The next node of a list. */
+/* The first node of a list that has no number yet. */
 typedef struct head {
-    uint64_t key; /* phase and cost */
+    uint64_t key; /* phase + 1, then cost; 0: the list is empty */
     uint32_t list;
 } head;
 
-/* A node of a list; in parts, nodes beyond the last are faces. */
+/* A node of a list. In a part, numbers from node_count on are faces. */
 typedef struct place_in_list {
     uint32_t list, node;
 } place_in_list;
@@ -33,18 +35,18 @@ typedef struct assembler {
     fct_large *large;
     fct_tree_writer *out;
     fct_tree_view view;
-    uint32_t list_count;       /* parts, then the upper nodes */
-    uint32_t *ranks;           /* of all lists' nodes: keys of costs, then numbers by falling cost */
-    uint64_t *bases;           /* per list */
-    uint32_t *cursors;         /* per list */
-    float floors[3];           /* per phase: no cost of it is lower */
-    uint32_t dropped;          /* numbers below are no nodes of the tree */
-    fct_large_root *roots;     /* in order of ids */
-    uint32_t *by_place;        /* roots in order of their first */
-    uint32_t *firsts, *places; /* per top: its first place in its part, and in the tree */
-    uint8_t *depths;           /* per node */
+    uint32_t list_count;       /* one per part, then the upper nodes */
+    uint32_t *ranks;           /* per node of all lists: key of its cost, then its number */
+    uint64_t *bases;           /* per list: index of its first node in ranks */
+    uint32_t *cursors;         /* per list: its next node */
+    float floors[3];           /* per phase: its lowest cost */
+    uint32_t dropped;          /* nodes with smaller numbers are not in the file */
+    fct_large_root *roots;     /* in the order of ids */
+    uint32_t *by_place;        /* roots in the order of `first` */
+    uint32_t *firsts, *places; /* per top: its first place in its part, and in the tree with one root */
+    uint8_t *depths;           /* per node of the file, at most 255 */
     uint64_t depth_total;
-    fct_cluster *run, *window; /* nodes of one list; nodes by id */
+    fct_cluster *run, *window; /* nodes of one list; nodes of the window by id */
     uint32_t run_list, run_first, window_first, window_size;
 } assembler;
 
@@ -60,7 +62,7 @@ static uint32_t phase_at(const assembler *a, uint32_t list, uint32_t node) {
     return node < counts[2] ? 2 : node < counts[2] + counts[1] ? 1 : 0;
 }
 
-/* The next head of a list, or key 0: none is left. */
+/* The next head of a list; its key is 0 at the end of the list. */
 static head next_of(assembler *a, uint32_t list) {
     uint32_t node = a->cursors[list];
     if (node == list_size(a, list)) return (head){0, list};
@@ -77,7 +79,7 @@ static void swap_heads(void *heads, size_t i, size_t j) {
     *x = *y, *y = moving;
 }
 
-/* Lower bounds of later phases: the highest cost of those before. */
+/* The floor of a phase is the highest cost of all earlier phases. */
 static void find_floors(assembler *a) {
     for (int k = 0; k < 3; ++k) a->floors[k] = -INFINITY;
     for (uint32_t list = 0; list < a->list_count; ++list)
@@ -89,7 +91,7 @@ static void find_floors(assembler *a) {
             const fct_large *l = a->large;
             const uint32_t *counts =
                 list < l->part_count ? l->parts[list].phase_counts : l->upper_phase_counts;
-            node = begin + counts[phase]; /* the first of a phase has its highest cost */
+            node = begin + counts[phase]; /* the first node of a phase has the phase's highest cost */
         }
 }
 
@@ -150,7 +152,7 @@ static fct_result number_nodes(assembler *a) {
 
 /* --- Places --- */
 
-/* Place in the one tree of a place of a part. */
+/* Converts a place of a part to a place of the tree with one root. */
 static uint32_t tree_place(const assembler *a, uint32_t list, uint32_t place) {
     const fct_part *part = &a->large->parts[list];
     uint32_t low = part->first_top, high = low + part->top_count;
@@ -164,7 +166,7 @@ static uint32_t tree_place(const assembler *a, uint32_t list, uint32_t place) {
     return a->places[low] + (place - a->firsts[low]);
 }
 
-/* Place in the file of a place of the one tree. */
+/* Converts a place of the tree with one root to a place of the file. */
 static uint32_t final_place(const assembler *a, uint32_t place) {
     if (a->dropped == 0) return place;
     uint32_t low = 0, high = a->view.root_count;
@@ -179,7 +181,7 @@ static uint32_t final_place(const assembler *a, uint32_t place) {
     return r->to + (place - r->first);
 }
 
-/* Where a node's child is: in the same list, or the root of a top in its part. */
+/* The child of a node: a node of the same list, or the node of a top in its part. */
 static place_in_list child_of(const assembler *a, uint32_t list, uint32_t child) {
     const fct_large *l = a->large;
     if (list < l->part_count || child < l->upper_count) return (place_in_list){list, child};
@@ -199,7 +201,7 @@ static uint32_t place_of_face(const assembler *a, place_in_list at) {
     return tree_place(a, at.list, at.node - list_size(a, at.list));
 }
 
-/* A node as its list has it, but for its first place, which is that in the tree. */
+/* Reads a node as its list has it, except that `first` is a place of the tree with one root. */
 static fct_result read_node(const assembler *a, place_in_list at, fct_cluster *out) {
     const fct_large *l = a->large;
     *out = (fct_cluster){0};
@@ -213,7 +215,7 @@ static fct_result read_node(const assembler *a, place_in_list at, fct_cluster *o
     return result;
 }
 
-/* The children of a node that is left out become roots, unless they are left out as well. */
+/* Lists the children of a dropped node that are not dropped themselves: they are roots. */
 static fct_result list_roots_below(assembler *a, place_in_list at, uint32_t *found) {
     fct_cluster c, child;
     fct_result result = read_node(a, at, &c);
@@ -242,7 +244,7 @@ static fct_result list_roots(assembler *a, uint32_t *found) {
     return result;
 }
 
-/* Puts the roots in the order of their ids and their faces in that order, too. */
+/* Sorts the roots by id, and gives their faces consecutive places in that order. */
 static fct_result order_roots(assembler *a, uint64_t *keys, uint32_t *order, fct_large_root *sorted) {
     const fct_env *env = a->large->env;
     uint32_t count = a->view.root_count, to = 0;
@@ -287,7 +289,7 @@ static fct_result find_roots(assembler *a) {
 
 /* --- Nodes --- */
 
-/* Nodes of a list into the window, with the links of the whole tree. */
+/* Copies nodes of a list into the window, with the children, places and costs of the file. */
 static void place_nodes(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     assembler *a = user;
@@ -307,7 +309,7 @@ static void place_nodes(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* Takes the nodes of a list whose numbers are below `end`. */
+/* Takes the next nodes of a list, as long as their numbers are below `end`. */
 static fct_result take_run(assembler *a, uint32_t list, uint32_t end) {
     fct_large *l = a->large;
     uint32_t first = a->cursors[list], count = 0, size = list_size(a, list);

@@ -61,7 +61,10 @@ double fct_mean_border(const fct_metric *metric, const float *positions, const u
     return best;
 }
 
-/* (8.11) for the union: the parts' covariances, moved to the common centroid. */
+/* Z (8.6) of the union. For each part, the steps (8.7), (8.8) and (8.9) to (8.10), taken about another point
+ * than its own centroid u, show that Z about v is Z about u plus k (u - v)(u - v)^T. With v the centroid of
+ * the union, both added terms together are ka kb / (ka + kb) d d^T, where d goes from one part's centroid to
+ * the other's. */
 static void join_covariances(const fct_mean_record *a, const fct_mean_record *b, double out[6],
                              v3 *centroid) {
     double weight = a->weight + b->weight, share = weight > 0 ? b->weight / weight : 0.5;
@@ -93,9 +96,10 @@ double fct_mean_cost(const fct_metric *metric, const fct_mean_record *a, const f
     for (int i = 0; i < 6; ++i) moment[i] = a->moment[i] + b->moment[i];
     fct_eigen3(covariance, values, axes);
     v3 n = v3_dot(axes[0], s) < 0 ? v3_scale(axes[0], -1) : axes[0];
-    double fit = weight > 0 ? fmax(values[0], 0) / weight : 0; /* (8.1) at its minimum, by (8.4) */
-    double direction =
-        area > 0 ? fmax((sym3_form(moment, n, n) - 2 * v3_dot(n, s)) / area + 1, 0) : 0; /* (8.13), (8.15) */
+    /* The least (8.2): at d = -n^T b / c, P (8.4) is n^T Z n, whose minimum is the least eigenvalue of Z. */
+    double fit = weight > 0 ? fmax(values[0], 0) / weight : 0;
+    /* (8.13), with R (8.15) for the summed D, e = -s and f = area (8.14) */
+    double direction = area > 0 ? fmax((sym3_form(moment, n, n) - 2 * v3_dot(n, s)) / area + 1, 0) : 0;
     double shape = shape_error(a, b, join_perimeters(a, b, shared));
     return metric->fit_weight * fit + metric->direction_weight * direction + metric->shape_weight * shape;
 }

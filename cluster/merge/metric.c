@@ -178,8 +178,8 @@ static inline f8 shape_error(const lanes *a, const lanes *b, const lanes *u, f8 
     return f8_if_lt(none, worst, at_least(error, -1000), f8_set(0.5f));
 }
 
-/* The record of the union, except its fit. The covariance of the parts moves to the common centroid (8.11).
- */
+/* The record of the union, except its fit. By (8.7) to (8.10), Z of the union is the sum of both parts' Z and
+ * of wa wb / (wa + wb) d d^T, where d goes from one centroid to the other. */
 static inline void join(const fct_metric *metric, const lanes *a, const lanes *b, f8 shared, f8 invert_weight,
                         lanes *u) {
     f8 d[3], wa = weight_of(metric, a), wb = weight_of(metric, b), none = f8_set(0);
@@ -242,10 +242,10 @@ static inline void find_apart(const f8 c[6], f8 u[3]) {
     for (int i = 0; i < 3; ++i) u[i] = f8_mul(u[i], invert);
 }
 
-/* The least eigenvalue of the covariance (8.11), which is the sum of squared distances to the best plane
- * (8.4). Within 4e-5 of itself and 6e-8 of the trace of the eigenvalue in double. It is the least of the
- * Rayleigh quotient of the eigenvector u that stands apart and of the lesser eigenvalue of the 2x2 matrix
- * (ee ef; ef ff) across u. */
+/* The least eigenvalue of Z (8.11). It is the sum of squared distances to the best plane, because P (8.4) is
+ * n^T Z n at the best d = -n^T b / c. Within 4e-5 of itself and 6e-8 of the trace of the eigenvalue in
+ * double. It is the least of the Rayleigh quotient of the eigenvector u that stands apart and of the lesser
+ * eigenvalue of the 2x2 matrix (ee ef; ef ff) across u. */
 static inline f8 least_spread(const lanes *l) {
     f8 trace = f8_add(f8_add(l->covariance[0], l->covariance[3]), l->covariance[5]);
     f8 one = f8_set(1), invert = f8_div(one, at_least(trace, TINY)), c[6], u[3], cu[3], ce[3], cf[3];

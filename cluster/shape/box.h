@@ -13,7 +13,7 @@ void fct_box_axes(const float rotation[4], float axes[3][3]);
  * extents are then FLT_MAX. */
 bool fct_box_set(const fct_extents *extents, const float axes[3][3], v3 point, fct_cluster *cluster);
 
-/* A quarter of the surface area, for comparison. */
+/* Half the surface area of the box, for comparisons. */
 double fct_box_area(const fct_extents *extents);
 
 #endif

@@ -1,9 +1,11 @@
 /* cluster/shape/sums.c: sums over the surface of a cluster, in double: of triangles, four at a time, and of
  * the union of two clusters.
  *
- * The covariance of a triangle about its centroid is area / 36 times the sum of the outer products of its
- * three sides. A triangle without area weighs 1e-20 of its longest squared side in centroid and covariance,
- * so that clusters of such faces have both.
+ * The covariance is Z (8.6), integrated over the surface instead of summed over points. That of a triangle is
+ * area / 36 times the sum of the outer products of its three sides. That of a union follows from (8.10): both
+ * parts move to the common centroid. The moment is D of (8.14), weighted by area, and the vector is -e. A
+ * triangle without area weighs 1e-20 of its longest squared side in centroid and covariance, so that clusters
+ * of such faces have both.
  */
 #include "cluster/shape/sums.h"
 

@@ -7,8 +7,9 @@
 #include "base/math/vec.h"
 #include "base/variant.h"
 
-/* 20 doubles per cluster, so that four clusters transpose as 4 x 4 blocks. Centre and covariance are weighted
- * by `weight`; the covariance is about the centre. */
+/* 20 doubles per cluster, so that four clusters transpose as 4 x 4 blocks. moment: D of (8.14), sum of A n
+ * n^T. vector: -e of (8.14), sum of A n. center: b / c (8.3) and covariance: Z (8.10), both weighted by
+ * `weight`; the covariance is about the centre. */
 typedef struct fct_sums {
     double area, weight, moment[6], covariance[6];
     v3 vector, center;
