@@ -25,6 +25,30 @@ static void reads_every_index_form(void **state) {
     starve("obj", text, sizeof text - 1);
 }
 
+/* A dart: the fan about its first corner would fold over. The texture coordinates equal x and y of the
+ * vertices, so they must still do so in every corner of the triangles. */
+static void concave_polygons_keep_their_texcoords(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    assert_int_equal(parse_text(&r, "obj",
+                                "v 2 -1 0\nv .5 0 0\nv 2 1 0\nv 0 0 0\n"
+                                "vt 0 0\nvt 2 1\nvt .5 0\nvt 2 -1\nf 1/4 2/3 3/2 4/1\n",
+                                &m),
+                     FCT_OK);
+    assert_int_equal(m.face_count, 2);
+    for (int corner = 0; corner < 6; ++corner) {
+        assert_true(m.texcoords[2 * corner] == m.positions[3 * m.triangles[corner]]);
+        assert_true(m.texcoords[2 * corner + 1] == m.positions[3 * m.triangles[corner] + 1]);
+    }
+    for (int f = 0; f < 2; ++f) { /* halves of the dart, whose area is 1/2 */
+        const float *a = m.positions + 3 * m.triangles[3 * f], *b = m.positions + 3 * m.triangles[3 * f + 1];
+        const float *c = m.positions + 3 * m.triangles[3 * f + 2];
+        assert_true((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) == .5f);
+    }
+    release(&r, &m);
+}
+
 static void reads_colors(void **state) {
     (void)state;
     recorder r = {0};
@@ -187,6 +211,7 @@ static void cancels(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(reads_every_index_form),
+        cmocka_unit_test(concave_polygons_keep_their_texcoords),
         cmocka_unit_test(reads_colors),
         cmocka_unit_test(numbers_materials_in_order_of_use),
         cmocka_unit_test(keeps_many_materials_apart),

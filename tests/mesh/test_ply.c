@@ -29,6 +29,30 @@ static void reads_text(void **state) {
     release(&r, &m);
 }
 
+/* Integer colours are sRGB: ushort from 0 to 65535, other types from 0 to 255. */
+static void integer_colors_scale_by_their_type(void **state) {
+    (void)state;
+    static const struct {
+        const char *type;
+        double top;
+    } cases[] = {{"uchar", 255}, {"ushort", 65535}, {"int", 255}};
+    for (int i = 0; i < 3; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        char text[512];
+        int high = (int)(cases[i].top * .7), low = (int)(cases[i].top * .02);
+        snprintf(text, sizeof text,
+                 "%selement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property %s red\nproperty %s green\nproperty %s blue\nend_header\n0 0 0 %d %d %d\n",
+                 head_ascii, cases[i].type, cases[i].type, cases[i].type, (int)cases[i].top, high, low);
+        assert_int_equal(parse_text(&r, "ply", text, &m), FCT_OK);
+        assert_true(m.colors[0] == 1);
+        assert_true(fabs((double)m.colors[1] - pow((high / cases[i].top + .055) / 1.055, 2.4)) < 1e-6);
+        assert_true(fabs((double)m.colors[2] - low / cases[i].top / 12.92) < 1e-7);
+        release(&r, &m);
+    }
+}
+
 /* Doubles, shuffled properties, unknown elements with lists before and between, in both byte orders. */
 static bytes make_binary(bool big, bool uniform) {
     bytes b = {.size = 0};
@@ -244,6 +268,7 @@ static void keeps_extreme_extents(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(reads_text),
+        cmocka_unit_test(integer_colors_scale_by_their_type),
         cmocka_unit_test(reads_both_byte_orders),
         cmocka_unit_test(refuses_every_truncation),
         cmocka_unit_test(reads_strips),

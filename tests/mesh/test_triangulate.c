@@ -67,11 +67,43 @@ static void combs_and_spirals_are_covered_once(void **state) {
         p[3 * i] = (float)cos(a), p[3 * i + 1] = (float)sin(a), p[3 * i + 2] = 0;
     }
     assert_true(fabs(cover(p, N, out) - 1) < 1e-5);
-    for (int i = 0; i < N; ++i) { /* twice round the middle: every fan triangle turns the same way */
+}
+
+/* The corners run twice round the middle, so every triangle of the fan about corner 0 turns the same way, but
+ * the fan's angles sum to 3 pi. The polygon is not convex, so it is cut by ears. It crosses itself, so some
+ * triangles turn over; their signed areas still sum to the polygon's. */
+static void a_double_spiral_is_no_fan(void **state) {
+    (void)state;
+    enum { N = 60 };
+    float p[3 * N];
+    uint32_t out[3 * N], corners[N], at_first_corner = 0;
+    for (uint32_t i = 0; i < N; ++i) {
         double a = 2 * 6.283185307179586 * i / N, r = 1 + .5 * i / N;
         p[3 * i] = (float)(r * cos(a)), p[3 * i + 1] = (float)(r * sin(a)), p[3 * i + 2] = 0;
+        corners[i] = i;
     }
-    cover(p, N, out);
+    double area = 0, whole = area_vector(p, corners, N).z;
+    assert_true(cover(p, N, out) > 1 - 1e-5);
+    for (int i = 0; i < N - 2; ++i) {
+        at_first_corner += !out[3 * i] || !out[3 * i + 1] || !out[3 * i + 2];
+        area += area_vector(p, out + 3 * i, 3).z;
+    }
+    assert_true(fabs(area / whole - 1) < 1e-6);
+    assert_true(at_first_corner < N / 2);
+}
+
+/*        4,5
+ *   2,5   |     The spike at (2, 5) folds back over the corner (2, 3). That corner is flat to the spike, and
+ *    |    |     becomes convex when its neighbour is cut off. From then on it must not block other ears.
+ * ---2,3  |
+ *    2,2  |
+ *        4,0
+ */
+static void a_corner_cut_convex_blocks_no_ear(void **state) {
+    (void)state;
+    static const float spike[] = {0, 3, 0, 2, 3, 0, 2, 5, 0, 2, 2, 0, 4, 0, 0, 4, 5, 0};
+    uint32_t out[12];
+    assert_true(fabs(cover(spike, 6, out) - 1) < 1e-12);
 }
 
 static void tiny_and_huge_extents_make_no_difference(void **state) {
@@ -123,6 +155,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_dart_is_cut_at_its_reflex_corner),
         cmocka_unit_test(combs_and_spirals_are_covered_once),
+        cmocka_unit_test(a_double_spiral_is_no_fan),
+        cmocka_unit_test(a_corner_cut_convex_blocks_no_ear),
         cmocka_unit_test(tiny_and_huge_extents_make_no_difference),
         cmocka_unit_test(degenerate_polygons_still_give_all_triangles),
         cmocka_unit_test(giants_end),
