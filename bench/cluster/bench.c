@@ -98,7 +98,7 @@ static size_t status_bytes(const char *key) {
 
 bench_memory bench_memory_start(void) {
     malloc_trim(0);
-    /* 5 sets the high-water mark back to what is resident; where that is forbidden the loading counts, too.
+    /* writing 5 resets the peak to the resident memory; if that is forbidden, the peak includes the loading
      */
     FILE *file = fopen("/proc/self/clear_refs", "w");
     if (file) {

@@ -1,11 +1,11 @@
-/* bench/cluster/boxes.c: our boxes beside those of a top-down OBBTree and of an aligned tree, by surface and
- * by what queries visit.
+/* bench/cluster/boxes.c: compares our boxes with those of a top-down OBB tree and of an axis-aligned tree, by
+ * surface area and by the boxes that queries visit.
  *
  * usage: boxes MESH [REPEATS]
- * All trees go down to one triangle and are walked by the same code, so that only their shapes differ.
- * Queries: a grid of parallel rays from outside, rays from anywhere in the bounds in any direction, and the
- * mesh against a copy at random poses, one thousandth of the diagonal before and behind first contact. Every
- * tree must give the same answers, or the program fails. Times are medians of REPEATS (5), taken in turns.
+ * All trees have one triangle per leaf, and the same code walks them. Queries: a grid of parallel rays from
+ * outside; random rays from inside the bounds; the mesh against a copy at random poses, a thousandth of the
+ * diagonal before and behind the first contact. The program fails unless all trees give the same answers.
+ * Times are medians of REPEATS (5) measurements in turns.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +32,7 @@ typedef struct tests {
 typedef struct figure {
     box_visits visits;
     double seconds[MOST_REPEATS];
-    double sum; /* of what was found */
+    double sum; /* of the results */
     size_t found;
 } figure;
 
@@ -95,7 +95,7 @@ static void make_rays(const fct_mesh *mesh, double diagonal, tests *t) {
     }
 }
 
-/* A random rotation about the centre of the root's box, and the way out. */
+/* A random rotation about the centre of the root's box, and a random direction to move along. */
 static box_pose any_pose(bench_dice *dice, v3 center, v3 *out) {
     box_pose pose;
     v3 a = any_direction(dice), b, c;
@@ -110,7 +110,7 @@ static box_pose any_pose(bench_dice *dice, v3 center, v3 *out) {
     return pose;
 }
 
-/* The last contact on the way out, between two steps of 1/64 of the diagonal, to 1/1024 of it. */
+/* The distance of the last contact along the direction: steps of 1/64 of the diagonal, refined to 1/1024. */
 static void make_poses(const box_tree *tree, double diagonal, tests *t) {
     bench_dice dice = {13};
     v3 center = v3_load(tree->boxes[tree->root].center);

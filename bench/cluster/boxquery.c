@@ -1,7 +1,8 @@
-/* bench/cluster/boxquery.c: rays and touching copies through a tree of boxes, plainly.
+/* bench/cluster/boxquery.c: plain queries of a tree of boxes: rays, and contact with a copy.
  *
- * In double throughout. Boxes are swollen by a millionth of their own size, so that rounding never hides what
- * lies on a side of one; every tree then finds the same hits. Stacks are as high as the tree.
+ * All arithmetic is in double. Boxes are enlarged by a millionth of their size, so that rounding never
+ * excludes a point on a side of a box. So every tree finds the same hits. The program ends
+ * with an error if a stack needs more than 4096 entries.
  */
 #include <float.h>
 #include <stdlib.h>
@@ -19,7 +20,7 @@ static double swell(const fct_box *box) {
 
 /* --- Rays --- */
 
-/* Where the ray enters the box, INFINITY if not before `limit`. */
+/* t where the ray enters the box; INFINITY if it misses the box before `limit`. */
 static double enter(const fct_box *box, v3 origin, v3 direction, double limit) {
     v3 o = v3_sub(origin, v3_load(box->center));
     double first = 0, last = limit, margin = swell(box);
@@ -82,7 +83,7 @@ double box_tree_ray(const box_tree *tree, v3 origin, v3 direction, box_visits *v
     return best;
 }
 
-/* --- A tree against its own copy --- */
+/* --- Contact with a copy --- */
 
 static v3 turn(const box_pose *pose, v3 p) {
     return (v3){v3_dot(pose->axes[0], p), v3_dot(pose->axes[1], p), v3_dot(pose->axes[2], p)};
@@ -92,7 +93,7 @@ static v3 place(const box_pose *pose, v3 p) {
     return v3_add(turn(pose, p), pose->shift);
 }
 
-/* Fifteen axes that may part two boxes; the second is moved by the pose. */
+/* Separating axis test of two boxes, with fifteen axes; the pose moves the second box. */
 static bool boxes_overlap(const fct_box *first, const fct_box *second, const box_pose *pose) {
     double r[3][3], size[3][3], a[3], b[3], t[3];
     v3 ax[3], between = v3_sub(place(pose, v3_load(second->center)), v3_load(first->center));
@@ -131,7 +132,8 @@ static bool parted_along(v3 axis, const v3 p[3], const v3 q[3]) {
     return low[0] > high[1] || low[1] > high[0];
 }
 
-/* Normals, cross products of sides, and for triangles in one plane the sides' normals within it. */
+/* Separating axes: both normals, cross products of sides, and for coplanar triangles the normals of the sides
+ * in the plane. */
 static bool triangles_touch(const v3 p[3], const v3 q[3]) {
     v3 pe[3], qe[3], origin = p[0], a[3], b[3];
     for (int k = 0; k < 3; ++k) {

@@ -1,9 +1,9 @@
-/* bench/cluster/boxtop.c: our clusters under another top.
+/* bench/cluster/boxtop.c: our clusters below a new top.
  *
- * What a tree for rays alone could look like: the tree's own clusters up to a cut, above it boxes split from
- * the top by the surface area heuristic. The cut's clusters are sorted along each axis of a node's surface
- * and every place between two is tried. Ids below count - 1 are the nodes above the cut, in our tree and in
- * the new one.
+ * A tree for rays alone keeps the clusters of a cut and everything below them. The tree above the cut is
+ * split from the top by the surface area heuristic: sort the clusters along each axis of the node's surface
+ * and try every cut between two. Ids below count - 1 are the nodes above the cut, in our tree and in the new
+ * one.
  */
 #include <stdlib.h>
 
@@ -11,7 +11,7 @@
 #include "bench/cluster/boxtree.h"
 
 typedef struct item {
-    uint32_t node, first, count; /* its box; its faces in the tree's order */
+    uint32_t node, first, count; /* number of its box; its faces in the tree's order */
     v3 center;
     double key;
 } item;
@@ -54,7 +54,7 @@ static void sort_along(item *items, uint32_t count, v3 axis) {
     qsort(items, count, sizeof *items, compare);
 }
 
-/* Sorts the items along the best axis and returns how many go to the first child. */
+/* Sorts the items along the best axis. Returns the number of items of the first child. */
 static uint32_t split(const box_tree *tree, item *items, uint32_t count, const v3 axes[3], double *before) {
     double best = INFINITY;
     uint32_t left = 1;

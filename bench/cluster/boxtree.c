@@ -1,4 +1,4 @@
-/* bench/cluster/boxtree.c: trees of boxes: ours taken over, and two built from the top. */
+/* bench/cluster/boxtree.c: trees of boxes: ours, converted, and two that are built from the top. */
 #include "bench/cluster/boxtree.h"
 
 #include <float.h>
@@ -7,7 +7,7 @@
 
 #include "bench/cluster/bench.h"
 
-/* --- What all trees share --- */
+/* --- Common code --- */
 
 static v3 corner(const fct_mesh *mesh, uint32_t face, uint32_t k) {
     return v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)face + k]);
@@ -26,7 +26,7 @@ void box_tree_release(box_tree *tree) {
     *tree = (box_tree){0};
 }
 
-/* Half extents reach past what rounding to float takes. */
+/* Half extents are enlarged by more than the rounding to float. */
 fct_box box_fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, const v3 axes[3]) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     v3 used[3], center = {0, 0, 0};
@@ -46,7 +46,7 @@ fct_box box_fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, con
     return box;
 }
 
-/* A face without area weighs next to nothing. */
+/* A face without area gets a tiny weight, so that clusters of such faces have a centroid. */
 v3 box_axes(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, v3 axes[3]) {
     v3 origin = corner(mesh, faces[0], 0), mean = {0, 0, 0};
     double total = 0, m[6] = {0}, values[3], vectors[3][3];
@@ -68,7 +68,7 @@ v3 box_axes(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, v3 axes
 
 static const v3 world[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-/* A triangle's own frame: its longest side and its normal. */
+/* The frame of a triangle: its longest side and its normal. */
 static fct_box fit_face(const fct_mesh *mesh, uint32_t face) {
     v3 p[3] = {corner(mesh, face, 0), corner(mesh, face, 1), corner(mesh, face, 2)}, longest = {0, 0, 0};
     for (int k = 0; k < 3; ++k) {
@@ -107,7 +107,7 @@ void box_tree_take(const fct_mesh *mesh, const fct_tree *tree, box_tree *out) {
     fit_faces(out);
 }
 
-/* --- Built from the top --- */
+/* --- Trees from the top --- */
 
 typedef struct task {
     uint32_t first, count, node;
@@ -115,11 +115,11 @@ typedef struct task {
 
 typedef struct builder {
     box_tree *tree;
-    uint32_t *faces; /* a permutation that the tasks' ranges cut */
+    uint32_t *faces; /* a permutation; each task has a range of it */
     v3 *centroids;
 } builder;
 
-/* Puts the box of a task's faces in place, reorders them and returns how many go to the first child. */
+/* Stores the box of the task's faces and reorders them. Returns the number of faces of the first child. */
 typedef uint32_t split_function(builder *b, const task *t);
 
 static void build(const fct_mesh *mesh, split_function *split, box_tree *out) {
@@ -131,7 +131,7 @@ static void build(const fct_mesh *mesh, split_function *split, box_tree *out) {
         v3 sum = v3_add(v3_add(corner(mesh, f, 0), corner(mesh, f, 1)), corner(mesh, f, 2));
         b.centroids[f] = v3_scale(sum, 1. / 3);
     }
-    /* Each task on the stack holds faces of its own. */
+    /* tasks on the stack have disjoint faces, so there are at most face_count */
     task *stack = bench_allocate(mesh->face_count, sizeof *stack);
     uint32_t top = 0, made = 1;
     stack[top++] = (task){0, mesh->face_count, 0};
@@ -151,7 +151,7 @@ static void build(const fct_mesh *mesh, split_function *split, box_tree *out) {
     free(b.centroids);
 }
 
-/* Faces whose centroid lies below come first; returns how many. */
+/* Moves faces whose centroid lies below the cut to the front. Returns their number. */
 static uint32_t part(builder *b, const task *t, v3 axis, double at) {
     uint32_t *faces = b->faces + t->first, left = 0;
     for (uint32_t i = 0; i < t->count; ++i)
@@ -202,7 +202,7 @@ static void join(bin *to, const bin *from) {
     to->count += from->count;
 }
 
-/* Half the surface times the count. */
+/* Half the surface area times the count. */
 static double weight(const bin *b) {
     if (b->count == 0) return 0;
     double x = b->high[0] - b->low[0], y = b->high[1] - b->low[1], z = b->high[2] - b->low[2];
@@ -221,7 +221,7 @@ static bin bounds_of(const fct_mesh *mesh, uint32_t face) {
     return out;
 }
 
-/* The cheapest of the cuts between bins along one axis: returns its cost and where it is. */
+/* Finds the cheapest cut between bins along one axis. Returns its cost; *at receives its place. */
 static double best_cut(const bin bins[BINS], double low, double step, double *at) {
     double right[BINS], best = INFINITY;
     bin sum = empty;
@@ -269,7 +269,7 @@ void box_tree_aligned(const fct_mesh *mesh, box_tree *out) {
     out->seconds = bench_seconds() - start;
 }
 
-/* --- What a tree is like --- */
+/* --- Measures of a tree --- */
 
 double box_tree_area(const box_tree *tree, double diagonal) {
     double area = 0;
@@ -277,7 +277,7 @@ double box_tree_area(const box_tree *tree, double diagonal) {
     return area / (diagonal * diagonal);
 }
 
-/* Calls `visit` for every box with its parent, parents first. */
+/* Calls `visit` with each box and its parent, parents first. */
 static void walk(const box_tree *tree, void (*visit)(void *user, uint32_t parent, uint32_t box), void *user) {
     uint32_t *stack = bench_allocate((size_t)tree->inner_count + 1, sizeof *stack), top = 0;
     stack[top++] = tree->root;

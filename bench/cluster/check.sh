@@ -1,5 +1,5 @@
 #!/bin/sh
-# The measuring programs on small meshes whose figures are known in closed form.
+# Runs the measuring programs on small meshes with figures that are known in closed form.
 # usage: check.sh PROGRAMS WORK
 set -eu
 programs=$1 work=$2
@@ -14,24 +14,24 @@ expect() {
 }
 make() { "$programs/facetree" make "$1" --triangles "$2" --quiet -o "$work/$1.ply"; }
 
-# A flat square in one cluster: no deviation, perimeter^2 / (4 pi area) = 4 / pi.
+# A flat square in one cluster has no deviation, and perimeter^2 / (4 pi area) = 4 / pi.
 make grid 2048
 one=$("$tree" "$work/grid.ply" rounds 1 1)
 expect "a square" "$one" deviation 0 1e-6
 expect "a square" "$one" fit 0 1e-9
 expect "a square" "$one" irregularity 1.27324 1e-4
-# A closed surface in one cluster: its area vector is 0, and from whatever unit normal the mean squared deviation is 2.
+# A closed surface in one cluster has the area vector 0. The mean squared deviation from any unit normal is 2.
 make sphere 1280
 one=$("$tree" "$work/sphere.ply" greedy 1 1)
 expect "a sphere" "$one" deviation 2 1e-4
 expect "a sphere" "$one" irregularity 0 1e-6
-# A unit sphere's plane through its middle: mean squared distance 1/3, over a squared diagonal of 12.
+# A plane through the centre of a unit sphere: mean squared distance 1/3, squared diagonal 12.
 expect "a sphere" "$one" fit 0.02778 3e-4
-# As many clusters as faces: all flat.
+# With one cluster per face, all clusters are flat.
 one=$("$tree" "$work/sphere.ply" rounds 2 1280)
 expect "single faces" "$one" clusters 1280 0
 expect "single faces" "$one" deviation 0 1e-6
-# Cubes in as many clusters as sides have none; every shape has the faces it was asked for, and keeps them when shuffled.
+# Cubes with one cluster per side have no deviation. Each shape has the requested number of faces, also after a shuffle.
 "$shapes" cubes 120 "$work/cubes.ply"
 expect "cubes" "$("$tree" "$work/cubes.ply" rounds 1 60)" deviation 0 1e-6
 for shape in strip fan loose books; do
@@ -44,7 +44,7 @@ expect "subdivided cubes" "$("$tree" "$work/finer.ply" rounds 1)" faces 1920 0
 make torso 3000
 "$shapes" shuffle 5 "$work/torso.ply" "$work/shuffled.ply"
 expect "a shuffled torso" "$("$programs/facetree" compare --json --samples 1 "$work/torso.ply" "$work/shuffled.ply")" e_max 0 1e-9
-# All trees of boxes hold their faces and answer alike, or the program fails.
+# The program fails unless all trees of boxes contain their faces and give the same answers.
 "$programs/bench_cluster_boxes" "$work/torso.ply" 1 | grep -q '"aligned"'
 "$programs/bench_cluster_boxes" "$work/cubes.ply" 1 | grep -q '"obbtree"'
 echo "the measuring programs measure what they say"

@@ -1,8 +1,8 @@
-/* bench/cluster/judge.c: how good a partition is, from the triangles and their labels.
+/* bench/cluster/judge.c: measures a partition from triangles and labels.
  *
- * Written apart from the library's own measure and used for every builder, peers included. Sums are double;
- * covariances are taken about a first corner of the cluster and then moved to its centroid. Borders come from
- * the dual graph. O(F log F).
+ * Independent of the library's own measure, and the same for all builders. Sums are in double. Covariances
+ * are about the first corner of the cluster and then move to its centroid. Borders come from the dual graph.
+ * O(F log F).
  */
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +14,7 @@
 
 typedef struct sums {
     double area, perimeter;
-    v3 vector, origin, first; /* S; where moments are taken about; integral of x - origin */
+    v3 vector, origin, first; /* S; a corner of the cluster; integral of x - origin */
     double second[6];         /* integral of (x - origin)(x - origin)^T */
     uint32_t faces;
 } sums;
@@ -39,7 +39,7 @@ static void add_face(sums *s, const fct_mesh *mesh, uint32_t face) {
 
 typedef struct corners {
     uint32_t low, middle, high, face;
-    int turn; /* 1 or -1 */
+    int turn; /* orientation of the corners: 1 or -1 */
 } corners;
 
 static corners sort_corners(const uint32_t *t, uint32_t face) {
@@ -77,7 +77,7 @@ bool *bench_single_faces(const fct_mesh *mesh) {
     return single;
 }
 
-/* Over the whole mesh, doubled faces too, whose borders are those of their clusters. */
+/* Adds the borders of the whole mesh. Doubled faces count: their sides are borders of their clusters. */
 static void add_borders(const fct_env *env, const fct_mesh *mesh, const uint32_t *labels, sums *all) {
     fct_dual dual;
     bench_check(fct_dual_build(env, mesh, &dual), "the dual graph");

@@ -24,14 +24,14 @@ FULL = ["dragon-11k", "dragon-48k", "bunny", "nefertiti", "sphere-100k", "terrai
 QUICK = ["dragon-11k", "dragon-48k", "bunny", "terrain-100k", "sphere-100k", "bunny-x4", "terrain-1m"]
 BOXES = ["bunny", "terrain-100k", "nefertiti", "dragon-203k", "dragon-871k"]
 ADVERSARIAL = ["grid", "strip", "fan", "loose", "books", "shuffled-faces", "shuffled"]
-# Scans and machine parts whose cuts are compared, and into how many clusters.
+# Meshes whose cuts are compared, and their numbers of clusters.
 CUTS = ["cow", "fandisk", "gear-20k", "rocker-arm", "bunny", "nefertiti", "dragon-48k"]
 CUT_COUNTS = [30, 100, 1000, 10000]
 SEAM_FIGURES = ["mean_fit", "mean_direction", "mean_irregularity", "mean_normal_deviation", "box_area"]
-# Builder, threads, seconds its turns on one mesh may take in all.
+# Builder, threads, and the seconds that all its turns on one mesh may take.
 BUILDERS = [("rounds", 1, 25), ("rounds", 2, 25), ("greedy", 1, 6), ("greedy", 2, 6), ("meshlets", 1, 20), ("vsa-random", 1, 5),
             ("vsa-hierarchical", 1, 5), ("vsa-incremental", 1, 5)]
-# Where CGAL, which takes long and whose clusters are what it is here for, is not asked.
+# Meshes without CGAL, because it takes long and only its clusters are of interest.
 WITHOUT_VSA = ["terrain-1m", "sphere-1m", "terrain-4m", "terrain-10m"]
 
 
@@ -83,7 +83,7 @@ class Bench:
             return row
         begin = time.monotonic()
         try:
-            # Loading and judging take time of their own.
+            # The limit allows for loading and judging.
             done = subprocess.run(self.command(builder, mesh, threads, judge), stdout=subprocess.PIPE, timeout=limit + 20)
             row["status"] = "ok" if done.returncode == 0 else "failed"
             if done.returncode == 0:

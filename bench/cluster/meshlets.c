@@ -1,8 +1,8 @@
-/* bench/cluster/meshlets.c: the flat clustering of meshoptimizer, as it stands in Debian.
+/* bench/cluster/meshlets.c: times the flat clustering of Debian's meshoptimizer.
  *
  * usage: meshlets MESH
- * Meshlets of at most 64 vertices and 124 triangles, no weight on cones, as buildMeshlets is called by most.
- * The arrays it fills are allocated outside of the measured time; their pages are touched inside.
+ * Meshlets have at most 64 vertices and 124 triangles, and no weight on cones: the usual arguments of
+ * buildMeshlets. The time excludes the allocation of its output, but includes the first touch of the pages.
  */
 #include <meshoptimizer.h>
 #include <stdio.h>

@@ -7,11 +7,11 @@ import statistics
 import subprocess
 import sys
 
-# MixKit, Garland's own code, cannot be had everywhere. Seconds of MixKit over those of meshoptimizer's meshlets, measured beside
-# each other on another machine (70 thousand faces: .70 / .049; 1.07 million: 17.5 / .79), carry over; between them and beyond
-# the ratio is taken to grow with the logarithm, or to stay.
+# Faces, and time of MixKit (Garland's code) over that of meshoptimizer's meshlets. Debian has no package of MixKit, so the
+# ratio was measured on another machine: .70 s / .049 s at 70 thousand faces, 17.5 s / .79 s at 1.07 million. Between the two it
+# grows with the logarithm of the faces; outside it is constant.
 MIXKIT = [(70e3, .70 / .049), (1.07e6, 17.5 / .79)]
-# Its box areas over the squared diagonal.
+# Box areas of MixKit over the squared diagonal.
 MIXKIT_BOXES = {"bunny": 83.1}
 
 
@@ -168,7 +168,7 @@ def table_quality(runs):
            "greedy", "MixKit"], rows)
 
 
-# L2,1 of MixKit, Garland's own code, by mesh and number of clusters.
+# L2,1 of MixKit by mesh and number of clusters.
 MIXKIT_CUTS = {("rocker-arm", 100): .0886, ("bunny", 1000): .0367}
 
 

@@ -1,10 +1,10 @@
-/* bench/cluster/shapes.c: meshes that `facetree make` does not make: subdivided, shuffled and adversarial
- * ones.
+/* bench/cluster/shapes.c: makes subdivided, shuffled and adversarial meshes, which `facetree make` does not
+ * make.
  *
  * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes, gear: of about COUNT triangles
- *        shapes subdivide LEVELS IN OUT   each triangle into four, LEVELS times, with noise
+ *        shapes subdivide LEVELS IN OUT   splits each triangle into four, LEVELS times, with noise
  *        shapes shuffle-faces SEED IN OUT, shapes shuffle SEED IN OUT (vertices, too), shapes copy 0 IN OUT
- * Everything is a function of the arguments alone.
+ * The output depends on the arguments only.
  */
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 
 #include "bench/cluster/bench.h"
 
-/* --- Made from nothing --- */
+/* --- Meshes from formulas --- */
 
 static void start(const fct_env *env, uint32_t vertices, uint32_t faces, fct_mesh *m) {
     bench_check(fct_mesh_create(env, vertices, faces, 0, m), "a mesh");
@@ -38,7 +38,7 @@ static void make_strip(const fct_env *env, uint32_t count, fct_mesh *m) {
     for (uint32_t i = 0; i < count; ++i) add_face(m, i, i + 1 + i % 2, i + 2 - i % 2);
 }
 
-/* One vertex in all faces; a flat cone, closed. */
+/* All faces share one vertex; a flat cone, closed around it. */
 static void make_fan(const fct_env *env, uint32_t count, fct_mesh *m) {
     start(env, count + 1, count, m);
     add_vertex(m, 0, .2, 0);
@@ -49,7 +49,7 @@ static void make_fan(const fct_env *env, uint32_t count, fct_mesh *m) {
     for (uint32_t i = 0; i < count; ++i) add_face(m, 0, 1 + (i + 1) % count, 1 + i);
 }
 
-/* Triangles of all directions at random places, none of which share a vertex. */
+/* Random triangles that share no vertex. */
 static void make_loose(const fct_env *env, uint32_t count, fct_mesh *m) {
     bench_dice dice = {1};
     double size = .5 / cbrt(count);
@@ -64,7 +64,7 @@ static void make_loose(const fct_env *env, uint32_t count, fct_mesh *m) {
     }
 }
 
-/* Books of up to 100,000 pages on one edge each. */
+/* Books of up to 100,000 pages. All pages of a book share one edge. */
 static void make_books(const fct_env *env, uint32_t count, fct_mesh *m) {
     enum { PAGES = 100000 };
     start(env, count + 2 * (count / PAGES + 1), count, m);
@@ -76,7 +76,7 @@ static void make_books(const fct_env *env, uint32_t count, fct_mesh *m) {
     }
 }
 
-/* Small cubes in one high stack, with a gap between them. */
+/* A high stack of small cubes with gaps between them. */
 static void make_cubes(const fct_env *env, uint32_t count, fct_mesh *m) {
     static const uint8_t sides[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                                          {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -89,8 +89,8 @@ static void make_cubes(const fct_env *env, uint32_t count, fct_mesh *m) {
     }
 }
 
-/* A ring with twelve rounded teeth, 1 high: flat ends, curved walls, sharp edges between them. The profile is
- * a closed loop of `around` points (outer wall, upper end, inner wall, lower end), repeated at `turns`
+/* A gear of height 1 with a hole and twelve rounded teeth: flat ends, curved walls, sharp edges between them.
+ * A closed profile of `around` points (outer wall, upper end, inner wall, lower end) repeats at `turns`
  * angles. */
 static void make_gear(const fct_env *env, uint32_t count, fct_mesh *m) {
     uint32_t quarter = (uint32_t)(sqrt(count / 2.0) / 8) + 1, around = 4 * quarter,
@@ -126,7 +126,7 @@ static void make_gear(const fct_env *env, uint32_t count, fct_mesh *m) {
         }
 }
 
-/* --- Made from another mesh --- */
+/* --- Meshes from another mesh --- */
 
 typedef struct side {
     uint32_t low, high, corner;
@@ -139,7 +139,7 @@ static int compare_sides(const void *x, const void *y) {
     return a->corner < b->corner ? -1 : a->corner > b->corner;
 }
 
-/* The middle of a side, moved to a random place within a twentieth of its length. */
+/* The middle of a side, moved at random by at most a twentieth of its length. */
 static uint32_t add_middle(fct_mesh *m, bench_dice *dice, uint32_t a, uint32_t b) {
     const float *p = m->positions + 3 * (size_t)a, *q = m->positions + 3 * (size_t)b;
     double d[3], r[3], length = 0;

@@ -1,9 +1,9 @@
-/* bench/cluster/vsa.cpp: variational shape approximation by CGAL, the slow way to good clusters.
+/* bench/cluster/vsa.cpp: CGAL's variational shape approximation, a slow peer with good clusters.
  *
  * usage: vsa MESH K SEEDING
- * SEEDING is random, hierarchical or incremental. Seeding with its five relaxations and 20 iterations are
- * timed; the conversion of the mesh is not. What is no manifold is cut into one first; doubled faces stay
- * out. The partition is judged as ours is.
+ * SEEDING is random, hierarchical or incremental. The time includes the seeding with five relaxations and 20
+ * iterations, but not the conversion of the mesh. A non-manifold mesh is cut into a manifold first, without
+ * its doubled faces. judge.c judges the partition.
  */
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
@@ -35,7 +35,7 @@ seeding::Seeding_method method_of(const char *name) {
     bench_fail("expected random, hierarchical or incremental, found '%s'", name);
 }
 
-/* kept[i] is the input's face that became face i. */
+/* kept[i]: the input face of face i. */
 Mesh convert(const fct_mesh &input, std::vector<uint32_t> &kept) {
     namespace processing = CGAL::Polygon_mesh_processing;
     std::vector<Kernel::Point_3> points;

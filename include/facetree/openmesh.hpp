@@ -1,5 +1,5 @@
-// facetree/openmesh.hpp: face clusters straight from an OpenMesh mesh, and back as its properties. Header
-// only, C++17, OpenMesh 9; not part of facetree.h.
+// facetree/openmesh.hpp: clusters the faces of an OpenMesh mesh and stores the results in its properties.
+// Header only, C++17, OpenMesh 9; not part of facetree.h.
 //
 //     OpenMesh::TriMesh_ArrayKernelT<> mesh = ...;
 //     facetree::mesh_tree tree(mesh);
@@ -7,15 +7,14 @@
 //     OpenMesh::FProp<int> id(mesh, "cluster");
 //     tree.store_ids(mesh, parts, id);
 //
-// Takes any TriMesh_ArrayKernelT<Traits> with points of three coordinates; a PolyMesh is refused by the
-// compiler, for clusters are of triangles: mesh.triangulate() a copy of it. Elements that are marked as
-// deleted, and not yet collected, are left out, and their properties are not touched. A mesh may change its
-// points afterwards, but neither gain, lose nor renumber faces and vertices between mesh_tree(mesh) and the
-// last store: where their number differs, std::logic_error is thrown.
+// The mesh is any TriMesh_ArrayKernelT<Traits> with points of three coordinates. A PolyMesh does not compile;
+// triangulate() a copy of it. Deleted elements that are not yet garbage-collected are left out, and their
+// properties stay unchanged. After mesh_tree(mesh), points may change, but faces and vertices must not be
+// added, removed or renumbered until the last store. A different number of them throws std::logic_error.
 //
-// Errors are exceptions: facetree::error for what the library refuses (bad data, no memory, cancelled), with
-// its code and message. Hooks of an fct_env must not throw. One thread at a time may use an object of these
-// classes.
+// Errors of the library (bad data, no memory, cancelled) throw facetree::error with its code and message.
+// Hooks of an fct_env must not throw. Objects of these classes are not thread-safe: use each from one thread
+// at a time.
 #ifndef FACETREE_OPENMESH_HPP
 #define FACETREE_OPENMESH_HPP
 
@@ -52,7 +51,7 @@ class error : public std::runtime_error {
 
 namespace detail {
 
-// An environment that stays where it is, and remembers what the library said last.
+// An environment with a fixed address that keeps the last message of the library.
 class context {
   public:
     explicit context(const fct_env &user) : env(user), outer(user) {
@@ -74,7 +73,7 @@ class context {
         context *c = static_cast<context *>(self);
         try {
             if (severity == FCT_MESSAGE_ERROR) c->text = line;
-        } catch (...) { // without memory for a text the code still tells
+        } catch (...) { // no memory for the text; the exception still has the code
             c->text.clear();
         }
         if (c->outer.message) c->outer.message(c->outer.message_user, severity, line);
@@ -84,7 +83,8 @@ class context {
     std::string text;
 };
 
-// Which handles the numbers 0, 1, 2, ... stand for; empty where nothing is deleted: the same numbers.
+// The handle of each number 0, 1, 2, ...; empty if nothing is deleted, because numbers and handles are then
+// equal.
 template <class Handle> class handle_list {
   public:
     template <class Deleted> void fill(std::size_t all, Deleted &&deleted) {
@@ -96,7 +96,7 @@ template <class Handle> class handle_list {
             if (!deleted(h)) {
                 if (count < i) handles.push_back(h);
                 ++count;
-            } else if (count == i) { // the first that is missing
+            } else if (count == i) { // the first deleted element
                 for (std::size_t k = 0; k < i; ++k) handles.push_back(Handle(static_cast<int>(k)));
             }
         }
@@ -135,7 +135,7 @@ inline double linear_of(double srgb) {
     return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-// Colours of OpenMesh: bytes are sRGB, floats linear light; a fourth component is opaque.
+// Converts to a colour of OpenMesh: bytes are sRGB, floats are linear light, a fourth component is opaque.
 template <class Color> Color color_of(const float rgb[3], double exposure) {
     using value = typename OpenMesh::vector_traits<Color>::value_type;
     constexpr bool whole = std::is_integral<value>::value;
@@ -169,9 +169,9 @@ template <class Mesh> constexpr void require_triangles() {
 
 } // namespace detail
 
-// An fct_mesh with the points and triangles of an OpenMesh mesh, to be given to any function of the library:
-// face i is face(i) of the mesh, vertex i is vertex(i), both in the mesh's order. Vertex colours come along
-// where `colors` is true and the mesh has them. One copy; not copyable.
+// An fct_mesh with a copy of the points and triangles of an OpenMesh mesh, for any function of the library.
+// Its face i is face(i) of the mesh and its vertex i is vertex(i), both in the mesh's order. If `colors` is
+// true and the mesh has vertex colours, they are copied, too. Not copyable.
 template <class Mesh> class mesh_copy {
   public:
     explicit mesh_copy(const Mesh &mesh, bool colors = false, const fct_env &env = fct_env_default())
@@ -209,9 +209,9 @@ template <class Mesh> class mesh_copy {
     OpenMesh::FaceHandle face(std::size_t i) const { return ids.faces[i]; }
     OpenMesh::VertexHandle vertex(std::size_t i) const { return ids.vertices[i]; }
 
-    // Puts colours such as a bake leaves in fct_mesh::colors, vertex_count x 3 floats of linear light in the
-    // order of this copy, times exposure, into the vertex colours of the mesh: clamped and as sRGB where
-    // those are bytes. The mesh must have them: mesh.request_vertex_colors().
+    // Writes colours times exposure to the vertex colours of the mesh. colors: vertex_count x 3 floats of
+    // linear light in the order of this copy, such as fct_mesh::colors after a bake. Byte colours are clamped
+    // and converted to sRGB. Call mesh.request_vertex_colors() before.
     void store_vertex_colors(Mesh &mesh, const float *colors, double exposure = 1) const {
         ids.check(mesh);
         if (!mesh.has_vertex_colors()) throw std::logic_error("facetree: the mesh has no vertex colours");
@@ -223,7 +223,7 @@ template <class Mesh> class mesh_copy {
     template <class> friend class mesh_tree;
 
     void fill(const Mesh &mesh) {
-        std::vector<std::uint32_t> numbers; // of the vertices, where some are deleted
+        std::vector<std::uint32_t> numbers; // per vertex of the mesh, if some are deleted
         if (ids.vertices.size() < ids.vertices.full_size())
             numbers.assign(ids.vertices.full_size(), FCT_NONE);
         for (std::size_t v = 0; v < ids.vertices.size(); ++v) {
@@ -247,27 +247,28 @@ template <class Mesh> class mesh_copy {
     fct_mesh data{};
 };
 
-// A partition of the faces: labels are by face of the tree's input, and below count. nodes are those of the
-// tree, empty once the partition is refined.
+// A partition of the faces. labels: per face of the tree's input, below count. nodes: the tree's node of each
+// cluster; empty after refine, because refined clusters are not nodes.
 struct partition {
     std::uint32_t count = 0;
     std::vector<std::uint32_t> labels, nodes;
 };
 
-// A colour for each cluster, linear: hues a golden section apart, in three shades.
+// A colour per cluster in linear light. Successive hues are a golden section apart, in three shades.
 inline std::array<float, 3> cluster_color(std::uint32_t cluster) {
     double turn = std::fmod(cluster * 0.61803398874989485, 1.0), shade = 0.45 + 0.25 * (cluster % 3);
     std::array<float, 3> rgb{};
     for (unsigned k = 0; k < 3; ++k) {
-        double x = std::fabs(6 * std::fmod(turn + k / 3.0, 1.0) - 3) - 1; // a hexagon of hues
+        double x = std::fabs(6 * std::fmod(turn + k / 3.0, 1.0) - 3) -
+                   1; // red, green and blue as piecewise linear functions of the hue
         x = x < 0 ? 0 : x > 1 ? 1 : x;
         rgb[k] = static_cast<float>(shade * (0.15 + 0.85 * x));
     }
     return rgb;
 }
 
-// The tree of clusters of a mesh. Movable, not copyable; keeps no reference to the mesh. Vertex colours of
-// the mesh come along into the tree and the file it is saved to.
+// The tree of clusters of a mesh. Movable, not copyable. Keeps no reference to the mesh. The tree and its
+// file also hold the vertex colours of the mesh.
 template <class Mesh> class mesh_tree {
   public:
     explicit mesh_tree(const Mesh &mesh, const fct_tree_def &def = fct_tree_def_default(),
@@ -281,7 +282,7 @@ template <class Mesh> class mesh_tree {
         tree.reset(built);
     }
 
-    // For the functions of the library. Face i of the tree's input is face(i) of the mesh.
+    // The tree for functions of the library. Face i of its input is face(i) of the mesh.
     const fct_tree *get() const { return tree.get(); }
     fct_tree_view view() const { return fct_tree_get(tree.get()); }
     OpenMesh::FaceHandle face(std::size_t i) const { return ids.faces[i]; }
@@ -289,7 +290,8 @@ template <class Mesh> class mesh_tree {
         context->check(fct_tree_save(context->get(), tree.get(), path.c_str()));
     }
 
-    // `count` clusters, clamped to [roots, faces]; those that merges of at most max_cost leave.
+    // cut: the partition into `count` clusters, clamped to [roots, faces]. cut_at_cost: the partition after
+    // all merges that cost at most max_cost.
     partition cut(std::uint32_t count) const {
         const fct_tree_view v = view();
         count = count < v.root_count ? v.root_count : count > v.face_count ? v.face_count : count;
@@ -303,8 +305,8 @@ template <class Mesh> class mesh_tree {
     }
     partition cut_at_cost(double max_cost) const { return cut(fct_tree_count_at_cost(tree.get(), max_cost)); }
 
-    // What lies on borders changes sides: fct_tree_refine for a cut, fct_partition_refine for what is no cut
-    // any more. On failure the partition is as it was.
+    // Moves faces across borders: fct_tree_refine for a cut, fct_partition_refine for a partition that is
+    // refined already. On failure the partition is unchanged.
     fct_refine_stats refine(partition &parts, const fct_refine_def &def = fct_refine_def_default()) const {
         fct_refine_stats stats{};
         if (parts.nodes.size() == parts.count)
@@ -326,7 +328,7 @@ template <class Mesh> class mesh_tree {
         return out;
     }
 
-    // Area, normal cone, plane, box and so on of each cluster of a cut that is not refined.
+    // The record (area, normal cone, plane, box, ...) of each cluster of a cut that is not refined.
     std::vector<fct_cluster> clusters(const partition &parts) const {
         if (parts.nodes.size() != parts.count)
             throw std::logic_error("facetree: a refined partition has no nodes");
@@ -335,7 +337,7 @@ template <class Mesh> class mesh_tree {
             context->check(fct_tree_cluster(tree.get(), parts.nodes[i], &out[i]));
         return out;
     }
-    // n.x + d = 0 of each cluster, refined or not: nx, ny, nz, d.
+    // The plane n.x + d = 0 of each cluster, refined or not, as nx, ny, nz, d.
     std::vector<std::array<float, 4>> planes(const partition &parts) const {
         std::vector<std::array<float, 4>> out(parts.count);
         with_mesh([&](const fct_mesh *mesh) {
@@ -345,14 +347,14 @@ template <class Mesh> class mesh_tree {
         return out;
     }
 
-    // The cluster of each face, 0 to count - 1, into a property of any integer type that holds it.
+    // Writes the cluster of each face, 0 to count - 1, to a property of any integer type that can hold it.
     template <class Id>
     void store_ids(Mesh &mesh, const partition &parts, OpenMesh::FPropHandleT<Id> property) const {
         check(mesh, parts);
         for (std::size_t f = 0; f < parts.labels.size(); ++f)
             mesh.property(property, ids.faces[f]) = static_cast<Id>(parts.labels[f]);
     }
-    // The plane of each face's cluster into a property of vectors of four (OpenMesh::Vec4f, Vec4d).
+    // Writes the plane of each face's cluster to a property of 4-vectors (OpenMesh::Vec4f, Vec4d).
     template <class Vector>
     void store_planes(Mesh &mesh, const partition &parts, OpenMesh::FPropHandleT<Vector> property) const {
         check(mesh, parts);
@@ -364,7 +366,7 @@ template <class Mesh> class mesh_tree {
                     all[parts.labels[f]][k]);
         }
     }
-    // The same for OpenMesh::FProp<T> and other property managers.
+    // The same with OpenMesh::FProp<T> and other property managers.
     template <class Id, class Any>
     void store_ids(Mesh &mesh, const partition &parts,
                    const OpenMesh::PropertyManager<OpenMesh::FPropHandleT<Id>, Any> &property) const {
@@ -375,8 +377,8 @@ template <class Mesh> class mesh_tree {
                       const OpenMesh::PropertyManager<OpenMesh::FPropHandleT<Vector>, Any> &property) const {
         store_planes(mesh, parts, property.getRawProperty());
     }
-    // color(cluster), three floats of linear light, into the face colours of the mesh, which must have them:
-    // mesh.request_face_colors().
+    // Writes color(cluster), three floats of linear light, to the face colours of the mesh. Call
+    // mesh.request_face_colors() before.
     template <class Color = std::array<float, 3> (*)(std::uint32_t)>
     void store_face_colors(Mesh &mesh, const partition &parts, Color &&color = cluster_color) const {
         check(mesh, parts);
