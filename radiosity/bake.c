@@ -9,8 +9,8 @@
 #include "radiosity/solve/refine.h"
 #include "radiosity/surface/tessellate.h"
 
-/* Default epsilon over the emitted power: 1.4 % RMS error of the vertices in the Cornell box, 3.4 % in the museum.
- * Larger values give fewer elements and rays. */
+/* Default epsilon over the emitted power: 1.4 % RMS error of the vertices in the Cornell box, 3.4 % in the
+ * museum. Larger values give fewer elements and rays. */
 #define DEFAULT_ERROR 2e-5
 /* Factors on numbers of rays for errors far from the default. */
 #define LEAST_FINENESS .25
