@@ -43,7 +43,7 @@ typedef struct helper {
 static helper helpers[MOST_HELPERS];
 static _Atomic uint32_t helper_count;
 static pthread_mutex_t starting = PTHREAD_MUTEX_INITIALIZER; /* held while helpers are added */
-static bool closed = true;                                   /* no helpers may be added */
+static bool closed = true;                                   /* no helper may start */
 
 /* Works on the next chunk. Returns false if there is none. */
 static bool do_chunk(job *j, uint32_t thread) {

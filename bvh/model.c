@@ -15,7 +15,7 @@ bool fct_bvh_degenerate(const fct_bvh *bvh, uint32_t place) {
     double scale = bvh->scale, e[2][3];
     for (int i = 0; i < 2; ++i)
         for (int k = 0; k < 3; ++k) e[i][k] = scale * (double)p[i + 1][k] - scale * (double)p[0][k];
-    /* A product of two differences has more digits than a double holds. */
+    /* long double, because the product of two differences may need more digits than a double holds. */
     for (int i = 0; i < 3; ++i) {
         int j = (i + 1) % 3;
         if ((long double)e[0][i] * (long double)e[1][j] != (long double)e[0][j] * (long double)e[1][i])

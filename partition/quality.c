@@ -198,7 +198,7 @@ static fct_partition_quality average_pieces(const judge *j, bool connected) {
     return q;
 }
 
-/* Measures a judge that is complete except for parents. */
+/* Measures the pieces of a judge. All of its members except `parents` must be set. */
 static fct_result measure_pieces(const fct_env *env, judge *j, fct_partition_quality *out) {
     fct_dual dual = {0};
     j->parents = fct_allocate(env, j->mesh->face_count, sizeof *j->parents);

@@ -46,8 +46,8 @@ static int create_spool(void) {
     return descriptor;
 }
 
-/* A rename is on the disk only when the folder is. Some network file systems cannot synchronise folders, so
- * failures are ignored. */
+/* Writes the folder to the disk, because a rename is permanent only then. Some network file systems cannot
+ * synchronise folders, so failures are ignored. */
 static void synchronise_folder(const char *target) {
     char folder[PATH_MAX];
     snprintf(folder, sizeof folder, "%s", target);

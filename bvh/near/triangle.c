@@ -16,7 +16,7 @@ static v3 mix_corners(v3 a, v3 b, v3 c, double u, double v) {
     return v3_add(v3_scale(a, 1 - u - v), v3_add(v3_scale(b, u), v3_scale(c, v)));
 }
 
-/* The nearest point of the three sides to the origin. */
+/* The point on the three sides that is nearest to the origin. */
 static v3 closest_on_sides(v3 a, v3 b, v3 c, double *u, double *v) {
     double ab = closest_on_segment(a, b), bc = closest_on_segment(b, c), ac = closest_on_segment(a, c);
     double us[3] = {ab, 1 - bc, 0}, vs[3] = {0, bc, ac};

@@ -285,7 +285,7 @@ static bool is_in(const char *word, size_t length, const char *const *list) {
     return false;
 }
 
-/* Statements that do not say where triangles are. */
+/* Skips a statement that defines no triangles. Curves, lines and points are counted; unknown words too. */
 static fct_result read_other(reader *r, const char *word, size_t length) {
     static const char *const silent[] = {"o",      "g",          "s",         "mg",    "mtllib", "maplib",
                                          "usemap", "bevel",      "c_interp",  "lod",   "vp",     "d_interp",

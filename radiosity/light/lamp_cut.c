@@ -36,7 +36,7 @@
 /* Cosines are at least this in error bounds, which would be infinite otherwise. */
 #define LEAST_COSINE .05
 /* A triangle larger than its distance is cut into quarters if it sends more than this share of the lamp's
- * light: points for shadow rays would be unevenly distributed over its light. */
+ * light. Otherwise shadow rays would go too rarely to its near part, which sends most of its light. */
 #define BRIGHT_PART .05
 #define MAX_PART    (1u << 12) /* quarters down to 4^-6 of a triangle */
 /* Clusters whose projected areas the table sums. */
@@ -125,7 +125,7 @@ static outlook estimate_cluster(const fct_lamp *lamp, const fct_receiver *rec, c
     double lower = lamp->two_sided ? fabs(toward) : fmax(0, toward);
     if (upper < lower) upper = lower;
     double top = fmin(1, cosx + spread) * kernel, bottom = fmax(0, cosx - spread) * kernel;
-    /* Directions turn by up to asin(spread) over the node, so faces that are edge-on for w may face x. */
+    /* The direction to x turns by up to asin(spread) over the node, so a face that w sees edge-on may face x. */
     double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
     if (side && cosx >= spread && spread < .5) {
         double light = fabs(toward) * cosx * kernel, cosy = fmax(LEAST_COSINE, fabs(toward) / c->area);

@@ -25,8 +25,7 @@
 #define FCT_LEAST_REFLECTANCE .05
 
 /* Factor on the spread of a leaf that is partly in full shadow. Such a leaf may reach under a wall into a
- * room without light, and its mean then shines there. With 1, the dark room of tests/radiosity/test_bake.c
- * gets light; larger values split every shadow border further. */
+ * room without light, and its mean would shine there. The factor makes the solver split it earlier. */
 #define FCT_DARK_WEIGHT 16
 
 /* Where the source lies as the receiver's centroid sees it. */

@@ -14,8 +14,7 @@
 #include "radiosity/solve/element.h"
 
 /* sum A_k |n_k.u| over its Cauchy-Schwarz bound, for the estimate of the projected area. The bound is 1.03 to
- * 1.3 times the projected area on average over scans; 1 makes links too bright, .9 too dark where an element
- * is flat. */
+ * 1.3 times the projected area on average over scans, so the estimate lies a little below it. */
 #define FCT_TYPICAL_SPREAD .95
 
 /* Estimate of the projected area: exact for a triangle and for a flat sheet seen from its front, else

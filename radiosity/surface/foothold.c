@@ -20,7 +20,7 @@
  * offsets let rays hit the vertex's own faces; larger ones let light pass under contacts. */
 #define EDGE_OFFSET     2e-4
 #define ROUNDING_OFFSET 8
-/* The offset grows by 1 / cosine on bent vertices, at most by 1 / this. */
+/* On bent vertices the offset is divided by a cosine, which counts as at least this. */
 #define LEAST_COSINE .05
 
 /* Positions of the corner and of the two that follow it in its face. */

@@ -112,7 +112,7 @@ static fct_result make_points(fct_simplifier *s) {
     result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the points of a mesh");
     if (result != FCT_OK) return result;
     find_frame(s);
-    /* Downwards, so that the lowest vertex of a point is its source. */
+    /* From the last vertex to the first, so that the lowest vertex of a point becomes its source. */
     for (uint32_t v = mesh->vertex_count; v-- > 0;) {
         uint32_t p = s->point_of[v];
         if (p == FCT_NONE) continue;

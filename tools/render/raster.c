@@ -259,8 +259,8 @@ static edges make_edges(const raster *r, const piece *p) {
     return e;
 }
 
-/* The pixels [*begin, *end) whose sample on the sub-row at y is covered. shift: the sample's x in its pixel.
- */
+/* Sets [*begin, *end) to the pixels whose sample on the sub-row at y is covered. shift is the x of the
+ * sample within its pixel. */
 static void find_span(const edges *e, int64_t y, int64_t shift, int64_t width, int64_t *begin, int64_t *end) {
     *begin = 0, *end = width;
     for (int i = 0; i < 3; ++i) {

@@ -186,7 +186,7 @@ static void light_studio(const drawing *d, const float n[3], const float to_eye[
     static const float sky[3] = {.30F, .335F, .40F}, ground[3] = {.20F, .175F, .155F},
                        key[3] = {.92F, .85F, .75F}, fill[3] = {.07F, .09F, .13F};
     float up = .5F + .5F * dot_floats(n, d->light[2]), f = fmaxf(dot_floats(n, d->light[1]), 0);
-    /* The key light has some extent, so it reaches beyond the horizon of the normal. */
+    /* The key light is not a point, so it also lights surfaces that turn slightly away from it. */
     float k = fmaxf(dot_floats(n, d->light[0]) + .12F, 0) / 1.12F;
     float rim = 1 - fmaxf(dot_floats(n, to_eye), 0);
     rim = .12F * rim * rim * rim * up;

@@ -37,8 +37,8 @@ static void swap_entries(void *items, size_t i, size_t j) {
     l->others[j] = other, l->keys[j] = key, l->shared[j] = shared;
 }
 
-/* Unites neighbouring entries with the same end. Such an end, or this cluster, is a union of this round, so
- * the key is open already. */
+/* Unites adjacent entries with the same end and adds their lengths. Two entries have the same end only if
+ * this cluster or that end is a union of this round. Their keys are then marked as not priced already. */
 static uint32_t unite_sorted(const list *l, uint32_t count) {
     uint32_t to = 0;
     for (uint32_t i = 0; i < count; ++i) {
