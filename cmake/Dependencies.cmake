@@ -1,4 +1,4 @@
-# What each folder links, all from Debian 12.
+# The libraries that each folder links. All are packages of Debian 12.
 set(THREADS_PREFER_PTHREAD_FLAG ON)
 find_package(Threads REQUIRED)
 find_package(embree 3.13 REQUIRED)

@@ -1,5 +1,5 @@
-# What `cmake --install` puts where: library, headers, program, man pages, documents; and how others find it: the CMake
-# package facetree (target facetree::facetree) and pkg-config's facetree.
+# `cmake --install` installs the library, headers, program, man pages and documents. Other projects find them as the CMake
+# package facetree (target facetree::facetree) or as facetree of pkg-config.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS facetree EXPORT facetreeTargets
@@ -11,7 +11,7 @@ install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs)
 install(DIRECTORY examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
 
 if(TARGET facetree_program)
-    # The program finds its library wherever the two are put together.
+    # The program looks for the library relative to itself, so both may be moved together.
     file(RELATIVE_PATH from_program ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
     set_target_properties(facetree_program PROPERTIES INSTALL_RPATH "$ORIGIN/${from_program}")
     install(TARGETS facetree_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
@@ -22,12 +22,12 @@ set(package ${CMAKE_INSTALL_LIBDIR}/cmake/facetree)
 install(EXPORT facetreeTargets NAMESPACE facetree:: DESTINATION ${package})
 configure_package_config_file(cmake/facetreeConfig.cmake.in ${PROJECT_BINARY_DIR}/cmake/facetreeConfig.cmake
     INSTALL_DESTINATION ${package})
-# Before 1.0 a minor version may break what an earlier one promised.
+# Before 1.0, a minor version may be incompatible with an earlier one.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/cmake/facetreeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/cmake/facetreeConfig.cmake ${PROJECT_BINARY_DIR}/cmake/facetreeConfigVersion.cmake
     DESTINATION ${package})
 
-# pkg-config finds the prefix from where the file lies, so that an installed tree may be moved.
+# pkg-config derives the prefix from the place of its file, so an installed tree may be moved.
 file(RELATIVE_PATH FACETREE_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 configure_file(cmake/facetree.pc.in ${PROJECT_BINARY_DIR}/cmake/facetree.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/cmake/facetree.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

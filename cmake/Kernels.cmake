@@ -1,5 +1,4 @@
-# Kernel files (see base/variant.h): the baseline is compiled with the rest of its folder, the AVX2 variant as a target of
-# its own.
+# Kernel files (base/variant.h) are compiled twice: for the baseline with their folder, and for AVX2 as a separate target.
 set(FACETREE_AVX2_OPTIONS -mavx2 -mbmi -mbmi2) # base/variant.c asks the processor for exactly these
 if(FACETREE_AVX2)
     include(CheckCSourceCompiles)

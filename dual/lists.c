@@ -195,7 +195,7 @@ static void match_sides(void *user, size_t begin, size_t end, size_t chunk, uint
         size_t count = bucket_begin(b, v + 1) - bucket_begin(b, v);
         uint64_t copy[FEW + 1] = {0};
         const uint64_t *few = bucket;
-        /* match_few reads FEW sides; those of another chunk may be changing */
+        /* match_few always reads FEW sides. Another thread may be changing those of the next chunk: copy. */
         if (count <= FEW && last - bucket <= FEW) few = memcpy(copy, bucket, count * sizeof *copy);
         bool done = count <= FEW / 2 ? match_few(b, few, (uint32_t)count, true, &t)
                     : count <= FEW   ? match_few(b, few, (uint32_t)count, false, &t)

@@ -1,8 +1,8 @@
 /* partition/count.c: partitions by count and by cost.
  *
  * Node ids fall with the order of merges, and a child has a larger id than its parent. Therefore the
- * partition into K clusters opens exactly the nodes below id K - R. Cost O(K), of which only the nodes are
- * touched.
+ * partition into K clusters opens exactly the nodes below id K - R. O(K); reads no other nodes than those of
+ * the partition and those that it opens.
  */
 #include "cluster/tree/node.h"
 #include "cluster/tree/walk.h"

@@ -20,8 +20,8 @@ enum { CUT = 256 }; /* clusters whose boxes bound an instance */
 #define UNIFORM_TOLERANCE 1e-5
 /* |det R| over the product of the columns' lengths. */
 #define SINGULAR_RATIO 1e-6
-/* Of the coordinates of a box: the float origin of a transformed ray errs by less than 2^-23 of them per
- * axis. */
+/* Margin of a box, as a share of its coordinates. A transformed ray has a float origin, which errs by less
+ * than 2^-23 of the coordinates per axis. */
 #define RAY_SLACK 1e-6
 
 static bool all_finite(const float *values, int count) {

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Checks the same order and the same absence of cycles as check-includes.sh, in the calls of the compiled library: an object
-# that uses a symbol of another object calls it. Kernels compiled for one processor count as the file that they come from.
+# Checks the rules of check-includes.sh on the calls of the compiled library. An object that uses a symbol of another object
+# calls it. Both variants of a kernel count as their source file.
 # usage: check-calls.sh BUILD_FOLDER
 sources=$(cd "$(dirname "$0")/.." && pwd) || exit 2
 cd "$1/CMakeFiles" || exit 2

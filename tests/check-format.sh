@@ -1,5 +1,5 @@
 #!/bin/sh
-# Every C and C++ file is as clang-format 14 leaves it. Exit code 77 (skipped) where that is not installed.
+# Checks that clang-format 14 would not change any C or C++ file. Exit code 77 (skipped) if it is not installed.
 # usage: check-format.sh [ROOT]
 cd "${1:-$(dirname "$0")/..}" || exit 2
 tool=clang-format-14

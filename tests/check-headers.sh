@@ -1,5 +1,6 @@
 #!/bin/sh
-# Each public header compiles alone, as C11 and as C++17; those for C++ as that, where what they adapt is installed.
+# Checks that each public header compiles alone, as C11 and as C++17. A C++ header compiles as C++17 only, and is skipped
+# if the library that it adapts is not installed.
 # usage: check-headers.sh INCLUDE_FOLDER CC CXX
 include=$1 cc=$2 cxx=$3 bad=0
 for header in "$include"/facetree/*.h; do

@@ -52,7 +52,7 @@ function allowed(from, to) {
         if (from == "tools" || from == "examples") next
         to = target[2]
         sub(/\..*/, "", to)
-        # the types of fct_tree are public names of all rooms of cluster/
+        # all subfolders of cluster/ know the types of fct_tree
         if (to == "cluster" && index(FILENAME, "cluster/") == 1) next
     } else {
         to = room_of(path)

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Habits of the house that a search can see. Prints each line that breaks one and fails.
+# Checks rules of style that a search can find. Prints each line that breaks a rule, and fails if there is one.
 # usage: check-words.sh [ROOT]
 cd "${1:-$(dirname "$0")/..}" || exit 2
 bad=0

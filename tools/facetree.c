@@ -56,7 +56,7 @@ static int print_overview(void) {
     for (int i = 0; i < COMMANDS; ++i) printf("  %-10s %s\n", commands[i].name, commands[i].summary);
     puts("  help       explain a command: facetree help COMMAND\n\n"
          "      --help     print this\n"
-         "      --version  print the version");
+         "      --version  print the version and the SIMD variant in use");
     return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 

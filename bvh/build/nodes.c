@@ -2,8 +2,8 @@
  *
  *   1. A node opens its child of largest area until it has eight children or all are leaves.
  *   2. Each child gets the oriented box of least area among three: with the axes of the smallest face cluster
- *      that holds all its faces, with those of its leaf of largest area, and with the coordinate axes. Each
- * is fitted to the vertices.
+ *      that holds all its faces, with those of its leaf of largest area, and with the coordinate axes. All
+ *      three are fitted to the vertices.
  *   3. If the oriented boxes of a node have less than ORIENTED_RATIO of the area of its axis boxes, the node
  *      stores oriented boxes. They cost twice the arithmetic of axis boxes and save visits to leaves.
  *

@@ -31,7 +31,8 @@ static const char *find_counts_fault(const fct_format_header *h) {
     return NULL;
 }
 
-/* What is wrong with the head of a file of `size` bytes at `data`, or NULL. *h is a copy of the header. */
+/* Describes the first fault in the head of a file of `size` bytes at `data`; NULL: none. Copies the header
+ * to *h. */
 static const char *find_head_fault(const fct_format_header *h, const void *data, size_t size) {
     if (h->order_mark != FCT_FORMAT_ORDER_MARK) return "written with another byte order, or damaged";
     if (h->file_size != size) return "truncated, with something appended, or damaged";

@@ -192,7 +192,7 @@ static fct_result run_greedy(greedy *g) {
     return FCT_OK;
 }
 
-/* The borders in double, from those of the edges where there are none yet. Errors: MEMORY. */
+/* MEAN only: makes the borders in double from those of the edges, unless they exist. Errors: MEMORY. */
 static fct_result widen_borders(fct_work *work) {
     if (!work->means || work->borders) return FCT_OK;
     work->borders = fct_allocate(work->env, work->edge_count, sizeof *work->borders);

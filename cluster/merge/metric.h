@@ -22,7 +22,7 @@ typedef struct fct_record {
     float fit;           /* area times E_fit (8.1) for the best plane */
 } fct_record;
 
-/* What a merge costs, and the map to the unit model. */
+/* The weights of the cost, and the map to the unit model. */
 typedef struct fct_metric {
     fct_cluster_cost cost;
     fct_fit_measure measure;

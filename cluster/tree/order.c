@@ -204,7 +204,7 @@ static void copy_vertices(void *user, size_t begin, size_t end, size_t chunk, ui
     }
 }
 
-/* What the four passes above do, in one, where there is one thread; returns how many vertices are used. */
+/* Does the work of the four passes above in one pass, for one thread. Returns the number of used vertices. */
 static uint32_t copy_alone(const orderer *o) {
     const fct_tree *tree = o->tree;
     uint32_t used = 0;

@@ -8,7 +8,7 @@
 #include "base/io/file.h"
 #include "facetree/cluster.h"
 
-/* What ordering knows of an inner node before it is described. */
+/* The members of an inner node that ordering sets; the description sets the others. */
 typedef struct fct_node_link {
     uint32_t child[2];
     uint32_t first, count;

@@ -45,7 +45,7 @@ static void find_range(const fct_tree *tree, uint32_t node, uint32_t *first, uin
     *count = record ? record->count : 1;
 }
 
-/* What is wrong with the corners of the face at a place, or NULL. */
+/* Describes the first fault in the corners of the face at a place; NULL: none. */
 static const char *corners_fault(const fct_tree_view *view, uint32_t place) {
     const uint32_t *t = view->triangles + 3 * (size_t)place;
     for (int k = 0; k < 3; ++k) {

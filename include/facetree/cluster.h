@@ -45,7 +45,7 @@ FCT_API void fct_cluster_box(const fct_cluster *cluster, fct_box *out);
  * merges all pairs of clusters at once that are each other's cheapest neighbour, or nearly so. */
 typedef enum fct_cluster_method { FCT_CLUSTER_GREEDY, FCT_CLUSTER_ROUNDS } fct_cluster_method;
 
-/* What the merge of clusters a and b costs. S = sum A_k n_k, w = sum A_k and E_shape (8.17) are those of the
+/* The cost of merging clusters a and b. S = sum A_k n_k, w = sum A_k and E_shape (8.17) are those of the
  * union, D(x) is x of the union less x of both parts. Lengths are those of the mesh scaled to a bounding-box
  * diagonal of 1.
  * INCREMENT, the default: the growth of the total error. Default weights 1e4, 1, .002.

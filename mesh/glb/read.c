@@ -2,9 +2,9 @@
  *
  * Nodes are visited in the order of the scene, each once (a node with two parents is an error, so there are
  * no cycles). Primitives of one mesh that share their arrays share their vertices. Triangles, strips and fans
- * become triangles, points become vertices; a mirroring transform turns the winding, as the specification
- * asks. Cameras, lights, skins and animations are left out. What is placed is bounded by the size of the
- * file, so that a short file of many references cannot exhaust the memory.
+ * become triangles, points become vertices; a mirroring transform reverses the winding, as the specification
+ * requires. Cameras, lights, skins and animations are left out. The size of the file bounds the number of
+ * placed elements, so that a short file of many references cannot exhaust the memory.
  */
 #include "mesh/glb/read.h"
 
@@ -62,7 +62,7 @@ static fct_result read_primitive(const reader *r, json_t *object, primitive *out
     return result;
 }
 
-/* What any (colours, texture coordinates, materials) or all (normals) primitives of the file have. */
+/* Arrays that some primitive has (colours, texture coordinates, materials) or that all have (normals). */
 static fct_result survey(reader *r) {
     json_t *meshes = json_object_get(r->glb.root, "meshes"), *mesh, *object;
     size_t i, j;

@@ -28,7 +28,7 @@ namespace {
 using namespace OpenMesh;
 using IO::OMFormat::Chunk;
 
-// What the reader tells, in its order. Half-edges 2e and 2e + 1 are the two of edge e.
+// The elements in the order of the reader. Edge e has the half-edges 2e and 2e + 1.
 class soup_importer : public IO::BaseImporter {
   public:
     struct half {
@@ -89,7 +89,7 @@ class soup_importer : public IO::BaseImporter {
     size_t n_edges() const override { return halves.size() / 2; }
     BaseKernel *kernel() override { return &no_properties; }
 
-    // What has no place in a soup.
+    // Counts of data that a soup cannot store.
     void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<Vec2f> &) override {}
     void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<Vec3f> &) override {}
     void set_face_texindex(FaceHandle, int) override {}

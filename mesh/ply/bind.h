@@ -24,12 +24,12 @@ typedef struct fct_ply_target {
     ptrdiff_t indices, texcoords, material; /* property numbers or NOWHERE */
 } fct_ply_target;
 
-/* What the element's name says. */
+/* The kind of the element, by its name. */
 fct_ply_kind fct_ply_kind_of(const fct_ply_element *element);
 
-/* Finds out what the element's properties are for, and allocates what one value (or three) for each of its
- * records needs. *vertex_texcoords receives V x 2 where texture coordinates lie at vertices. The count has
- * been checked against the size of the file. Errors: DATA, MEMORY. */
+/* Binds each property of the element to an array of the soup, and allocates the arrays that have one or three
+ * values per record. *vertex_texcoords receives V x 2 values if texture coordinates belong to vertices. The
+ * caller has checked the count against the size of the file. Errors: DATA, MEMORY. */
 fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const fct_ply_element *element,
                         fct_soup *soup, float **vertex_texcoords, fct_ply_target *out);
 

@@ -49,8 +49,8 @@ static inline size_t fct_ply_size(fct_ply_type type) {
     return sizes[type];
 }
 
-/* Reads up to and with the line "end_header"; t then stands at the first byte of the data. Errors: DATA,
- * MEMORY; release what is there in any case. */
+/* Reads the header and its last line, "end_header". Then t is at the first byte of the data. The caller
+ * releases the header also after an error. Errors: DATA, MEMORY. */
 fct_result fct_ply_read_header(fct_text *t, fct_ply_header *out);
 void fct_ply_release_header(const fct_env *env, fct_ply_header *header);
 

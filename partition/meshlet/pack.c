@@ -3,8 +3,9 @@
  * Growth leaves small pieces between full ones. From the smallest piece up:
  * 1. Merge it with the neighbour that shares most vertices with it, if both fit into one piece.
  * 2. Otherwise give its faces to neighbours one by one, first those that bring no new vertex. If some face
- * finds no place, take all of them back. Pieces without neighbours merge with others that are near in the
- * tree. Serial; O(pieces x limits).
+ *    finds no place, take all of them back.
+ *
+ * Pieces without neighbours merge with others that are near in the tree. Serial; O(pieces x limits).
  */
 #include "partition/meshlet/pack.h"
 

@@ -125,7 +125,7 @@ static outlook estimate_cluster(const fct_lamp *lamp, const fct_receiver *rec, c
     double lower = lamp->two_sided ? fabs(toward) : fmax(0, toward);
     if (upper < lower) upper = lower;
     double top = fmin(1, cosx + spread) * kernel, bottom = fmax(0, cosx - spread) * kernel;
-    /* The direction to x turns by up to asin(spread) over the node, so a face that w sees edge-on may face x. */
+    /* The direction to x turns by up to asin(spread) over the node, so x may see a face edge-on to w. */
     double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
     if (side && cosx >= spread && spread < .5) {
         double light = fabs(toward) * cosx * kernel, cosy = fmax(LEAST_COSINE, fabs(toward) / c->area);

@@ -21,8 +21,8 @@
 #define DIAGONAL_EDGES 72
 /* Longest over shortest edge that a split may leave. Larger: finer contact shadows, more vertices. */
 #define GRADES 4
-/* Boxes with a half diagonal below this share of the distance count as solid: the distance is then right to
- * about a third. */
+/* A box with a half diagonal below this share of its distance counts as the surface itself. The distance then
+ * errs by at most about a third. */
 #define SMALL_BOX  .35
 #define STACK_SIZE 288
 /* Faces per chunk. */

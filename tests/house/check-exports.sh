@@ -1,5 +1,5 @@
 #!/bin/sh
-# The shared library exports exactly the functions that the public headers declare with FCT_API.
+# Checks that the shared library exports exactly the functions that the public headers declare with FCT_API.
 # usage: check-exports.sh LIBRARY INCLUDE_FOLDER
 found=$(mktemp) declared=$(mktemp)
 trap 'rm -f "$found" "$declared"' EXIT

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds the examples against an installed library, through its CMake package or through pkg-config, and runs them;
-# every example prints what it found and checks it.
+# Builds the examples against an installed library, through its CMake package or through pkg-config, and runs them.
+# Each example checks its own results.
 # usage: check-package.sh cmake|pkgconfig INSTALLED EXAMPLES BUILD CC CXX
 set -eu
 how=$1 installed=$2 examples=$3 build=$4/$1 cc=$5 cxx=$6
@@ -21,7 +21,7 @@ else
         $cc -std=c11 -O2 -Wall -Wextra -Werror "$source" -o "$build/$(basename "$source" .c)" $(pkg-config --cflags --libs facetree) \
             -Wl,-rpath,"$libraries" -lm
     done
-    # OpenMesh's inlined code is what gcc 12 takes for uninitialised.
+    # gcc 12 wrongly reports inlined code of OpenMesh as uninitialised.
     # shellcheck disable=SC2046
     $cxx -std=c++17 -O2 -Wall -Wextra -Wshadow -Werror -Wno-maybe-uninitialized "$examples/openmesh.cpp" -o "$build/openmesh" \
         $(pkg-config --cflags --libs facetree openmesh) -Wl,-rpath,"$libraries" -lm

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs a fixed set of commands with every variant, with one and eight threads, on emulated old processors and, if it is
-# given, with a program that another compiler built. Every file must have the same bytes as the first run's. Figures of
-# time and memory in text output are left out.
+# Runs a fixed set of commands with every variant, with one and eight threads, on emulated old processors, and with a second
+# program, if one is given, that another compiler built. All runs must write files with the same bytes. The comparison ignores
+# times and memory in text output.
 # usage: same-bytes.sh PROGRAM [OTHER_PROGRAM]
 set -u
 program=$(realpath "$1")
@@ -21,7 +21,7 @@ make_inputs() {
     cd "$here" || exit 2
 }
 
-# write_outputs INPUTS FOLDER ERROR COMMAND...: the command is the program with all that runs it.
+# write_outputs INPUTS FOLDER ERROR COMMAND...: COMMAND is the program, with its emulator if there is one.
 write_outputs() {
     local in=$here/$1 out=$2 error=$3 method cost measure
     shift 3
@@ -71,7 +71,7 @@ for variant in $variants; do
     FACETREE_SIMD=$variant write_outputs inputs "$variant-other-compiler" 1e-3 "$other"
     compare "$variant-other-compiler" first
 done
-# Memory for a part of the mesh only: the hierarchy is built in pieces.
+# --max-memory is below the size of the mesh, so the hierarchy is built in parts.
 for variant in $variants; do
     FACETREE_SIMD=$variant "$program" make bust -o large.ply --triangles 300000 --quiet
     FACETREE_SIMD=$variant "$program" cluster large.ply -o "large-$variant.fct" --max-memory 60M --quiet

@@ -4,8 +4,8 @@
  * Entries that now lead to the same neighbour become one, with the sum of their borders. Three ways, by the
  * longer list of the two parts:
  * 1. At most 8 entries, as most lists: in registers, each lane compared with every other.
- * 2. At most SHORT_LIST: in scratch memory. A byte per live cluster says at which place it was put last, and
- *    the scratch tells whether that was for this list.
+ * 2. At most SHORT_LIST: in scratch memory. A byte per live cluster holds its last place in the scratch. The
+ *    entry at that place tells whether it belongs to this list.
  * 3. More: sorted in place.
  * In 1 and 2 no branch depends on the entries, because such branches are unpredictable.
  */
@@ -38,7 +38,7 @@ static void swap_entries(void *items, size_t i, size_t j) {
 }
 
 /* Unites adjacent entries with the same end and adds their lengths. Two entries have the same end only if
- * this cluster or that end is a union of this round. Their keys are then marked as not priced already. */
+ * this cluster or that end is a union of this round, so their keys are FCT_KEY_OPEN already. */
 static uint32_t unite_sorted(const list *l, uint32_t count) {
     uint32_t to = 0;
     for (uint32_t i = 0; i < count; ++i) {

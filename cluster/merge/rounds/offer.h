@@ -1,4 +1,4 @@
-/* cluster/merge/rounds/offer.h: an edge as one number that both of its ends take the least of.
+/* cluster/merge/rounds/offer.h: an edge and its cost as one number. Each cluster keeps its least number.
  *
  *   63                        37 36          32 31                            0
  *  +----------------------------+--------------+-------------------------------+

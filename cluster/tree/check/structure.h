@@ -4,9 +4,9 @@
 
 #include "cluster/tree/tree.h"
 
-/* What is wrong with the record of a node (a leaf too) on its own, or NULL. */
+/* Describes the first fault in the record of a node or leaf; NULL: none. Reads no other record. */
 const char *fct_tree_node_fault(const fct_tree_view *view, uint32_t node, const fct_cluster *c);
-/* What is wrong with the ranges of the two children of a node, or NULL. */
+/* Describes the first fault in the ranges of the two children of a node; NULL: none. */
 const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], const uint32_t count[2]);
 
 /* Largest and mean depth of the leaves. Children must have larger ids than their parents. Errors: MEMORY. */
