@@ -197,7 +197,8 @@ static fct_result open_other(fct_stream *s, const char *folder, const char *besi
     fct_mesh mesh;
     fct_result result = fct_mesh_load(s->env, s->name, &mesh);
     if (result == FCT_ERROR_MEMORY)
-        fct_fail(s->env, result, "%s: this file is loaded whole; a binary PLY of triangles need not be",
+        fct_fail(s->env, result,
+                 "%s: this file is loaded as a whole; only a binary PLY of triangles is read in parts",
                  s->name);
     if (result != FCT_OK) return result;
     result = fct_spool_open(s->env, folder, beside, &s->spool);

@@ -168,8 +168,8 @@ static int run_meshlets(tool *t, void *options) {
     const fct_meshlet_def *def = options;
     bool json = tool_ends(t->output, "json") || !strcmp(t->output, "-"), binary = tool_ends(t->output, "bin");
     if (!json && !binary && !tool_is_mesh_name(t->output))
-        return tool_fail(t, TOOL_USAGE, "%s: expected a name that ends in .json, in .bin, or as a mesh does",
-                         t->output);
+        return tool_fail(t, TOOL_USAGE,
+                         "%s: expected a name that ends in .json or .bin, or the name of a mesh", t->output);
     if (tool_ends(t->output, "stl"))
         return tool_fail(t, TOOL_USAGE,
                          "%s: STL cannot store colours; expected .ply, .off, .obj, .glb or .om", t->output);

@@ -434,7 +434,7 @@ static void drop_partial(reader *r) {
     fct_soup *soup = r->soup;
     if (!(r->seen >> FCT_PLY_STRIPS & 1) || (!soup->materials && !soup->polygon_colors && !soup->texcoords))
         return;
-    fct_note(r->t.env, FCT_MESSAGE_WARNING, "%s: values of faces are left out, for strips have none",
+    fct_note(r->t.env, FCT_MESSAGE_WARNING, "%s: values of faces are left out, because strips have none",
              r->t.name);
     fct_release(r->t.env, soup->materials);
     fct_release(r->t.env, soup->polygon_colors);

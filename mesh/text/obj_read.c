@@ -401,7 +401,7 @@ static fct_result finish_normals(reader *r) {
     fct_result result = FCT_OK;
     if (!normals_agree(r, numbers)) {
         fct_note(r->t.env, FCT_MESSAGE_NOTE,
-                 "%s: normals are left out, for the corners of a vertex do not share one", r->t.name);
+                 "%s: normals are left out, because the corners of a vertex do not share one", r->t.name);
     } else if ((soup->normals = fct_allocate_zero(r->t.env, soup->vertex_count, 3 * sizeof(float)))) {
         for (size_t v = 0; v < soup->vertex_count; ++v)
             if (numbers[v] != FCT_NONE)

@@ -142,7 +142,8 @@ static fct_result check_def(const fct_env *env, const fct_chart_def *def) {
     if (!(def->max_angle >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "charts: expected an angle of at least 0, found %g",
                         def->max_angle);
-    if (def->max_faces < 1) return fct_fail(env, FCT_ERROR_DATA, "charts: expected at least 1 face a chart");
+    if (def->max_faces < 1)
+        return fct_fail(env, FCT_ERROR_DATA, "charts: expected at least 1 face per chart");
     if (!(def->max_area >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "charts: expected an area of at least 0, found %g",
                         def->max_area);

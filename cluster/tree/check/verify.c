@@ -210,11 +210,11 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
     if (result != FCT_OK) return result;
     if (counts.boundary != view->boundary_edges || counts.nonmanifold != view->nonmanifold_edges ||
         counts.components != view->component_count)
-        return fct_fail(
-            env, FCT_ERROR_DATA,
-            "%u boundary edges, %u non-manifold ones and %u components are told, %u, %u and %u found",
-            view->boundary_edges, view->nonmanifold_edges, view->component_count, counts.boundary,
-            counts.nonmanifold, counts.components);
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "the header has %u boundary edges, %u non-manifold edges and %u components, the mesh "
+                        "has %u, %u and %u",
+                        view->boundary_edges, view->nonmanifold_edges, view->component_count, counts.boundary,
+                        counts.nonmanifold, counts.components);
     return FCT_OK;
 }
 
