@@ -354,7 +354,7 @@ def goals(runs, hard, large, cuts):
     g.most("seconds for 10 million, T2", runs.get(ten, "rounds", threads=2), 5)
     g.most("gigabytes for 10 million, mesh included", over(runs.get(ten, "rounds", "peak_bytes", 2), 1e9), 2.2)
     value, mesh = worst((over(runs.get(m, "rounds", "grown_bytes", t), runs.faces[m]), m) for m in runs.meshes for t in (1, 2) if runs.faces[m] > 5e4)
-    g.most(f"bytes a face at the peak, most ({mesh})", value, 200, "{:.0f}")
+    g.most(f"bytes per face at the peak, most ({mesh})", value, 200, "{:.0f}")
     for m in runs.meshes:
         ratio = over(runs.get(m, "rounds", "deviation"), best_vsa(runs, m))
         if ratio is not None:

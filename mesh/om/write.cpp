@@ -120,7 +120,7 @@ class mesh_exporter : public IO::BaseExporter {
 
     uint32_t end_of(uint32_t side) const { return mesh->triangles[side % 3 == 2 ? side - 2 : side + 1]; }
 
-    // The sides of one edge: the i-th that runs up meets the i-th that runs down; those left over meet none.
+    // The sides of one edge: the i-th that runs up meets the i-th that runs down; the others have no partner.
     void pair_up(const uint32_t *sides, size_t count) {
         std::vector<uint32_t> ways[2];
         for (size_t i = 0; i < count; ++i)

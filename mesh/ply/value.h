@@ -59,7 +59,7 @@ static inline double fct_ply_load(const unsigned char *p, fct_ply_type type, boo
     return 0;
 }
 
-/* An id; FCT_NONE for what is no whole number in range. */
+/* An id. FCT_NONE if the value is not a whole number in range. */
 static inline uint32_t fct_ply_id(double value) {
     return value >= 0 && value < 4294967295.0 && value == (double)(uint32_t)value ? (uint32_t)value
                                                                                   : FCT_NONE;
