@@ -1,5 +1,5 @@
-/* tests/support.h: what the tests share: environments that record messages or fail the nth allocation, and
- * small meshes. */
+/* tests/support.h: common code of the tests: environments that record messages or fail the nth allocation,
+ * and small meshes. */
 #ifndef FCT_TESTS_SUPPORT_H
 #define FCT_TESTS_SUPPORT_H
 
@@ -28,15 +28,15 @@ static inline void skip_unless_variant_runs(void) {
 #endif
 }
 
-/* Instrumented code is ten times slower: tests of figures skip their large cases. */
+/* Tests of figures skip their large cases with sanitizers, because these make the code ten times slower. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SANITIZED 1
 #else
 #define SANITIZED 0
 #endif
 
-/* The last message, and an allocator that fails when `allocations` reaches fail_at (0: never) and counts what
- * is alive. */
+/* Records the last message. Its allocator fails when `allocations` reaches fail_at (0: never) and counts live
+ * allocations. */
 typedef struct recorder {
     char text[1024];
     long messages, allocations, fail_at, alive;

@@ -1,4 +1,4 @@
-/* tests/cluster/check_tree.h: everything a finished tree promises, checked the slow way. */
+/* tests/cluster/check_tree.h: checks every guarantee of a finished tree with slow, plain code. */
 #ifndef FCT_TESTS_CHECK_TREE_H
 #define FCT_TESTS_CHECK_TREE_H
 
@@ -30,7 +30,7 @@ static inline void check_node_geometry(const fct_tree_view *view, const fct_clus
                         (double)c->cone_angle + 1e-7);
     }
     if (area > 1e-30 && area < 1e38) assert_true(fabs((double)c->area - area) <= 1e-6 * area);
-    for (int i = 0; i < 3; ++i) { /* tight: no extent beyond the farthest vertex and rounding */
+    for (int i = 0; i < 3; ++i) { /* tight: the box ends at its farthest vertex, up to rounding */
         double ulp =
             (fabs((double)box.center[0]) + fabs((double)box.center[1]) + fabs((double)box.center[2]));
         assert_true((double)box.half[i] <= largest * (1 + 1e-6) + 1e-6 * ulp + 1e-44);
@@ -42,7 +42,7 @@ static inline void check_node_geometry(const fct_tree_view *view, const fct_clus
         assert_true(isfinite(numbers[i]));
 }
 
-/* The partition, which must come out; returns how many clusters it has. */
+/* Cuts the tree, which must succeed. Returns the number of clusters. */
 static inline uint32_t cut_tree(const fct_tree *tree, uint32_t count, uint32_t *nodes) {
     fct_env env = fct_env_default();
     uint32_t written = 0;
@@ -77,7 +77,7 @@ static inline void check_links(const fct_tree *tree) {
     free(parents);
 }
 
-/* The permutations are permutations, and the tree's mesh is the input's. */
+/* The permutations are valid, and the mesh of the tree is the input. */
 static inline void check_mesh(const fct_tree_view *view, const fct_mesh *mesh) {
     assert_int_equal(view->face_count, mesh->face_count);
     assert_int_equal(view->vertex_count, mesh->vertex_count);

@@ -1,4 +1,4 @@
-/* tests/cluster/shapes.h: small meshes of every topology that cuts, charts and meshlets must get through. */
+/* tests/cluster/shapes.h: small meshes of every topology, for tests of cuts, charts and meshlets. */
 #ifndef FCT_TESTS_SHAPES_H
 #define FCT_TESTS_SHAPES_H
 
@@ -19,7 +19,7 @@ static inline double shape_random(uint32_t *state) {
     return (*state >> 8) / 16777216.0;
 }
 
-/* n by m quads around; twist: glued after half a turn (a Moebius strip when `closed` is false). */
+/* A ring of n x m quads. twist: its ends meet after half a turn (a Moebius strip if `closed` is false). */
 static inline fct_mesh make_ring(const fct_env *env, uint32_t n, uint32_t m, bool closed, bool twist) {
     uint32_t rows = closed ? m : m + 1;
     fct_mesh mesh = shape_of(env, n * rows, 2 * n * m);
@@ -57,7 +57,7 @@ static inline fct_mesh make_book(const fct_env *env, uint32_t k) {
     return mesh;
 }
 
-/* A flat grid with each face there twice. */
+/* A flat grid with each face twice. */
 static inline fct_mesh make_doubled(const fct_env *env, uint32_t n) {
     fct_mesh grid = make_grid(env, n), mesh = shape_of(env, grid.vertex_count, 2 * grid.face_count);
     memcpy(mesh.positions, grid.positions, 12 * (size_t)grid.vertex_count);
@@ -67,7 +67,7 @@ static inline fct_mesh make_doubled(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
-/* Loose triangles, some without area, some with a vertex twice or thrice. */
+/* Loose triangles. Some have no area, some have two or three equal vertices. */
 static inline fct_mesh make_soup(const fct_env *env, uint32_t n, bool odd) {
     fct_mesh mesh = shape_of(env, 3 * n, n);
     uint32_t state = 7;
@@ -84,7 +84,7 @@ static inline fct_mesh make_soup(const fct_env *env, uint32_t n, bool odd) {
     return mesh;
 }
 
-/* Two flat squares that touch at one corner only, in one plane. */
+/* Two squares in one plane that share one corner. */
 static inline fct_mesh make_bowtie(const fct_env *env) {
     static const float points[7][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                        {2, 1, 0}, {2, 2, 0}, {1, 2, 0}};
@@ -95,7 +95,7 @@ static inline fct_mesh make_bowtie(const fct_env *env) {
     return mesh;
 }
 
-/* Bumps of every size, so that nothing is alike. */
+/* Bumps of every size, so that no two faces are equal. */
 static inline void roughen(fct_mesh *mesh, double height) {
     uint32_t state = 3;
     for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; ++i)

@@ -1,5 +1,5 @@
-/* Inputs that break other programs: each gives a tree that keeps every promise, in about the time of a good
- * mesh of its size, with either method. */
+/* Inputs that break other programs. Each gives a valid tree with both methods, in about the time of a good
+ * mesh of the same size. */
 #include <float.h>
 
 #include "check_tree.h"
@@ -24,10 +24,10 @@ static void set_face(fct_mesh *mesh, uint32_t f, uint32_t a, uint32_t b, uint32_
     t[0] = a, t[1] = b, t[2] = c;
 }
 
-/* Whether every partition must be of connected clusters. */
+/* Whether the clusters of every partition must be connected. */
 enum { NEVER, ALWAYS };
 
-/* Builds with both methods and costs, checks, releases. */
+/* Builds with both methods and costs and checks the trees. Releases the mesh. */
 static void check(fct_mesh *mesh, int connected) {
     recorder r = {0};
     fct_env env = recorder_env(&r);
@@ -60,7 +60,7 @@ static void one_and_two_faces(void **state) {
     fct_mesh one = make(&env, 3, 1);
     set_vertex(&one, 1, 1, 0, 0), set_vertex(&one, 2, 0, 1, 0), set_face(&one, 0, 0, 1, 2);
     check(&one, ALWAYS);
-    fct_mesh two = make(&env, 5, 2); /* share a vertex alone */
+    fct_mesh two = make(&env, 5, 2); /* share only a vertex */
     for (uint32_t v = 0; v < 5; ++v) set_vertex(&two, v, v, v * v, 0);
     set_face(&two, 0, 0, 1, 2), set_face(&two, 1, 2, 3, 4);
     check(&two, NEVER);
@@ -103,7 +103,7 @@ static void options_out_of_range(void **state) {
     def = fct_tree_def_default();
     def.size = 8;
     assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_ERROR_DATA);
-    for (int cost = 0; cost < 2; ++cost) { /* the largest there are: still a tree of finite numbers */
+    for (int cost = 0; cost < 2; ++cost) { /* the largest allowed weights give finite numbers */
         def = fct_tree_def_default();
         def.cost = cost ? FCT_COST_MEAN : FCT_COST_INCREMENT;
         def.fit_weight = def.direction_weight = def.shape_weight = 1e30;
@@ -118,16 +118,16 @@ static void options_out_of_range(void **state) {
 static void degenerate_faces(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    fct_mesh points = make(&env, 300, 100); /* all in one place */
+    fct_mesh points = make(&env, 300, 100); /* all vertices in one place */
     for (uint32_t f = 0; f < 100; ++f) set_face(&points, f, 3 * f, 3 * f + 1, 3 * f + 2);
     check(&points, NEVER);
-    fct_mesh same = make(&env, 1, 1000); /* one vertex, named three times */
+    fct_mesh same = make(&env, 1, 1000); /* three equal corners per face */
     check(&same, NEVER);
     fct_mesh line = make(&env, 1002, 1000);
     for (uint32_t v = 0; v < 1002; ++v) set_vertex(&line, v, v, 2 * v, 3 * v);
     for (uint32_t f = 0; f < 1000; ++f) set_face(&line, f, f, f + 1, f + 2);
     check(&line, ALWAYS);
-    fct_mesh doubles = make_grid(&env, 20); /* every face twice, once turned over, some flattened */
+    fct_mesh doubles = make_grid(&env, 20); /* every face twice: once reversed, or with two equal corners */
     fct_mesh twice = make(&env, doubles.vertex_count, 2 * doubles.face_count);
     memcpy(twice.positions, doubles.positions, 12 * (size_t)doubles.vertex_count);
     for (uint32_t f = 0; f < doubles.face_count; ++f) {
@@ -155,7 +155,7 @@ static void extents(void **state) {
     fct_mesh needle = make_sphere(&env, 12);
     for (uint32_t k = 0; k < needle.vertex_count; ++k) needle.positions[3 * k] *= 1e12f;
     check(&needle, ALWAYS);
-    fct_mesh whole = make_sphere(&env, 12); /* as large as floats go, its bulk along a diagonal */
+    fct_mesh whole = make_sphere(&env, 12); /* the largest floats, with most of the extent along a diagonal */
     for (uint32_t v = 0; v < whole.vertex_count; ++v) {
         float *p = whole.positions + 3 * v, along = p[0] < 0 ? -1 : 1;
         for (int k = 0; k < 3; ++k) p[k] = v % 2 ? along * FLT_MAX : p[k] * 1e37f;
@@ -178,7 +178,7 @@ static void scattered_triangles(void **state) {
     check(&mesh, NEVER);
 }
 
-/* One part of most of the faces and a cloud of single ones: the join has little height left. */
+/* One part with most of the faces and many single faces: little height is left for the join. */
 static void large_and_small_parts(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -218,7 +218,7 @@ static void fan_of_one_vertex(void **state) {
     fct_env env = fct_env_default();
     uint32_t count = 6000;
     for (int closed = 0; closed < 2;
-         ++closed) { /* a disc; a cylinder's lid with its wall, which makes a hub */
+         ++closed) { /* a disc; the lid of a cylinder with its wall, whose centre is a hub */
         fct_mesh mesh = make(&env, 2 * count + 1, closed ? 2 * count : count);
         for (uint32_t f = 0; f < count; ++f) {
             double angle = 2 * 3.14159265358979 * f / count;
@@ -235,7 +235,7 @@ static void strips(void **state) {
     (void)state;
     fct_env env = fct_env_default();
     uint32_t count = 6000;
-    for (int kind = 0; kind < 3; ++kind) { /* even, growing by a thousandth a step, curling */
+    for (int kind = 0; kind < 3; ++kind) { /* equal steps; steps that grow by .1 %; a spiral */
         fct_mesh mesh = make(&env, count + 2, count);
         double x = 0, step = 1;
         for (uint32_t v = 0; v < count + 2; ++v) {
@@ -259,7 +259,8 @@ static void flat_grid(void **state) {
     check(&mesh, ALWAYS);
 }
 
-/* Each face joined by an edge to the one before it, at every size: chains are where depth is short. */
+/* Chains of every length: each face shares an edge with the one before. Short chains come closest to the
+ * limit of depth. */
 static void short_chains(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -272,7 +273,7 @@ static void short_chains(void **state) {
     }
 }
 
-/* Memory that runs out where chains are cut up and parts are joined. */
+/* Each allocation fails once while a hub is contracted and a loose face is joined. */
 static void no_memory_for_odd_shapes(void **state) {
     (void)state;
     fct_env plain = fct_env_default();

@@ -1,5 +1,5 @@
-/* Trees over made meshes: everything check_tree.h asks, partitions, roots, costs, materials, the same for
- * every thread count, and no memory at any allocation. */
+/* Trees of generated meshes: check_tree.h, partitions, roots, costs, materials, equal bits for every thread
+ * count, and a failure of each allocation. */
 #include "check_tree.h"
 
 static fct_tree *build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def) {
@@ -65,7 +65,8 @@ static void partitions_are_exact_and_connected(void **state) {
         }
 }
 
-/* A grid that is flat but for a fold: at two clusters each side is one, and every number is known. */
+/* A flat grid with one fold. At two clusters, each side of the fold is one, and every figure has a closed
+ * form. */
 static void quality_of_a_folded_sheet(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -185,7 +186,7 @@ static void survives_no_memory(void **state) {
     (void)state;
     recorder r = {0};
     fct_env env = recorder_env(&r);
-    fct_mesh mesh = make_sphere(&env, 40); /* more faces than rounds leave to the greedy loop */
+    fct_mesh mesh = make_sphere(&env, 40); /* more faces than the rounds leave to greedy */
     mesh.materials = fct_allocate_zero(&env, mesh.face_count, sizeof *mesh.materials);
     mesh.material_count = 1;
     long before = r.alive;

@@ -1,5 +1,5 @@
-/* The hierarchy file: what is saved comes back, every cut and every flipped byte is an error or harmless, and
- * a failed write leaves the old file. */
+/* The hierarchy file: a saved tree opens with the same content, each truncated file is refused, each flipped
+ * byte is found or harmless, and a failed write leaves the old file. */
 #include "check_tree.h"
 
 #include <unistd.h>
@@ -103,7 +103,7 @@ static void one_face_comes_back(void **state) {
     unlink(path);
 }
 
-/* Walks as a reader may who has checked nothing, and comes to every node at most once. */
+/* Walks an unchecked tree by its children, and opens each node at most once. */
 static void walk_down(const fct_tree *tree) {
     fct_tree_view view = fct_tree_get(tree);
     uint32_t *stack = malloc(4 * ((size_t)view.face_count + view.root_count + 1)), height = 0, opened = 0;
@@ -124,7 +124,7 @@ static void walk_down(const fct_tree *tree) {
     free(stack);
 }
 
-/* Whatever a query could do; each is right or says DATA. */
+/* Runs all queries. Each gives a valid result or DATA. */
 static void walk(const fct_env *env, const fct_tree *tree) {
     fct_tree_view view = fct_tree_get(tree);
     uint32_t *nodes = malloc(4 * (size_t)view.face_count), *labels = malloc(4 * (size_t)view.face_count);
@@ -193,7 +193,8 @@ static void every_cut_is_refused(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
-/* Bytes of the head do not even open; the rest is harmless, and found when all is read. */
+/* A flipped byte of the head prevents opening. Any other is harmless to queries, and fct_tree_verify finds
+ * it. */
 static void every_flipped_byte_is_found(void **state) {
     (void)state;
     recorder quiet = {0};
@@ -221,7 +222,7 @@ static void every_flipped_byte_is_found(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
-/* Links, ranges and indices made up on purpose: no query leaves the arrays, none runs in circles. */
+/* Random wrong links, ranges and indices: no query reads outside of the arrays or runs in circles. */
 static void no_damage_leads_astray(void **state) {
     (void)state;
     recorder quiet = {0};
@@ -258,7 +259,7 @@ static void no_damage_leads_astray(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
-/* Each node's two children are the node after it: walks that trust links visit 2^(F - 1) of them. */
+/* Both children of each node are the next node. A walk that trusts the links would visit 2^(F - 1) nodes. */
 static void shared_children_end(void **state) {
     (void)state;
     recorder quiet = {0};
@@ -289,7 +290,7 @@ static void shared_children_end(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
-/* Sets 4 bytes of an entry of a section of node records. */
+/* Sets 4 bytes of a record in a section of records. */
 static void set_word(unsigned char *bytes, fct_section section, uint32_t entry, size_t offset,
                      uint32_t value) {
     fct_format_header h;
@@ -357,7 +358,7 @@ static void the_cut_is_that_of_the_nodes(void **state) {
     assert_int_equal(quiet.alive, 0);
 }
 
-/* The section's bytes of a saved tree, found by their content. */
+/* Finds a section in the bytes of a saved tree by its content. */
 static unsigned char *find_bytes(unsigned char *bytes, size_t size, const void *what, size_t length) {
     for (size_t i = 512; i + length <= size; ++i)
         if (!memcmp(bytes + i, what, length)) return bytes + i;

@@ -1,5 +1,5 @@
-/* Trees built from file to file in parts: all that a tree promises, the counts and the quality of one built
- * in memory, the same bytes for every thread count, and an old file as it was whatever goes wrong. */
+/* Trees built from file to file in parts: check_tree.h, the counts and quality of a build in memory, the same
+ * bytes for every thread count, and an unchanged old file after every error. */
 #define _GNU_SOURCE
 #include "check_tree.h"
 
@@ -9,7 +9,7 @@
 static char folder[] = "/tmp/facetree-large-XXXXXX";
 static char mesh_path[64], tree_path[64];
 
-/* One thread, for parts of a few faces are not worth a second one. */
+/* One thread, because parts of a few faces are too small for a second one. */
 static fct_env single(void) {
     fct_env env = fct_env_default();
     env.thread_count = 1;
@@ -25,7 +25,7 @@ static float unit_hash(uint32_t x) {
     return (float)(hash_of(x) >> 8) / (float)(1 << 24);
 }
 
-/* A grid of 2 n^2 faces with hills on it, and scales too fine for a cluster. */
+/* A grid of 2 n^2 faces with hills, and with bumps that are smaller than a cluster. */
 static fct_mesh make_hills(const fct_env *env, uint32_t n) {
     fct_mesh mesh = make_grid(env, n);
     for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
@@ -60,7 +60,7 @@ static fct_tree *open_tree(const fct_env *env) {
     return tree;
 }
 
-/* Clusters the mesh in parts of so many faces and checks the tree; it is left open. */
+/* Clusters the mesh in parts of `part_faces` faces and checks the tree. The caller destroys it. */
 static fct_tree *build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, uint32_t part_faces,
                        fct_large_stats *stats) {
     fct_large_def large = parts_of(part_faces);
@@ -73,12 +73,12 @@ static fct_tree *build(const fct_env *env, const fct_mesh *mesh, const fct_tree_
     assert_int_equal(stats->vertex_count, mesh->vertex_count);
     assert_int_equal(stats->depth, view.depth);
     assert_int_equal(stats->root_count, view.root_count);
-    for (uint32_t i = 0; i < view.node_count; ++i) /* ids go by cost */
+    for (uint32_t i = 0; i < view.node_count; ++i) /* ids are in the order of falling costs */
         assert_true(i == 0 || tree->nodes[i].cost <= tree->nodes[i - 1].cost);
     return tree;
 }
 
-/* The counts of the mesh's edges are those that a build in memory finds. */
+/* The counts of edges are those of a build in memory. */
 static void check_counts(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                          const fct_tree *tree) {
     fct_tree *whole;
@@ -132,7 +132,7 @@ static double larger_ratio(double a, double b, double worst) {
     return ratio > worst ? ratio : worst;
 }
 
-/* Seams do not show in any figure, at any number of clusters: what differs is chance, and falls with it. */
+/* No figure shows the seams, at any number k of clusters: all are within 1 / sqrt(k) of a build in memory. */
 static void seams_do_not_show(void **state) {
     (void)state;
     fct_env env = single();
@@ -164,7 +164,7 @@ static void seams_do_not_show(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* Colours and materials come along, and clusters of one material are finished first. */
+/* The tree has the colours and materials. Merges within a material come before merges across materials. */
 static void colors_and_materials(void **state) {
     (void)state;
     fct_env env = single();
@@ -187,7 +187,7 @@ static void colors_and_materials(void **state) {
     assert_memory_equal(back.colors, mesh.colors, 12 * (size_t)mesh.vertex_count);
     assert_memory_equal(back.materials, mesh.materials, 4 * (size_t)mesh.face_count);
     const fct_cluster *first = &tree->nodes[0];
-    for (int k = 0; k < 2; ++k) /* the last merge is between the materials */
+    for (int k = 0; k < 2; ++k) /* only the last merge crosses materials */
         for (uint32_t p = tree->nodes[first->child[k]].first, i = 0; i < tree->nodes[first->child[k]].count;
              ++i)
             assert_int_equal(view.materials[p + i], view.materials[p]);
@@ -221,11 +221,11 @@ static void several_roots(void **state) {
         assert_int_equal(fct_tree_partition(&env, tree, 1, nodes, &count), FCT_OK);
         assert_int_equal(count, roots[i]);
         assert_int_equal(fct_tree_labels(&env, tree, nodes, count, others), FCT_OK);
-        for (uint32_t f = 1; f < mesh.face_count; ++f) /* the same partition */
+        for (uint32_t f = 1; f < mesh.face_count; ++f) /* both are the same partition */
             assert_int_equal(labels[f] == labels[f - 1], others[f] == others[f - 1]);
         fct_tree_destroy(tree);
         if (count == 1800) continue;
-        def.root_count = 1; /* and by the cost of the last merge that is wanted */
+        def.root_count = 1; /* the same by the cost of the last merge */
         def.max_cost = cost;
         tree = build(&env, &mesh, &def, 300, &stats);
         view = fct_tree_get(tree);
@@ -260,8 +260,8 @@ static fct_mesh make_loose(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
-/* What no edge connects is joined by proximity, over the borders of parts, and where memory is short within
- * parts first: the tree is as good a tree of boxes as one that is built in memory. */
+/* Loose triangles are joined by proximity: across parts, or first within parts if memory is short. The boxes
+ * are about as small as those of a build in memory. */
 static void loose_triangles(void **state) {
     (void)state;
     fct_env env = single();
@@ -337,7 +337,8 @@ static void one_and_two_faces(void **state) {
     }
 }
 
-/* So little room for tops that parts must give up some of their promise; files in no order at all. */
+/* A shuffled file with the least memory: parts must merge more than they should, and the tree is still valid.
+ */
 static void little_memory(void **state) {
     (void)state;
     recorder r = {0};
@@ -418,7 +419,7 @@ static int count_entries(void) {
     return count - 2;
 }
 
-/* Only the mesh, and the tree with the old text in it. */
+/* The folder has only the mesh and the old tree file with its old text. */
 static void check_untouched(void) {
     size_t size;
     unsigned char *bytes = read_tree(&size);

@@ -1,10 +1,10 @@
-/* A shuffled mesh is sorted for the build, and nobody sees it: ids are those of the mesh. */
+/* The build sorts a shuffled mesh, but the results have the ids of the mesh. */
 #include "check_tree.h"
 #include "shapes.h"
 
 #include "cluster/tree/locality.h"
 
-/* A sphere of 36,480 triangles with colours and materials, faces or vertices or both in any order. */
+/* A sphere of 36,480 triangles with colours and materials, with faces, vertices or both shuffled. */
 static fct_mesh make_shuffled(const fct_env *env, bool faces, bool vertices) {
     fct_mesh sphere = make_sphere(env, 96), mesh;
     uint32_t state = 7, *order = malloc(((size_t)sphere.face_count + sphere.vertex_count) * sizeof *order);
@@ -21,7 +21,7 @@ static fct_mesh make_shuffled(const fct_env *env, bool faces, bool vertices) {
             mesh.positions[3 * (size_t)order[v] + k] = sphere.positions[3 * (size_t)v + k];
             mesh.colors[3 * (size_t)order[v] + k] = (float)order[v] + 0.25f * (float)k;
         }
-    for (size_t k = 0; k < 3; ++k) /* one that no face uses */
+    for (size_t k = 0; k < 3; ++k) /* a vertex that no face uses */
         mesh.positions[3 * (size_t)sphere.vertex_count + k] =
             mesh.colors[3 * (size_t)sphere.vertex_count + k] = 2;
     for (uint32_t i = 0; i < 3 * sphere.face_count; ++i) mesh.triangles[i] = order[sphere.triangles[i]];

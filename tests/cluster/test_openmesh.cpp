@@ -1,5 +1,5 @@
-/* The OpenMesh adapter: the same tree as from a file's mesh, properties by handle, deleted elements left out,
- * points and colours of every type, errors as exceptions. */
+/* The OpenMesh adapter: the same tree as for an fct_mesh, properties by handle, deleted elements, points and
+ * colours of every type, errors as exceptions. */
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* in OpenMesh, inlined */
 
 #include <cmath>
@@ -87,7 +87,7 @@ void both_sides_of_a_ridge(void **) {
     two_sides<double_mesh>();
 }
 
-/* Faces, and the vertices that only they used, are gone but not collected. */
+/* Some faces and their isolated vertices are deleted, but not garbage-collected. */
 void deleted_elements_are_left_out(void **) {
     plain_mesh mesh = ridge<plain_mesh>(10);
     mesh.request_face_status();
@@ -152,7 +152,7 @@ void refinement_keeps_clusters_and_drops_nodes(void **) {
     assert_true(after.mean_normal_deviation < before.mean_normal_deviation);
     fct_refine_def def = fct_refine_def_default();
     def.perimeter_weight = 0;
-    tree.refine(parts, def); /* no cut any more */
+    tree.refine(parts, def); /* refined, so it is no cut */
     assert_true(tree.quality(parts).mean_normal_deviation <= after.mean_normal_deviation);
     assert_int_equal(tree.planes(parts).size(), 12);
     try {
@@ -197,7 +197,7 @@ void colors_of_bytes_and_floats(void **) {
 }
 
 void *fail_nth(void *user, size_t size) {
-    long *state = static_cast<long *>(user); /* counts down; alive */
+    long *state = static_cast<long *>(user); /* allocations until the failure; live allocations */
     if (--state[0] == 0) return nullptr;
     ++state[1];
     return aligned_alloc(64, size);

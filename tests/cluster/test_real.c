@@ -1,11 +1,11 @@
-/* Real meshes and two generated ones: every promise of check_tree.h, connected partitions of the manifold
- * ones, and the quality that the clustering is known for. Real ones are left out where they are absent. */
+/* Real meshes and two generated ones: check_tree.h, connected partitions of manifold meshes, and upper bounds
+ * on the quality figures. Absent real meshes are skipped. */
 #include "check_tree.h"
 #include "oracle/meshes.h"
 
 typedef struct figures {
     const char *name;
-    bool connected;                            /* one manifold part */
+    bool connected;                            /* the mesh is one manifold part */
     double deviation, irregularity, box_areas; /* at 1000 clusters: upper bounds; boxes of the whole tree */
 } figures;
 

@@ -1,5 +1,5 @@
-/* How much of a hierarchy file is read: by the pages that are in memory after a file was dropped from it and
- * opened again. Coarse work touches the beginning, whatever the mesh and the faces that stand alone in it. */
+/* Coarse work reads only the beginning of a hierarchy file, on any mesh, also with loose faces. The test
+ * drops the file from the page cache, opens it, and counts the pages that are in the cache afterwards. */
 #define _GNU_SOURCE
 #include "check_tree.h"
 
@@ -13,7 +13,7 @@
 static const char *const path = "test_touch.fct";
 enum { PAGE = 4096, LONE = 200, RINGS = SANITIZED ? 150 : 300 };
 
-/* Pages of the file that are in memory. */
+/* The number of pages of the file in the page cache. */
 static size_t resident(void) {
     int descriptor = open(path, O_RDWR);
     struct stat status;
@@ -29,7 +29,8 @@ static size_t resident(void) {
     return count;
 }
 
-/* Whether the file could be put out of memory, and so what is in it later has been read. */
+/* Drops the file from the page cache. Returns whether that worked, so that later pages are those that were
+ * read. */
 static bool dropped(void) {
     int descriptor = open(path, O_RDWR);
     assert_true(descriptor >= 0);
@@ -41,7 +42,8 @@ static bool dropped(void) {
     return false;
 }
 
-/* A sphere of small faces and large triangles far from each other around it, which stay leaves to the end. */
+/* A sphere of small faces, and large triangles far apart around it, which stay leaves until the last merges.
+ */
 static fct_mesh make_scene(const fct_env *env) {
     fct_mesh ball = make_sphere(env, RINGS), mesh;
     assert_int_equal(fct_mesh_create(env, ball.vertex_count + 3 * LONE, ball.face_count + LONE, 0, &mesh),
@@ -112,7 +114,7 @@ static void a_thousand_clusters_read_less_than_a_megabyte(void **state) {
             leaves += c.count == 1;
             faces += c.count;
         }
-        /* Nodes above the cut, its ids and its clusters. */
+        /* the nodes above the cut, its ids and its clusters */
         size_t pages = resident(), least = k * sizeof(fct_cluster) / PAGE;
         size_t most = 2048 * (2 * sizeof(fct_cluster) + 4) / PAGE + 4;
         print_message("%u clusters: %zu KB of %zu\n", k, pages * 4,
@@ -124,7 +126,7 @@ static void a_thousand_clusters_read_less_than_a_megabyte(void **state) {
     assert_true(leaves >= LONE);
 }
 
-/* The same count tells when all is read. */
+/* The count also notices when everything is read. */
 static void checking_reads_everything(void **state) {
     (void)state;
     if (!dropped()) skip();

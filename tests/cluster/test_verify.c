@@ -1,5 +1,5 @@
-/* Verifying finds every number of a node that is not that of its faces, be it on a sphere, on noise or far
- * from the origin, and finds nothing where nothing is wrong. */
+/* fct_tree_verify finds every wrong number of a node, on a sphere, with noise and far from the origin, and
+ * accepts correct trees. */
 #include "check_tree.h"
 
 #include <float.h>
@@ -95,7 +95,7 @@ static const mistake mistakes[] = {{"an area that is not", more_area},
                                    {"a number that is not finite", endless},
                                    {"cost above that of a later merge", dear}};
 
-/* Every mistake at several nodes, one after the other. */
+/* Makes every mistake at several nodes, one at a time. */
 static void find_mistakes(const fct_env *env, const recorder *r, fct_tree *tree) {
     assert_int_equal(fct_tree_verify(env, tree), FCT_OK);
     uint32_t tried = 0;
@@ -103,7 +103,7 @@ static void find_mistakes(const fct_env *env, const recorder *r, fct_tree *tree)
         fct_cluster *c = &tree->clusters[i], right = *c;
         float size = sqrtf(right.box_half[0] * right.box_half[0] + right.box_half[1] * right.box_half[1] +
                            right.box_half[2] * right.box_half[2]);
-        if (right.cone_angle < .01F || right.cone_angle > 3) continue; /* flat, or without direction */
+        if (right.cone_angle < .01F || right.cone_angle > 3) continue; /* flat, or S is 0 */
         ++tried;
         for (size_t k = 0; k < sizeof mistakes / sizeof *mistakes; ++k) {
             mistakes[k].make(c, size);
@@ -117,7 +117,7 @@ static void find_mistakes(const fct_env *env, const recorder *r, fct_tree *tree)
     assert_int_equal(fct_tree_verify(env, tree), FCT_OK);
 }
 
-/* A sphere, moved and with radii that vary at random by `noise`. */
+/* A sphere that is moved by `away`, with radii that vary at random by `noise`. */
 static fct_tree *build_ball(const fct_env *env, float away, float noise) {
     fct_mesh mesh = make_sphere(env, 10);
     uint32_t random = 1;
@@ -147,7 +147,7 @@ static void every_wrong_number_is_found(void **state) {
     }
 }
 
-/* The first wrong node is told, whatever the threads. */
+/* The message names the first wrong node, for every thread count. */
 static void the_first_mistake_is_told(void **state) {
     (void)state;
     for (uint32_t threads = 1; threads <= 4; ++threads) {
@@ -188,8 +188,8 @@ static void wrong_counts_are_found(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
-/* What a build says of its mesh is what counting edges finds: a pinched strip, two faces that coincide, three
- * at one edge, a face that is a point, a triangle apart. */
+/* Build, fct_tree_count_edges and fct_mesh_inspect agree on the counts of edges and components: a pinched
+ * strip, two equal faces, three faces at one edge, a face that is a point, a separate triangle. */
 static void a_build_counts_as_verifying_does(void **state) {
     (void)state;
     static const uint32_t faces[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 3, 5}, {0, 1, 2},
@@ -209,7 +209,7 @@ static void a_build_counts_as_verifying_does(void **state) {
         assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
         assert_int_equal(fct_tree_verify(&env, tree), FCT_OK);
         assert_int_equal(fct_mesh_inspect(&env, &mesh, &report), FCT_OK);
-        for (uint32_t portion = 1; portion < 32; portion *= 3) { /* the last ones in a single lot */
+        for (uint32_t portion = 1; portion < 32; portion *= 3) { /* large portions make a single lot */
             fct_edge_counts counts;
             assert_int_equal(fct_tree_count_edges(&env, &tree->view, portion, &counts), FCT_OK);
             assert_int_equal(counts.boundary, report.boundary_edges);
@@ -226,14 +226,13 @@ static void a_build_counts_as_verifying_does(void **state) {
     }
 }
 
-/* Clusters of the cut that are faces have their numbers in the file; here they are wrong and the checksums
- * are right. */
+/* The file holds the records of leaves in the cut. A wrong one is found although the checksums are right. */
 static void wrong_faces_of_the_cut_are_found(void **state) {
     (void)state;
     recorder r = {0};
     fct_env env = recorder_env(&r);
     const char *path = "test_verify.fct";
-    fct_mesh ball = make_sphere(&env, 10), mesh; /* and one face apart, which is merged last of all */
+    fct_mesh ball = make_sphere(&env, 10), mesh; /* and a separate face, which the last merge joins */
     assert_int_equal(fct_mesh_create(&env, ball.vertex_count + 3, ball.face_count + 1, 0, &mesh), FCT_OK);
     memcpy(mesh.positions, ball.positions, 12 * (size_t)ball.vertex_count);
     memcpy(mesh.triangles, ball.triangles, 12 * (size_t)ball.face_count);
@@ -250,7 +249,7 @@ static void wrong_faces_of_the_cut_are_found(void **state) {
     unsigned char *bytes = malloc(file.size);
     memcpy(bytes, file.data, file.size);
     memcpy(&h, bytes, sizeof h);
-    uint32_t entry = h.cut_count - 1, id; /* ids ascend: leaves are the last */
+    uint32_t entry = h.cut_count - 1, id; /* ids ascend, so the last entry is a leaf */
     memcpy(&id, bytes + h.sections[FCT_SECTION_CUT_IDS].offset + 4 * entry, 4);
     assert_true(id >= h.node_count);
     fct_cluster *leaf = (fct_cluster *)(bytes + h.sections[FCT_SECTION_CUT].offset) + entry;

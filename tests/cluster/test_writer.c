@@ -1,5 +1,5 @@
-/* The writer of hierarchy files: pieces of any size in any order make the same bytes as saving the tree does,
- * and whatever goes wrong leaves the old file and nothing beside it. */
+/* The writer of hierarchy files: pieces of any size, with the sections in turns, give the same bytes as
+ * fct_tree_save. Every error leaves the old file and no temporary file. */
 #include "check_tree.h"
 
 #include <dirent.h>
@@ -56,13 +56,13 @@ static fct_tree *build_sphere(const fct_env *env, uint32_t n) {
 
 static const struct {
     fct_section section;
-    uint32_t bytes; /* of an item */
+    uint32_t bytes; /* per item */
 } parts[] = {{FCT_SECTION_TRIANGLES, 12}, {FCT_SECTION_NODES, sizeof(fct_cluster)},
              {FCT_SECTION_POSITIONS, 12}, {FCT_SECTION_ROOTS, 4},
              {FCT_SECTION_VERTEX_IDS, 4}, {FCT_SECTION_FACE_IDS, 4}};
 enum { PARTS = sizeof parts / sizeof *parts };
 
-/* Writes all sections of a tree without colours by turns, `piece` bytes each, to be finished. */
+/* Writes the sections of a tree without colours in turns, `piece` bytes at a time. The caller finishes. */
 static fct_result write_by_turns(const fct_env *env, const fct_tree *tree, size_t piece,
                                  fct_tree_writer **writer) {
     const fct_tree_view *view = &tree->view;
@@ -88,7 +88,8 @@ static void pieces_make_the_same_file(void **state) {
     (void)state;
     recorder r = {0};
     fct_env env = recorder_env(&r);
-    fct_tree *tree = build_sphere(&env, SANITIZED ? 56 : 90); /* nodes of more than a block of 1 MiB */
+    /* the nodes fill more than one block of 1 MiB */
+    fct_tree *tree = build_sphere(&env, SANITIZED ? 56 : 90);
     fct_tree_view view = fct_tree_get(tree);
     assert_true((size_t)view.node_count * sizeof(fct_cluster) > 1 << 20);
     assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
@@ -131,7 +132,7 @@ static void an_abandoned_file_was_never_there(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
-/* The device is not written before all is known to be right, and what it says is told. */
+/* The error of a device reaches the message hook. */
 static void a_full_device_is_an_error(void **state) {
     (void)state;
     if (access("/dev/full", W_OK)) skip();

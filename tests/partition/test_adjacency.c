@@ -11,7 +11,7 @@ static void *copy_of_numbers(uint32_t count, uint32_t step) {
     return labels;
 }
 
-/* Every face its own label: pairs and lengths are edges and lengths of the dual graph, to its floats. */
+/* With one label per face, pairs and lengths are those of the dual graph, up to float rounding. */
 static void faces_as_labels_are_the_dual_graph(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -39,7 +39,7 @@ static bool has_side(const uint32_t *t, uint32_t a, uint32_t b) {
     return false;
 }
 
-/* Shared edges of two labels, by looking at every pair of faces; for meshes with two faces an edge. */
+/* Shared edges of two labels from all pairs of faces. Needs at most two faces per edge. */
 static uint32_t count_shared(const fct_mesh *mesh, const uint32_t *labels, uint32_t a, uint32_t b,
                              double *length) {
     uint32_t count = 0;
@@ -106,13 +106,15 @@ static void neighbours_of_each_label_ascend(void **state) {
             assert_int_equal(pair[1], a < b ? b : a);
         }
     assert_int_equal(ends, 2 * found.pair_count);
-    assert_int_equal(found.first[count - 1], found.first[count]); /* labels without faces have none */
+    /* a label without faces has no neighbours */
+    assert_int_equal(found.first[count - 1], found.first[count]);
     fct_adjacency_release(&env, &found);
     fct_mesh_release(&env, &mesh);
     free(labels);
 }
 
-/* Five faces around one edge of length 1 with labels 0 1 0 1 2: links of a half each, 0-1 three times. */
+/* Five faces with labels 0 1 0 1 2 around one edge of length 1: four links of length 1/2, three of them 0-1.
+ */
 static void an_edge_with_many_faces_is_a_chain(void **state) {
     (void)state;
     fct_env env = fct_env_default();

@@ -1,5 +1,4 @@
-/* Charts against the definition of a disk, looked up from scratch: one fan at every vertex, one loop around.
- */
+/* Charts against the definition of a disk: one fan at every vertex and one simple loop around. */
 #include "cluster/shapes.h"
 
 #include "base/math/vec.h"
@@ -35,7 +34,7 @@ static uint32_t count_roots(const uint32_t *parents, const bool *used, uint32_t 
  */
 typedef struct topology {
     uint32_t faces, vertices, edges, parts, fans, loops, crowded, repeated;
-    bool loops_simple; /* every vertex of the border has two of its edges */
+    bool loops_simple; /* each border vertex has two border edges */
 } topology;
 
 static topology look_at(const fct_mesh *mesh) {
@@ -110,7 +109,7 @@ static double widest_angle(const fct_mesh *mesh) {
     double widest = 0, area = 0;
     for (uint32_t f = 0; f < mesh->face_count; ++f)
         sum = v3_add(sum, vector_of(mesh, f)), area += v3_norm(vector_of(mesh, f));
-    if (v3_norm(sum) < 1e-9 * area) return NAN; /* the normals cancel: any direction is as good */
+    if (v3_norm(sum) < 1e-9 * area) return NAN; /* the normals cancel, so there is no direction */
     for (uint32_t f = 0; f < mesh->face_count; ++f) {
         v3 n = vector_of(mesh, f);
         if (!(v3_norm(n) > 0)) continue;
@@ -119,7 +118,7 @@ static double widest_angle(const fct_mesh *mesh) {
     return widest;
 }
 
-/* All that is promised of one chart, given as a mesh of its own. */
+/* Checks the guarantees of one chart, which is a mesh of its own. */
 static bool check_chart(const fct_mesh *chart, const fct_chart_def *def, double *widest) {
     topology t = look_at(chart);
     *widest = widest_angle(chart);
@@ -129,7 +128,7 @@ static bool check_chart(const fct_mesh *chart, const fct_chart_def *def, double 
     return is_disk(&t);
 }
 
-/* And that the figures told are those found. */
+/* Also compares the reported figures. */
 static void check_charts(const fct_mesh *mesh, const uint32_t *labels, const fct_chart_def *def,
                          const fct_chart_stats *stats) {
     fct_env env = fct_env_default();
@@ -196,7 +195,7 @@ static fct_chart_stats charts_of(const fct_env *env, const fct_mesh *mesh, doubl
     return stats;
 }
 
-/* What needs few charts gets few. */
+/* Shapes that need few charts get few. */
 static void known_surfaces(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -205,12 +204,12 @@ static void known_surfaces(void **state) {
     fct_chart_stats s = charts_of(&env, &grid, 0, false);
     assert_int_equal(s.charts, 1);
     assert_true(s.seam_length == 0 && fabs(s.boundary_length - 4) < 1e-6 && s.largest_angle == 0);
-    s = charts_of(&env, &sphere, 3.2, false); /* all directions allowed, but a sphere is no disk */
+    s = charts_of(&env, &sphere, 3.2, false); /* every angle is allowed, but a sphere is no disk */
     assert_in_range(s.charts, 2, 3);
     assert_true(s.opened_topology >= 1 && s.opened_angle == 0);
     s = charts_of(&env, &tube, pi, false);
     assert_int_equal(s.charts, 2);
-    s = charts_of(&env, &bowtie, 0.1, false); /* they only touch */
+    s = charts_of(&env, &bowtie, 0.1, false); /* the squares share only a vertex */
     assert_int_equal(s.charts, 2);
     assert_true(s.seam_length == 0);
     fct_mesh_release(&env, &grid);
@@ -219,7 +218,8 @@ static void known_surfaces(void **state) {
     fct_mesh_release(&env, &bowtie);
 }
 
-/* A roof of two squares at right angles: one chart from 45 degrees on, two below; the ridge is the seam. */
+/* A roof of two squares at right angles: one chart if 45 degrees are allowed, else two with the ridge as
+ * seam. */
 static void the_angle_decides(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -275,8 +275,8 @@ static void materials_and_areas_are_kept_apart(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* Thousands of sheets on one edge, and sheets on the rims of others: no chart runs through such an edge
- * twice. */
+/* Thousands of sheets on one edge, and sheets on the rims of others: no chart has such an edge twice inside.
+ */
 static void crowded_edges(void **state) {
     (void)state;
     fct_env env = fct_env_default();

@@ -68,7 +68,7 @@ static void the_coarsest_cut_within_a_distance(void **state) {
         }
 }
 
-/* The bound of a limit is met from below: just under the distance of the root the root is opened. */
+/* The limit is sharp: just below the distance of the root, the root is opened. */
 static void the_limit_itself_is_within(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -114,8 +114,7 @@ static void a_wide_cut_is_the_same_for_every_thread_count(void **state) {
         assert_int_equal(counts[t], counts[0]);
         assert_memory_equal(nodes[t], nodes[0], 4 * (size_t)counts[0]);
     }
-    assert_in_range(counts[0], 2000,
-                    mesh.face_count - 1); /* the frontier was wide, so subtrees were cut, too */
+    assert_in_range(counts[0], 2000, mesh.face_count - 1); /* wide enough for the parallel cut of subtrees */
     for (int t = 0; t < 3; ++t) free(nodes[t]);
     fct_tree_destroy(tree);
     fct_mesh_release(&env, &mesh);

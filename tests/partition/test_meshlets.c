@@ -1,5 +1,6 @@
-/* Meshlets: every face once, within the limits, the input's corners; spheres and boxes hold the vertices, and
- * no cone culls a triangle that faces the eye. The smallest ball against all balls through few points. */
+/* Meshlets have every face once, within the limits, with the corners of the input. Spheres and boxes contain
+ * the vertices, and no cone culls a triangle that faces the eye. The smallest ball against all balls through
+ * two to four points. */
 #include "cluster/shapes.h"
 
 #include "base/math/vec.h"
@@ -80,13 +81,13 @@ static void check_boxes(const fct_mesh *mesh, const fct_meshlets *m) {
                 assert_true(fabs(v3_dot(v3_load(b->box.axes[k]), v3_load(b->box.axes[j])) - (j == k)) < 1e-6);
         }
         assert_true((double)b->radius <= widest * (1 + 1e-6));
-        /* no larger than the box of the world's axes, but for the rounding of its center */
+        /* no larger than the axis-aligned box, up to rounding of the center */
         assert_true(own <=
                     least * (1 + 1e-5) + 4e-6 * widest * (widest + v3_norm(v3_load(b->box.center))) + 1e-20);
     }
 }
 
-/* As a shader would, in floats. */
+/* In floats, as in a shader. */
 static bool is_culled(const fct_meshlet_bounds *b, const float eye[3]) {
     float d[3], squared = 0, dot = 0;
     for (int k = 0; k < 3; ++k) d[k] = b->cone_apex[k] - eye[k], squared += d[k] * d[k];
@@ -95,7 +96,7 @@ static bool is_culled(const fct_meshlet_bounds *b, const float eye[3]) {
     return dot >= b->cone_cutoff;
 }
 
-/* Random eyes near and far: what is culled has no triangle that faces the eye. Returns how many were culled.
+/* For random eyes near and far, no culled meshlet has a triangle that faces the eye. Returns the culled ones.
  */
 static uint32_t check_cones(const fct_mesh *mesh, const fct_meshlets *m, uint32_t eyes) {
     uint32_t state = 11, culled = 0;
@@ -273,7 +274,7 @@ static void bad_options_are_refused(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* Large enough for several regions that grow on their own. */
+/* A mesh with several regions that grow in parallel. */
 static void same_for_every_thread_count(void **state) {
     (void)state;
     fct_env env = fct_env_default(), envs[3];
@@ -307,7 +308,7 @@ static void survives_no_memory(void **state) {
     fct_mesh mesh = make_sphere(&env, 10);
     fct_tree *tree = tree_of(&env, &mesh, 1);
     fct_meshlet_def def = fct_meshlet_def_default();
-    def.max_vertices = 4, def.max_triangles = 2; /* many, so that their arrays grow */
+    def.max_vertices = 4, def.max_triangles = 2; /* many meshlets, so that their arrays grow */
     long before = r.alive;
     fct_result result = FCT_ERROR_MEMORY;
     for (r.fail_at = 1; result != FCT_OK; ++r.fail_at) {

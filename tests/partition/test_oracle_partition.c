@@ -1,6 +1,5 @@
 /* Measures, neighbours, refinement, seams and culling bounds of partitions against direct sums over triangles
- * in double. Meshes are rough terrains whose faces all differ, cut by labels that have nothing to do with a
- * tree. */
+ * in double. Meshes are rough terrains whose faces all differ. The labels do not come from a tree. */
 #include "cluster/oracle/meshes.h"
 #include "cluster/oracle/oracle.h"
 
@@ -76,7 +75,7 @@ typedef struct sums {
     double normal[3], offset;
 } sums;
 
-/* Second moments by the three-point rule at the middles of the sides, which is exact for squares. */
+/* Second moments by the rule of side midpoints, which is exact for squares. */
 static sums sum_label(const fct_mesh *mesh, const uint32_t *mates, const uint32_t *labels, uint32_t label) {
     sums s = {0};
     double p[3][3], v[3], values[3], axes[3][3], dot = 0;
@@ -165,7 +164,7 @@ static void quality_and_planes(void **state) {
     }
 }
 
-/* The box around the surface of a turned box is that box. Two faces that share no edge are not connected. */
+/* The box of the surface of a rotated box is that box. Two faces without a common edge are not connected. */
 static void boxes_of_labels(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -306,7 +305,7 @@ static void the_limit_holds_for_squared_perimeters(void **state) {
         state_of_labels end = measure_labels(&mesh, mates, fresh, 12);
         assert_true(end.deviation < start.deviation);
         if (step < 2) assert_true(end.squares <= start.squares * limits[step] * (1 + 1e-6));
-        if (step == 1) assert_true(end.squares > start.squares); /* the limit, and not the weight, holds it */
+        if (step == 1) assert_true(end.squares > start.squares); /* the weight alone would let it grow */
         free(fresh);
     }
     free(mates);
@@ -354,7 +353,7 @@ static void seams_and_angles_of_charts(void **state) {
         expect("boundary_length", (uint32_t)step, stats.boundary_length, boundary, 1e-9 * boundary);
         expect("largest_angle", (uint32_t)step, stats.largest_angle, widest, 1e-7);
         assert_true(widest <= def.max_angle + 1e-7);
-        assert_true(widest > .8 * def.max_angle || step > 1); /* charts are no smaller than they must be */
+        assert_true(widest > .8 * def.max_angle || step > 1); /* charts use the allowed angle */
     }
     fct_tree_destroy(tree);
     free(labels), free(mates);
@@ -363,9 +362,9 @@ static void seams_and_angles_of_charts(void **state) {
 
 /* --- Meshlets --- */
 
-/* The cone is as narrow as a search over axes makes it, and its apex is no farther back than it must be:
- * moved forward along the axis it is in front of some triangle. The box is no larger than those of the frame
- * around the mean normal, turned in fine steps, but for the 11 degrees between the turns that it tries. */
+/* The cone is as narrow as the best of a search over axes. Its apex cannot move forward along the axis
+ * without passing the plane of a triangle. The box is as small as the best frame around the mean normal in
+ * fine steps, up to the 11 degrees between the angles that the library tries. */
 static void cones_and_boxes_are_tight(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -388,7 +387,7 @@ static void cones_and_boxes_are_tight(void **state) {
         }
         if (b->cone_cutoff < 1) {
             double least = 1;
-            for (int trial = -1; trial < 1000; ++trial) { /* the axis itself, then others around it */
+            for (int trial = -1; trial < 1000; ++trial) { /* the axis, then random axes around it */
                 uint32_t seed = (uint32_t)trial * 7919u + 1;
                 double other[3], worst = 1, spread = pow(10, -4.0 * (trial % 50) / 50);
                 for (int k = 0; k < 3; ++k)

@@ -1,5 +1,5 @@
-/* Refinement of partitions: the deviation of normals falls, clusters stay in as many pieces as they were and
- * keep their last face, borders stay short; on made shapes, on odd meshes, and without memory. */
+/* Refinement of partitions: the deviation of normals falls, clusters keep a face and do not fall into more
+ * pieces, borders stay short. On generated shapes, on odd meshes, and with failing allocations. */
 #include "cluster/check_tree.h"
 
 #include "base/math/vec.h"
@@ -20,7 +20,7 @@ static uint32_t root_of(uint32_t *parents, uint32_t i) {
     return i;
 }
 
-/* What a partition is, summed the slow way. */
+/* Measures of a partition by direct sums. */
 typedef struct account {
     double area, deviation, squares; /* squares: of the clusters' perimeters */
     uint32_t filled, pieces;         /* clusters with faces; connected pieces of all clusters */
@@ -63,7 +63,7 @@ static account account_of(const fct_mesh *mesh, const uint32_t *labels, uint32_t
     return out;
 }
 
-/* How many pieces each cluster is in. */
+/* Counts the connected pieces of each cluster. */
 static uint32_t *pieces_of(const fct_mesh *mesh, const uint32_t *labels, uint32_t count) {
     fct_env env = fct_env_default();
     fct_dual dual;
@@ -81,7 +81,7 @@ static uint32_t *pieces_of(const fct_mesh *mesh, const uint32_t *labels, uint32_
     return pieces;
 }
 
-/* What is promised for every mesh. Returns the deviation's fall as a share of it. */
+/* Checks the guarantees for every mesh. Returns the relative decrease of the deviation. */
 static double check_refined(const fct_mesh *mesh, const uint32_t *old_labels, const uint32_t *labels,
                             uint32_t count, const fct_refine_def *def) {
     fct_refine_def used = def ? *def : fct_refine_def_default();
@@ -131,7 +131,7 @@ static void fill_labels(const fct_mesh *mesh, uint32_t count, uint32_t *labels) 
     fct_tree_destroy(tree);
 }
 
-/* From the cut of the mesh's tree; labels receives the result. */
+/* Refines a cut of the mesh's tree. labels receives the result. */
 static double refine_tree(const fct_mesh *mesh, uint32_t count, const fct_refine_def *def, uint32_t *labels) {
     fct_env env = fct_env_default();
     fct_tree *tree;
@@ -150,10 +150,10 @@ static double refine_tree(const fct_mesh *mesh, uint32_t count, const fct_refine
     return fall;
 }
 
-/* Two flat halves that meet in a right angle at x = 1/2, with the border of the labels one column beside the
- * fold, and ragged:
+/* Two flat halves that meet at a right angle at x = 1/2. The border of the labels is ragged and one column
+ * beside the fold:
  *
- *    0 0 0|0 1 1     the fold is at |, and there the border shall be
+ *    0 0 0|0 1 1     the fold is at |, where the border must move to
  *    0 0 1|1 1 1
  */
 static void border_finds_the_fold(void **state) {
@@ -242,7 +242,7 @@ static void grow_labels(const fct_mesh *mesh, uint32_t count, uint32_t *seed, ui
     fct_dual_release(&env, &dual);
 }
 
-/* Crumpled paper without a price on borders: clusters throw out arms and close rings, but none is cut. */
+/* Crumpled paper with no weight on borders: clusters grow arms and close rings, but none falls apart. */
 static void clusters_stay_in_one_piece(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -264,8 +264,8 @@ static void clusters_stay_in_one_piece(void **state) {
     }
 }
 
-/* A lid on a pipe, one row of faces around: every face of the pipe is one of its ring, which stays in one
- * piece when one leaves, for it holds together the other way round. */
+/* A lid on a pipe of one row of faces. A face may leave the pipe's ring, because the rest of the ring stays
+ * connected the other way round. */
 static void rings_may_be_opened(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -290,7 +290,7 @@ static void rings_may_be_opened(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* Soups of triangles over few vertices: edges of many faces, duplicates, faces without area. */
+/* Random triangles over few vertices: edges with many faces, duplicates, faces without area. */
 static void odd_meshes(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -315,14 +315,15 @@ static void odd_meshes(void **state) {
         refine(&mesh, labels, count, &def);
         for (uint32_t f = 0; mesh.materials && f < faces; ++f) {
             if (!(seen >> labels[f] & 1)) seen |= 1u << labels[f], firsts[labels[f]] = materials[f];
-            assert_int_equal(materials[f], firsts[labels[f]]); /* clusters of one material stay so */
+            assert_int_equal(materials[f],
+                             firsts[labels[f]]); /* a cluster of one material keeps its material */
         }
         mesh.materials = materials;
         fct_mesh_release(&env, &mesh);
     }
 }
 
-/* On a fine sphere with few clusters single faces hardly get anywhere, clusters of finer cuts do. */
+/* On a fine sphere with few clusters, single faces improve little, and clusters of finer cuts much. */
 static void finer_cuts_move_first(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -344,8 +345,8 @@ static bool is_mixed(const uint32_t *labels, const uint32_t *materials, uint32_t
     return seen[0] && seen[1];
 }
 
-/* Crumpled and torn paper: parts, edges of three and more faces where faces lie on others, two materials by
- * patches. Cuts of few clusters hold several parts at once. */
+/* Crumpled, torn paper with doubled faces: several parts, edges with three or more faces, two materials in
+ * patches. In cuts with few clusters a cluster has several parts. */
 static void torn_and_doubled_sheets(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -536,7 +537,7 @@ static void failures_leave_the_labels(void **state) {
     fct_mesh_release(&plain, &mesh);
 }
 
-/* The same numbers as for the cut of the tree that the labels come from. */
+/* Labels of a cut give the same numbers as the cut. */
 static void quality_is_that_of_the_cut(void **state) {
     (void)state;
     fct_env env = fct_env_default();

@@ -1,6 +1,5 @@
-/* tests/cluster/oracle/meshes.h: meshes of up to a few hundred faces for tests by brute force, and some
- * larger ones of the same kinds. Coordinates are irregular, so that costs differ, unless a comment says
- * otherwise. */
+/* tests/cluster/oracle/meshes.h: meshes of up to a few hundred faces for brute force, and larger ones of the
+ * same kinds. Unless a comment says otherwise, coordinates are irregular, so that all costs differ. */
 #ifndef FCT_TESTS_ORACLE_MESHES_H
 #define FCT_TESTS_ORACLE_MESHES_H
 
@@ -24,7 +23,7 @@ static inline fct_mesh make_tetrahedron(const fct_env *env) {
     return mesh;
 }
 
-/* A box of these extents, two triangles per side. With three equal ones: the cube, full of ties. */
+/* A box with two triangles per side. Equal extents give a cube, with many ties. */
 static inline fct_mesh make_box(const fct_env *env, double x, double y, double z) {
     static const uint32_t quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
                                          {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
@@ -37,7 +36,7 @@ static inline fct_mesh make_box(const fct_env *env, double x, double y, double z
     return mesh;
 }
 
-/* The surface of a box of these extents, n x n quads per side, with own vertices for each side. */
+/* A box with n x n quads per side. Sides share no vertices. */
 static inline fct_mesh make_fine_box(const fct_env *env, uint32_t n, double x, double y, double z) {
     fct_mesh grid = make_grid(env, n), mesh = shape_of(env, 6 * grid.vertex_count, 6 * grid.face_count);
     const double extents[3] = {x, y, z};
@@ -60,7 +59,7 @@ static inline fct_mesh make_fine_box(const fct_env *env, uint32_t n, double x, d
     return mesh;
 }
 
-/* n x n quads over [0,1]^2 with hills and noise up to this height; the grid itself is uneven, too. */
+/* An uneven grid of n x n quads over [0,1]^2 with hills and noise up to the height. */
 static inline fct_mesh make_terrain(const fct_env *env, uint32_t n, double height, uint32_t seed) {
     fct_mesh mesh = make_grid(env, n);
     for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
@@ -73,7 +72,7 @@ static inline fct_mesh make_terrain(const fct_env *env, uint32_t n, double heigh
     return mesh;
 }
 
-/* 2n triangles in a row, wound up along a spiral that opens: every union of neighbours is bent. */
+/* A strip of 2n triangles along an opening spiral: every union of neighbours is bent. */
 static inline fct_mesh make_bent_strip(const fct_env *env, uint32_t n) {
     fct_mesh mesh = shape_of(env, 2 * n + 2, 2 * n);
     uint32_t state = 11;
@@ -89,7 +88,8 @@ static inline fct_mesh make_bent_strip(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
-/* `pages` sheets of n x m quads that share one spine of n edges: 3 or more faces at each of its edges. */
+/* `pages` sheets of n x m quads that share a spine of n edges, so 3 or more faces meet at each of its edges.
+ */
 static inline fct_mesh make_pages(const fct_env *env, uint32_t pages, uint32_t n, uint32_t m) {
     fct_mesh mesh = shape_of(env, (n + 1) * (1 + pages * m), 2 * pages * n * m);
     uint32_t state = 5, face = 0;
@@ -112,8 +112,7 @@ static inline fct_mesh make_pages(const fct_env *env, uint32_t pages, uint32_t n
     return mesh;
 }
 
-/* A terrain with faces without area among its own: the same corner twice, two corners at one
- * place, and faces that are there twice. */
+/* A terrain with degenerate faces: two equal corners, two corners in one place, doubled faces. */
 static inline fct_mesh make_degenerate(const fct_env *env, uint32_t n) {
     fct_mesh terrain = make_terrain(env, n, 0.2, 23),
              mesh = shape_of(env, terrain.vertex_count + n, terrain.face_count + 3 * n);
@@ -138,7 +137,7 @@ static inline fct_mesh make_points(const fct_env *env) {
     return mesh;
 }
 
-/* Copies of a mesh, each moved along x and grown. Releases it. */
+/* Copies of a mesh, each moved along x and enlarged. Releases the mesh. */
 static inline fct_mesh make_copies(const fct_env *env, fct_mesh one, uint32_t copies) {
     fct_mesh mesh = shape_of(env, copies * one.vertex_count, copies * one.face_count);
     for (uint32_t c = 0; c < copies; ++c) {
@@ -155,7 +154,7 @@ static inline fct_mesh make_copies(const fct_env *env, fct_mesh one, uint32_t co
     return mesh;
 }
 
-/* Turns a mesh so that none of its sides lies along the world's axes. */
+/* Rotates a mesh so that no side is parallel to an axis of the world. */
 static inline void turn(fct_mesh *mesh) {
     static const double rows[3][3] = {
         {2.0 / 3, -2.0 / 3, 1.0 / 3}, {1.0 / 3, 2.0 / 3, 2.0 / 3}, {-2.0 / 3, -1.0 / 3, 2.0 / 3}};

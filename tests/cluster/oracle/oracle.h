@@ -1,8 +1,8 @@
-/* tests/cluster/oracle.h: clusters and their costs by direct sums over faces, in double.
+/* tests/cluster/oracle/oracle.h: clusters and their costs by direct sums over faces, in double.
  *
  * Source: Garland 1999, chapter 8, and the formula of the INCREMENT cost in facetree/cluster.h. Every value
- * is a sum over the faces of the cluster; nothing is carried from a part to its union, and no code of the
- * library takes part. The model is scaled to a bounding-box diagonal of 1. O(faces) per cluster.
+ * is a sum over the faces of the cluster, never a combination of the values of its parts. No code of the
+ * library is used. The model is scaled to a bounding-box diagonal of 1. O(faces) per cluster.
  */
 #ifndef FCT_TESTS_ORACLE_H
 #define FCT_TESTS_ORACLE_H
@@ -11,17 +11,16 @@
 
 #include "facetree/cluster.h"
 
-/* What a correct cost may lie off, as a share of its terms: MEAN is computed in double, INCREMENT in float.
- */
+/* Tolerance of a cost relative to its terms: MEAN is computed in double, INCREMENT in float. */
 static const double oracle_mean_slack = 1e-9, oracle_increment_slack = 1e-3;
 
 typedef struct oracle_face {
     double corner[3][3];
-    double vector[3], area; /* area times normal */
-    double sides;           /* length of its three sides together */
+    double vector[3], area; /* area vector A n */
+    double sides;           /* sum of the lengths of its three sides */
 } oracle_face;
 
-/* Two faces that are neighbours in the chain around one mesh edge, and the border that they share there. */
+/* Two neighbours in the chain of faces around a mesh edge, and the length of their border there. */
 typedef struct oracle_link {
     uint32_t a, b;
     double length;
@@ -31,7 +30,7 @@ typedef struct oracle {
     uint32_t face_count, link_count;
     oracle_face *faces;
     oracle_link *links;
-    uint32_t *link_starts, *links_of; /* per face, and one more: where its links begin; then their numbers */
+    uint32_t *link_starts, *links_of; /* first link of each face, with an end; numbers of links */
     const uint32_t *materials;        /* or NULL */
     uint8_t *inside;                  /* per face: scratch */
     fct_cluster_cost cost;
@@ -39,7 +38,7 @@ typedef struct oracle {
     double fit_weight, direction_weight, shape_weight; /* a1, a2, a3 of (8.18) */
 } oracle;
 
-/* A cluster as chapter 8 sees it. */
+/* The values of chapter 8 for a cluster. */
 typedef struct oracle_cluster {
     double area, vector[3];
     double normal[3];               /* of the best plane, along the area vector */
@@ -49,7 +48,7 @@ typedef struct oracle_cluster {
     double perimeter, irregularity; /* (8.16) */
 } oracle_cluster;
 
-/* The cost of a union, and how far a correct cost may lie from it. */
+/* The cost of a union, and the tolerance. */
 typedef struct oracle_price {
     double cost, slack;
 } oracle_price;
@@ -124,9 +123,9 @@ static inline int oracle_compare_sides(const void *p, const void *q) {
     return a->face < b->face ? -1 : a->face > b->face;
 }
 
-/* Links the faces around the mesh edge with sides [begin, end) to a chain in order of face. A face that is
- * not at an end of the chain divides its border there between its two neighbours. A degenerate face may have
- * two sides on the edge. */
+/* Links the faces around the mesh edge with sides [begin, end) to a chain in the order of faces. A face
+ * inside the chain divides its border between its two neighbours. A degenerate face may have two sides on the
+ * edge. */
 static inline void oracle_link_edge(oracle *o, const oracle_side *sides, size_t begin, size_t end) {
     for (size_t i = begin, k, next; i < end; i = k) {
         for (k = i; k < end && sides[k].face == sides[i].face;) ++k;
@@ -239,7 +238,7 @@ static inline double oracle_scatter(const oracle *o, const uint32_t *faces, uint
     return weight;
 }
 
-/* The border of a set of faces: all their sides, without both sides of every border between two of them. */
+/* The perimeter of a set of faces: the sum of all sides, minus twice every border inside the set. */
 static inline double oracle_perimeter(const oracle *o, const uint32_t *faces, uint32_t count) {
     double perimeter = 0;
     for (uint32_t i = 0; i < count; ++i) o->inside[faces[i]] = 1, perimeter += o->faces[faces[i]].sides;
@@ -280,15 +279,15 @@ static inline oracle_cluster oracle_measure(const oracle *o, const uint32_t *fac
 
 /* --- Costs --- */
 
-/* (8.17). A closed border earns at most 1000; a union without area, or of two closed parts, costs 1/2. */
+/* (8.17). At least -1000, which a closed union has. 1/2 if the union has no area or both parts are closed. */
 static inline double oracle_shape(const oracle_cluster *a, const oracle_cluster *b, const oracle_cluster *u) {
     double worst = fmax(a->irregularity, b->irregularity);
     if (u->area == 0 || worst == 0) return 0.5;
     return fmax(1 - worst / (2 * u->irregularity), -1000);
 }
 
-/* (8.18). The slack is that of double sums: 1e-9 of the terms; the normal of a union whose two smallest
- * spreads are equal is any of a circle, and E_dir with it. */
+/* (8.18). The slack is 1e-9 of the terms. If the two smallest spreads of the union are equal, its normal and
+ * so E_dir are arbitrary. */
 static inline oracle_price oracle_mean(const oracle *o, const oracle_cluster *u, double shape) {
     double gap = u->spread[1] - u->spread[0];
     double loose = gap > 0 ? fmin(1e-12 * u->spread[2] / gap, 4) : u->area > 0 ? 4 : 0;
@@ -299,8 +298,8 @@ static inline oracle_price oracle_mean(const oracle *o, const oracle_cluster *u,
                                                        o->direction_weight * (1e-12 + loose)};
 }
 
-/* How much of the shape weight INCREMENT gives to a union: a twentieth where it is flat, all of it where 1 -
- * |S| / w is .001 or more. */
+/* The share of the shape weight of INCREMENT: a twentieth for a flat union, 1 where 1 - |S| / w is .001 or
+ * more. */
 static inline double oracle_shape_share(const oracle_cluster *u) {
     return u->area > 0 ? fmin(fmax((1 - oracle_norm(u->vector) / u->area) / 0.001, 0.05), 1) : 0.05;
 }
@@ -311,7 +310,7 @@ static inline oracle_price oracle_increment(const oracle *o, const oracle_cluste
     double fit = fmax(u->area * u->fit - a->area * a->fit - b->area * b->fit, 0),
            share = oracle_shape_share(u);
     double direction = 2 * (oracle_norm(a->vector) + oracle_norm(b->vector) - oracle_norm(u->vector));
-    double points = u->fit > 0 ? u->area * u->fit / u->spread[0] : 1; /* turns a spread into w E_fit */
+    double points = u->fit > 0 ? u->area * u->fit / u->spread[0] : 1; /* factor from a spread to w E_fit */
     double share_slack = share > 0.05 && share < 1 ? 3e-4 : 0;
     double floor = o->fit_weight * (1e-6 * u->area * u->fit + 1e-7 * u->spread[2] * points) +
                    o->direction_weight * 1e-7 * u->area +
@@ -321,7 +320,7 @@ static inline oracle_price oracle_increment(const oracle *o, const oracle_cluste
                           oracle_increment_slack * (fabs(fit) + fabs(direction) + fabs(shape)) + floor};
 }
 
-/* Of merging two clusters of these faces, which `a` and `b` measure. */
+/* The cost of merging two clusters with these faces and the values a and b. */
 static inline oracle_price oracle_merge_price(const oracle *o, const oracle_cluster *a,
                                               const uint32_t *a_faces, uint32_t a_count,
                                               const oracle_cluster *b, const uint32_t *b_faces,

@@ -1,13 +1,12 @@
-/* Cuts of a tree by count, by cost and by distance, against the partition that its merges leave, one by one.
- */
+/* Cuts of a tree by count, by cost and by distance, against partitions from its merges, one after another. */
 #include "meshes.h"
 #include "oracle.h"
 
 #include "cluster/tree/tree.h"
 #include "facetree/partition.h"
 
-/* The partition into `count` clusters: all merges but the last ones are done. labels: per place, the last
- * node made. */
+/* The partition into `count` clusters by doing all merges except the last ones. labels: per place, the node
+ * of the last merge. */
 static void apply_merges(const fct_tree *tree, uint32_t count, uint32_t *labels) {
     const fct_tree_view *view = &tree->view;
     for (uint32_t p = 0; p < view->face_count; ++p) labels[p] = view->node_count + p;
@@ -71,7 +70,7 @@ static void check_costs(const char *name, const fct_tree *tree) {
         }
 }
 
-/* How far a node's vertices lie from its plane. */
+/* The largest distance of a node's vertices from its plane. */
 static double measure_node(const fct_tree *tree, uint32_t node) {
     fct_tree_view view = fct_tree_get(tree);
     fct_cluster c;
@@ -86,7 +85,7 @@ static double measure_node(const fct_tree *tree, uint32_t node) {
     return largest;
 }
 
-/* The highest nodes within the distance, in order of places. Distances: per node; leaves always pass. */
+/* The topmost nodes within the distance, in the order of places. distances: per node; leaves always pass. */
 static uint32_t cut_below(const fct_tree *tree, uint32_t node, const double *distances, double limit,
                           uint32_t *nodes, uint32_t count) {
     if (node >= tree->view.node_count || distances[node] <= limit) {
@@ -106,7 +105,7 @@ static void check_distances(const char *name, const fct_tree *tree) {
     uint32_t *nodes = malloc(faces * sizeof *nodes), *wanted = malloc(faces * sizeof *wanted);
     for (uint32_t i = 0; i < all; ++i) distances[i] = measure_node(tree, i);
     for (uint32_t i = 0; i < view.node_count; i += 1 + view.node_count / 60)
-        for (int side = -1; side <= 1; side += 2) { /* a little below a node's distance, and above it */
+        for (int side = -1; side <= 1; side += 2) { /* slightly below and above the distance of a node */
             double limit = distances[i] * (1 + 1e-6 * side) + (side > 0 ? 1e-12 : 0), most = 0;
             uint32_t number = 0;
             for (uint32_t r = 0; r < view.root_count; ++r)
@@ -125,7 +124,7 @@ static void check_distances(const char *name, const fct_tree *tree) {
     free(distances), free(nodes), free(wanted);
 }
 
-/* How many clusters are left when the tree stops at a number of roots and a cost. */
+/* The number of clusters of a tree with limits of roots and cost. */
 static uint32_t count_roots(const fct_mesh *mesh, uint32_t roots, double max_cost) {
     fct_env env = fct_env_default();
     fct_tree *whole;
@@ -141,7 +140,7 @@ static uint32_t count_roots(const fct_mesh *mesh, uint32_t roots, double max_cos
     return count;
 }
 
-/* Of a small mesh everything, of a large one the distances alone. */
+/* All checks for a small mesh; only distances for a large one. */
 static void check_mesh_cuts(const char *name, const fct_mesh *mesh, uint32_t roots, double max_cost) {
     fct_env env = fct_env_default();
     fct_tree *tree;

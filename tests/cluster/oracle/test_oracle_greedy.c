@@ -12,7 +12,8 @@
 #include "cluster/merge/join.h"
 #include "cluster/merge/mean.h"
 
-/* Where the contraction is: edges within a material, then all, each with mild heights first; then parts. */
+/* Stages of the contraction: edges within a material, then all edges, each with the lower height limit first;
+ * then separate parts. */
 typedef enum stage { WITHIN_MILD, WITHIN_STEEP, ACROSS_MILD, ACROSS_STEEP, JOIN } stage;
 
 typedef struct replay {
@@ -21,14 +22,14 @@ typedef struct replay {
     oracle o;
     uint32_t faces, merges;
     const fct_work *work;
-    /* By build id: a leaf's is its face, merge m makes F + m. */
+    /* by build id: that of a leaf is its face, merge m makes F + m */
     oracle_cluster *measures;
     uint32_t **members, *counts, *heights;
-    oracle_price *prices;   /* per pair of ids, cost NaN where not computed yet */
-    uint32_t *listed;       /* per pair of ids: 1 + the step at which it was last met */
-    fct_mean_record *means; /* what MEAN costs are made of, by build id */
-    uint32_t *nodes;        /* per face: the live id that holds it */
-    double *costs, *slacks; /* per merge, as the oracle says */
+    oracle_price *prices;   /* per pair of ids; cost NaN: not computed yet */
+    uint32_t *listed;       /* per pair of ids: 1 + the last step that listed it */
+    fct_mean_record *means; /* records of MEAN by build id */
+    uint32_t *nodes;        /* per face: the live cluster that has it */
+    double *costs, *slacks; /* per merge, by the oracle */
     stage *stages;          /* per merge */
 } replay;
 
@@ -54,7 +55,7 @@ static bool may_merge(const replay *r, uint32_t a, uint32_t b, stage at) {
 
 typedef struct choice {
     uint32_t a, b, pairs;
-    double cost, limit;  /* limit: what the cheapest may cost at most */
+    double cost, limit;  /* limit: upper bound of the cheapest cost */
     uint32_t least_size; /* the smallest log2 of faces among all pairs */
 } choice;
 
@@ -62,7 +63,7 @@ static uint32_t size_class(const replay *r, uint32_t a, uint32_t b) {
     return (uint32_t)floor(log2(r->counts[a] + r->counts[b]));
 }
 
-/* The cheapest of all live pairs that may merge. `wanted`: the pair of the library, whose presence is noted.
+/* Finds the cheapest of all live pairs that may merge, and whether `wanted`, the pair of the library, is one.
  */
 static choice find_cheapest(const replay *r, uint32_t step, stage at, const uint32_t wanted[2], bool *there) {
     choice best = {.cost = INFINITY, .limit = INFINITY, .least_size = UINT32_MAX};
@@ -106,7 +107,7 @@ static double shared_border(const replay *r, uint32_t a, uint32_t b) {
     return length;
 }
 
-/* The cost in double, which the tree and the list of merges hold as a float. */
+/* The cost in double; the tree and the list of merges hold it as a float. */
 static void check_mean(const replay *r, uint32_t m, const uint32_t pair[2], oracle_price price) {
     fct_mean_record *a = &r->means[pair[0]], *b = &r->means[pair[1]];
     double shared = shared_border(r, pair[0], pair[1]), cost = fct_mean_cost(&r->work->metric, a, b, shared);
@@ -125,7 +126,7 @@ static bool are_neighbors(const replay *r, uint32_t a, uint32_t b) {
     return false;
 }
 
-/* One merge of the library against all that it could have done. */
+/* Compares one merge of the library with all possible merges. */
 static stage check_merge(replay *r, uint32_t m, stage at) {
     uint32_t pair[2] = {r->work->children[m][0], r->work->children[m][1]};
     if (!is_live(r, pair[0]) || !is_live(r, pair[1]) || pair[0] == pair[1])
@@ -144,7 +145,7 @@ static stage check_merge(replay *r, uint32_t m, stage at) {
     double cost = (double)r->work->costs[m];
     if (r->o.cost == FCT_COST_MEAN) check_mean(r, m, pair, price);
     if (at == JOIN && are_neighbors(r, pair[0], pair[1]))
-        price.cost = cost; /* its border is not known any more */
+        price.cost = cost; /* the border of a grafted merge is unknown */
     if (!(fabs(cost - price.cost) <= price.slack + 1e-7 * fabs(price.cost)))
         fail_msg("%s: merge %u of %u and %u (%u and %u faces) costs %.17g, should cost %.17g (off by %g, "
                  "slack %g)",
@@ -161,7 +162,7 @@ static stage check_merge(replay *r, uint32_t m, stage at) {
 
 /* --- The tree --- */
 
-/* The tree shows a merge's cost as the largest of its subtree, and no less than any of an earlier stage. */
+/* The cost of a node is the largest of its subtree, and at least that of every merge of an earlier stage. */
 static void raise_costs(const replay *r, float *raised) {
     float floor = -INFINITY, highest = -INFINITY;
     int phase = 0;
@@ -195,12 +196,12 @@ static void check_node(const replay *r, const fct_tree *tree, uint32_t node, uin
         fail_msg("%s: node %u has cost %.9g, merge %u %.9g", r->name, node, (double)c.cost, m, (double)cost);
 }
 
-/* Costs go by their bits: -0 comes before 0. */
+/* Costs are compared by their bits, so -0 comes before 0. */
 static bool comes_first(float a, float b) {
     return a != b ? a < b : signbit(a) && !signbit(b);
 }
 
-/* The node numbered M - 1 - i is the merge with the i-th lowest cost; of equal ones the earlier. */
+/* Node M - 1 - i is the merge with the i-th lowest cost. Among equal costs the earlier merge comes first. */
 static void check_order(const replay *r, const fct_tree *tree) {
     assert_int_equal(fct_tree_get(tree).node_count, r->merges);
     float *raised = malloc(r->merges * sizeof *raised);
@@ -216,7 +217,7 @@ static void check_order(const replay *r, const fct_tree *tree) {
     free(raised), free(done);
 }
 
-/* --- All of one mesh --- */
+/* --- One mesh --- */
 
 static void replay_create(replay *r, const char *name, const fct_mesh *mesh, const fct_tree_def *def,
                           const fct_work *work) {
@@ -256,8 +257,8 @@ static void replay_destroy(replay *r) {
     oracle_destroy(&r->o);
 }
 
-/* The contraction as fct_tree_build does it. Returns whether heights kept neighbours apart: the tree is then
- * made in another way. */
+/* Contracts as fct_tree_build does. Returns whether height limits left neighbours unmerged; fct_tree_build
+ * then starts again by size. */
 static bool contract(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def, fct_work *work) {
     assert_int_equal(fct_work_create(env, mesh, def, work), FCT_OK);
     for (int across = !mesh->materials; across < 2; ++across)
@@ -279,7 +280,7 @@ static void check_contraction(const char *name, const fct_mesh *mesh, const fct_
     replay_create(&r, name, mesh, def, &work);
     stage at = mesh->materials ? WITHIN_MILD : ACROSS_MILD;
     for (uint32_t m = 0; m < r.merges; ++m) at = check_merge(&r, m, at);
-    /* fit or shape alone may make chains, which heights keep from being joined */
+    /* fit or shape alone may make chains, whose merges the height limits forbid */
     if (stranded) assert_true(def->direction_weight == 0 && def->fit_weight * def->shape_weight == 0);
     fct_tree *tree;
     assert_int_equal(fct_tree_build(&env, mesh, def, NULL, &tree), FCT_OK);
@@ -326,7 +327,7 @@ static fct_mesh make_mesh(const fct_env *env, int which, const char **name) {
 }
 enum { MESHES = 12 };
 
-/* Each term alone, which no other term can hide, and all together. */
+/* Each term alone, so that no other term hides it, and all together. */
 static const double weights[][3] = {{1e4, 1, 0.002}, {1e4, 0, 0},     {0, 1, 0},
                                     {0, 0, 1},       {1e3, 2.5, 0.1}, {0, 0, 0}};
 
@@ -366,7 +367,7 @@ static void increment_by_points(void **state) {
     check_all(FCT_COST_INCREMENT, FCT_FIT_POINTS);
 }
 
-/* Weights below 0 become these, which the tree then reports. */
+/* Negative weights select these defaults, and the tree reports them. */
 static void default_weights(void **state) {
     (void)state;
     static const double expected[2][3] = {

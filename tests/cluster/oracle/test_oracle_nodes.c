@@ -1,6 +1,6 @@
-/* Every node of a tree, leaves too, against direct sums over its faces: area, area vector, moment, centroid,
- * plane, cone and box. The box must hold all vertices, reach no farther than they do, and have about the
- * least area that the documented frames allow. */
+/* Every node of a tree, leaves included, against direct sums over its faces: area, area vector, moment,
+ * centroid, plane, cone and box. The box must contain all vertices, end at them, and have about the least
+ * area of the documented frames. */
 #include "meshes.h"
 #include "oracle.h"
 
@@ -16,7 +16,7 @@ typedef struct node {
     fct_cluster record;
     double (*corners)[3][3]; /* per face */
     double low[3], high[3];  /* of all corners */
-    double size;             /* of that box, and how far it lies from 0: what a float's rounding depends on */
+    double size;             /* largest coordinate and extent, which set the rounding of floats */
     double area, vector[3], moment[6], centroid[3], spread[3], axes[3][3];
 } node;
 
@@ -40,8 +40,8 @@ static void load_corners(node *n) {
     n->size = oracle_distance(n->low, n->high) + oracle_norm(n->low) + oracle_norm(n->high);
 }
 
-/* A face without area weighs 1e-20 of its longest side squared, so that clusters of such faces have a place.
- */
+/* A face without area weighs 1e-20 of its longest squared side, so that clusters of such faces have a
+ * centroid. */
 static double weigh_face(const double p[3][3], double area) {
     double longest =
         fmax(oracle_distance(p[0], p[1]), fmax(oracle_distance(p[1], p[2]), oracle_distance(p[2], p[0])));
@@ -64,7 +64,7 @@ static void sum_faces(node *n) {
     }
     for (int k = 0; k < 3 && weight > 0; ++k) n->centroid[k] /= weight;
     for (int k = 0; k < 3 && weight <= 0; ++k) n->centroid[k] = n->low[k];
-    for (uint32_t f = 0; f < n->count; ++f) { /* by the middles of the sides, which is exact */
+    for (uint32_t f = 0; f < n->count; ++f) { /* the rule of side midpoints is exact for squares */
         const double(*p)[3] = (const double(*)[3])n->corners[f];
         double s[3];
         oracle_area_vector(p, s);
@@ -90,7 +90,7 @@ static void check_sums(const node *n) {
     for (int i = 0; i < 6; ++i) expect(n, "moment", (double)c->moment[i], n->moment[i], 3e-7 * n->area);
 }
 
-/* The normal is judged by the spread along it, because it may be any of several. */
+/* Compares the spread along the normal, because equal eigenvalues allow several normals. */
 static void check_plane(const node *n) {
     const float *plane = n->record.plane;
     double normal[3] = {(double)plane[0], (double)plane[1], (double)plane[2]}, along = 0;
@@ -227,7 +227,7 @@ static void check_box(const node *n, excesses *out) {
 
 /* --- Trees --- */
 
-/* Depths of all leaves, from the roots down: a child's number is larger than its parent's. */
+/* Depths of all leaves, from the roots down, because the id of a child is larger than that of its parent. */
 static void check_depth(const char *name, const fct_tree *tree) {
     fct_tree_view view = fct_tree_get(tree);
     uint32_t all = view.node_count + view.face_count, deepest = 0, *depths = calloc(all, sizeof *depths);
@@ -338,7 +338,7 @@ static void nodes(void **state) {
     check_excess("large clusters' eight angles", &all.own, 1.15, 1.02);
 }
 
-/* What frames of large clusters are compared by: half the surface area. */
+/* Half the surface area, by which frames of large clusters are compared. */
 static void areas(void **state) {
     (void)state;
     const fct_extents extents = {{-1, 2, 5}, {2, 4, 12}};

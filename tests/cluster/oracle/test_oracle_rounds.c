@@ -28,13 +28,13 @@ typedef struct game {
     const fct_work *work;
     oracle_cluster *measures;
     uint32_t **members, *counts, *heights; /* by build id */
-    uint32_t *nodes;                       /* per face: the live id that holds it */
+    uint32_t *nodes;                       /* per face: the live cluster that has it */
     live *pairs;
     uint32_t pair_count;
-    uint32_t *starts, *ends_of; /* per id, and one more: where its pairs begin; then their numbers */
-    double *best, *rest;        /* per id: the lowest cost of its pairs; of those that patience allows */
-    uint32_t *mates;            /* per id: what it merges with in this round, or FCT_NONE */
-    bool *done, *sure; /* per id: it merges with its cheapest neighbour, within the slack and beyond it */
+    uint32_t *starts, *ends_of; /* first pair of each id, with an end; numbers of pairs */
+    double *best, *rest;        /* per id: lowest cost of its pairs, and of those within patience */
+    uint32_t *mates;            /* per id: its partner in this round, or FCT_NONE */
+    bool *done, *sure; /* per id: it merges with its cheapest neighbour, up to the slack; for certain */
     uint32_t mutual, patient;
 } game;
 
@@ -51,7 +51,7 @@ static bool may_merge(const game *g, uint32_t a, uint32_t b) {
            oracle_allows(taller, g->counts[a] + g->counts[b], true);
 }
 
-/* All pairs of live clusters that share a border, each once, and what they cost. */
+/* Lists all pairs of live clusters with a common border, each once, with their costs. */
 static void list_pairs(game *g) {
     uint32_t count = 0;
     for (uint32_t l = 0; l < g->o.link_count; ++l) {
@@ -88,7 +88,7 @@ static const live *find_pair(const game *g, uint32_t a, uint32_t b) {
     return bsearch(&wanted, g->pairs, g->pair_count, sizeof *g->pairs, compare_live);
 }
 
-/* The library orders costs as floats without their last five bits. */
+/* The library compares costs as floats without their last five bits. */
 static double slack_of(const live *p) {
     return p->price.slack + 1e-5 * fabs(p->price.cost);
 }
@@ -114,8 +114,8 @@ static bool is_cheapest(const game *g, const live *p, double slack) {
     return p->price.cost <= g->best[p->a] + slack && p->price.cost <= g->best[p->b] + slack;
 }
 
-/* Whether all other pairs at both ends cost certainly more than `most`; those that are open to nobody are
- * left out. */
+/* Whether all other pairs at both ends certainly cost more than `most`. Pairs that cannot merge do not count.
+ */
 static bool cost_others_more(const game *g, const live *p, double most, bool only_open) {
     for (int k = 0; k < 2; ++k) {
         uint32_t id = k ? p->b : p->a;
@@ -128,7 +128,7 @@ static bool cost_others_more(const game *g, const live *p, double most, bool onl
     return true;
 }
 
-/* Whether the pair is the cheapest of both ends by more than the slack. */
+/* Whether the pair is the cheapest at both ends by more than the slack. */
 static bool is_certain(const game *g, const live *p) {
     return cost_others_more(g, p, p->price.cost + slack_of(p), false);
 }
@@ -142,7 +142,7 @@ static void check_cost(const game *g, uint32_t m, uint32_t round, const live *p)
             slack_of(p));
 }
 
-/* Merges [begin, end) are one round. */
+/* Checks one round: merges [begin, end). */
 static void note_mates(game *g, uint32_t round, uint32_t begin, uint32_t end) {
     memset(g->mates, 0xFF, 2 * g->faces * sizeof *g->mates);
     for (uint32_t m = begin; m < end; ++m) {
@@ -183,15 +183,14 @@ static void check_patient(game *g, uint32_t round, uint32_t m, double patience) 
     }
 }
 
-/* Whether the pair is by an eighth of an octave the cheapest of its ends among those that patience may allow.
- */
+/* Whether the pair is the cheapest at both ends, among those within patience, by an eighth of an octave. */
 static bool is_certain_rest(const game *g, const live *p, double patience) {
     double slack = slack_of(p), least = fmin(limit_of(g, p->a, patience), limit_of(g, p->b, patience));
     return p->price.cost + slack < least &&
            cost_others_more(g, p, p->price.cost + octave_part * fabs(p->price.cost) + slack, true);
 }
 
-/* A pair that is certainly to be merged, is. */
+/* Every pair that must certainly merge has merged. */
 static void check_left_out(const game *g, uint32_t round, double patience) {
     for (uint32_t i = 0; i < g->pair_count; ++i) {
         const live *p = &g->pairs[i];
