@@ -122,8 +122,8 @@ static fct_result build_links(const fct_env *env, const fct_env *pool, const fct
     return result;
 }
 
-/* The contraction works in the memory that later holds the records, because touching new memory costs more
- * than most of the work in it (docs/clustering.md). */
+/* The contraction works in the memory that later holds the records, because the first touch of a page is slow
+ * (docs/notes/clustering.md). */
 static fct_result build_tree(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
                              fct_tree_stats *stats, fct_tree *tree) {
     double start = fct_seconds(), dual = start;

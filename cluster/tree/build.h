@@ -1,4 +1,4 @@
-/* cluster/tree/build.h: what building in memory and building from file to file share. */
+/* cluster/tree/build.h: common code of building in memory and from file to file. */
 #ifndef FCT_CLUSTER_BUILD_H
 #define FCT_CLUSTER_BUILD_H
 

@@ -1,12 +1,12 @@
-/* cluster/tree/order.c: from merges in the order they were found to the numbering of the tree.
+/* cluster/tree/order.c: turns the merges of a clustering into the numbering of the tree.
  *
  * 1. Raise each cost to the maximum over its subtree and over all merges of earlier phases.
  * 2. Sort the merges by cost with a stable radix sort, so children stay before parents. The merge of rank i
  *    becomes inner node M - 1 - i.
  * 3. Hand ranges down from the roots, which places the faces.
  * 4. Number vertices in order of first use, so the vertices that a cluster is the first to use are one run.
- * Passes up and down the tree go by merge and not by node, because merges that were found together lie near
- * each other in memory. Links and costs stay in their own arrays, so each record is written only once.
+ * Passes over the tree are in the order of merges and not of nodes, because successive merges are neighbours
+ * in memory. Links and costs stay in their own arrays, so each record is written only once.
  */
 #include "cluster/tree/order.h"
 

@@ -1,4 +1,4 @@
-/* cluster/tree/order.h: from a finished clustering to the numbering of a tree. */
+/* cluster/tree/order.h: turns a finished clustering into a tree with its numbering. */
 #ifndef FCT_CLUSTER_ORDER_H
 #define FCT_CLUSTER_ORDER_H
 

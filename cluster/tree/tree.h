@@ -26,7 +26,7 @@ struct fct_tree {
     float *positions, *colors;
     char **names;
     char *source;
-    /* Of a tree from a file. */
+    /* only for a tree from a file */
     fct_file file;
     char *path; /* for messages */
     /* The partition into cut_count clusters, by ascending id, with copies of their records near the beginning

@@ -1,9 +1,9 @@
-/* cluster/tree/check/edges.c: counts boundary edges, non-manifold edges and components, as the dual graph has
- * them (dual.h).
+/* cluster/tree/check/edges.c: counts boundary edges, non-manifold edges and components as the dual graph
+ * defines them (dual.h), but in less memory.
  *
- * Sorts the sides of faces by vertex pair, in lots that bound the memory: a hash of the pair chooses the lot,
- * so all faces of a pair are in one lot. This verifies a mesh of 10^8 triangles whose dual graph would not
- * fit. 4 bytes per face and 24 per side of a lot.
+ * A hash of a side's vertex pair chooses its lot, so all faces of a pair are in the same lot. The sides of
+ * one lot after another are sorted by vertex pair. This works for 10^8 triangles, whose dual graph would not
+ * fit. Memory: 4 bytes per face and 24 per side of a lot.
  */
 #include "cluster/tree/check/edges.h"
 #include "base/key.h"

@@ -1,8 +1,8 @@
 /* cluster/tree/check/structure.c: checks that a tree can be walked safely.
  *
  * In a valid tree the children of each inner node have larger ids, their ranges are the two parts of its own,
- * and the roots partition the places. It follows that each node is reached exactly once: the ranges of
- * different subtrees are disjoint, and F leaves under R roots have F - R inner nodes, which is their number.
+ * and the roots partition the places. So a walk reaches each node exactly once: the ranges of
+ * different subtrees are disjoint, and F leaves under R roots need all F - R inner nodes.
  * Each chunk records its first fault, and the fault of the first chunk is reported, so the message does not
  * depend on the threads. O(F).
  */
@@ -95,7 +95,7 @@ static const char *find_node_fault(const fct_tree *tree, uint32_t i) {
     return fct_tree_parts_fault(c, first, count);
 }
 
-/* Prefetches the children of a node, which lie anywhere. */
+/* Prefetches the children of a node, because they are scattered in memory. */
 static void prefetch_children(const fct_tree *tree, size_t i) {
     if (i >= tree->view.node_count) return;
     for (int k = 0; k < 2; ++k) {

@@ -13,7 +13,7 @@ const char *fct_tree_parts_fault(const fct_cluster *c, const uint32_t first[2], 
 fct_result fct_tree_find_depth(const fct_env *env, const fct_tree *tree, uint32_t *depth, double *mean);
 
 /* Checks links, ranges, roots, cut, permutations, indices, finite numbers and depth, so that no walk can
- * leave the arrays or run in circles. O(F), parallel. Errors: DATA, MEMORY. */
+ * read outside of the arrays or run in circles. O(F), parallel. Errors: DATA, MEMORY. */
 fct_result fct_tree_check_structure(const fct_env *env, const fct_tree *tree);
 
 #endif

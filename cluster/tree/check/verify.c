@@ -51,7 +51,7 @@ static bool is_close(double stored, double value, double size) {
     return fabs(stored - value) <= 1e-5 * size + FLT_MIN;
 }
 
-/* Calls of fmin and fmax took half of the time. */
+/* Without calls of fmin and fmax, which took half of the time. */
 static inline double least(double a, double b) {
     return a < b ? a : b;
 }

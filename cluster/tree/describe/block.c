@@ -149,8 +149,8 @@ static inline void prefetch_two(const fct_tree *tree, const fct_block_scratch *s
     }
 }
 
-/* Describes nodes [begin, begin + 8) of the order by size. Beyond `count` the first one is repeated. `first`
- * is the first place of the block. */
+/* Describes nodes [begin, begin + 8) in the order of sizes. Repeats the first one beyond `count`. first: the
+ * first place of the block. */
 static void describe_eight(const fct_tree *tree, uint32_t first, uint32_t begin, uint32_t count,
                            fct_block_scratch *s) {
     fct_octet o;

@@ -1,4 +1,4 @@
-/* cluster/tree/describe/outline.h: which clusters are described in blocks, and what the larger ones share.
+/* cluster/tree/describe/outline.h: the blocks of a tree and the larger clusters above them.
  *
  *                  upper                 clusters of more than FCT_BLOCK faces, in preorder
  *                 /     \

@@ -5,8 +5,8 @@
 #include "cluster/shape/octet.h"
 #include "facetree/cluster.h"
 
-/* Everything in the record but cost, children, first and count. The points fill all lanes of their rows; the
- * normals are rows of four floats. */
+/* Sets everything in the record except cost, children, first and count. The points fill all lanes of their
+ * rows; the normals are rows of four floats. */
 void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
                          uint32_t normal_count, const fct_sums *sums, fct_cluster *out);
 

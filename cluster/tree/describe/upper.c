@@ -182,7 +182,7 @@ static void fit_box(const upper_job *job, const fct_upper *u, fct_cluster *c) {
 
 /* --- Cones --- */
 
-/* Half a chord that the cone may be wider than its normals need, so that the search ends early. */
+/* The half chord by which a cone may exceed the smallest one, so that the search ends early. */
 static const double slack = 5e-7;
 /* A half chord of 169 degrees. A wider cone becomes all directions, because the search over loose triangles
  * with arbitrary normals would open every node. */
