@@ -1,4 +1,4 @@
-/* cluster/tree/locality.h: a sorted copy of a mesh in no order, for the time of a build. */
+/* cluster/tree/locality.h: a sorted copy of a mesh in no order, which lives during a build. */
 #ifndef FCT_CLUSTER_LOCALITY_H
 #define FCT_CLUSTER_LOCALITY_H
 

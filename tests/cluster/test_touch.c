@@ -38,7 +38,7 @@ static bool dropped(void) {
     posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED);
     close(descriptor);
     if (sysconf(_SC_PAGESIZE) == PAGE && resident() == 0) return true;
-    print_message("the file system keeps files in memory: what is read cannot be counted\n");
+    print_message("the file system keeps files in memory, so reads cannot be counted\n");
     return false;
 }
 

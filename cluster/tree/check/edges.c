@@ -19,7 +19,7 @@ typedef struct side_list {
     uint32_t lots;
 } side_list;
 
-/* The vertex pair of a side; 0, which is no pair, for a side from a vertex to itself. */
+/* The vertex pair of a side. 0, which is no pair, if both ends are the same vertex. */
 static uint64_t make_side_key(const uint32_t triangle[3], int k) {
     uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
     if (a == b) return 0;
