@@ -288,7 +288,7 @@ static const uint32_t fct_lanes_of[256] = {
     0x76521,  0x765210,  0x7653,   0x76530,   0x76531,   0x765310,  0x76532,  0x765320,  0x765321, 0x7653210,
     0x7654,   0x76540,   0x76541,  0x765410,  0x76542,   0x765420,  0x765421, 0x7654210, 0x76543,  0x765430,
     0x765431, 0x7654310, 0x765432, 0x7654320, 0x7654321, 0x76543210};
-/* The numbers of the mask's bits in the first lanes, 0 in those left. */
+/* The first lanes receive the numbers of the set bits of the mask, the remaining lanes 0. */
 static inline i8 i8_chosen(uint32_t mask) {
     __m256i numbers = _mm256_srlv_epi32(_mm256_set1_epi32((int)fct_lanes_of[mask]),
                                         _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));

@@ -26,7 +26,7 @@ void box_tree_release(box_tree *tree) {
     *tree = (box_tree){0};
 }
 
-/* Half extents are enlarged by more than the rounding to float. */
+/* Half extents grow by more than the rounding to float. */
 fct_box box_fit(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, const v3 axes[3]) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     v3 used[3], center = {0, 0, 0};

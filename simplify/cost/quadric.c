@@ -58,7 +58,7 @@ void fct_quadric_eliminate(const double *q, uint32_t m, const double *prior, dou
         out->upper[j][j] += ridge;
         r[9] += ridge * prior[j] * prior[j];
     }
-    /* Gaussian elimination: column j of the attributes leaves A, b, c and the rows below. */
+    /* A step of Gaussian elimination: removes attribute j from A, b, c and the rows below. */
     for (uint32_t j = 0; j < m; ++j) {
         const double *row = out->rows[j];
         double inverse = out->upper[j][j] > 0 ? 1 / out->upper[j][j] : 0;

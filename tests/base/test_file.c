@@ -26,7 +26,7 @@ static int leave_folder(void **state) {
     const char *names[] = {"file", "link", "pipe", "kept", "locked"};
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i) unlink(names[i]);
     (void)!rmdir("inner");
-    return chdir("/") || rmdir(folder); /* fails where something is left over */
+    return chdir("/") || rmdir(folder); /* fails if a file remains */
 }
 
 static uint32_t files_here(void) {

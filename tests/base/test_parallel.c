@@ -67,7 +67,7 @@ static bool wait_for(atomic_int *value, int least) {
     return false;
 }
 
-/* Chunks that wait until as many as there are threads are at work, and look at one another's numbers. */
+/* Each chunk waits until all threads are in a chunk, and then reads the numbers of the other threads. */
 typedef struct meeting {
     int threads, late; /* late: after how many chunks it is held */
     atomic_int begun, ended, wrong;
@@ -353,8 +353,8 @@ static void every_hundredth_is_told_by_a_late_caller_too(void **state) {
     assert_true(w.last == 1 && !w.falling);
 }
 
-/* The second call of the hook cancels while a helper is in a chunk: that one is waited for, and no other
- * begins. */
+/* The second call of the hook cancels while a helper is in a chunk. The call waits for this chunk, and no
+ * other chunk begins. */
 static void hold_briefly(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)begin, (void)end, (void)chunk;
     holder *h = user;

@@ -1,4 +1,4 @@
-/* Colour differences between surfaces: which face's colour counts, and how much bright lights weigh. */
+/* Colour differences between surfaces: the face that gives the colour, and the weight of bright lights. */
 #include "models.h"
 
 /* Grids of the unit square, one after the other; each has a height and a grey, odd ones face down. */

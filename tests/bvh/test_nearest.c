@@ -1,4 +1,4 @@
-/* Closest points against closed forms and brute force; faces by normal; how much a search visits. */
+/* Closest points against closed forms and brute force; choice of faces by normal; number of visits. */
 #include "packed.h"
 
 #include "bvh/near/nearest.h"

@@ -34,7 +34,7 @@ typedef struct tally {
     uint32_t axis, oriented, leaves, small_nodes;
 } tally;
 
-/* Each side of each box stands off the outermost vertex by the padding, no less and hardly more. */
+/* The distance of each box side from the outermost vertex is at least the padding, and hardly more. */
 static void check_boxes(const fct_bvh *bvh, uint32_t ref, tally *found) {
     if (is_leaf(ref)) {
         ++found->leaves;

@@ -231,8 +231,8 @@ void against_brute_force(Soup &soup) {
     fct_dual_release(&env, &dual);
 }
 
-/* Few vertices and many faces: edges of many faces, faces of one vertex twice, duplicates; many vertices and
- * few faces: loose ones; and all between. */
+/* Random meshes. Few vertices and many faces give edges with many faces, faces with a repeated vertex, and
+ * duplicate faces. Many vertices and few faces give loose faces. */
 void random_soups(void **) {
     uint32_t state = 1;
     auto random = [&state](uint32_t count) {

@@ -127,7 +127,7 @@ static inline void assert_same_array(const void *a, const void *b, size_t size) 
     if (a && size) assert_memory_equal(a, b, size);
 }
 
-/* The same arrays bit for bit, but for source_faces. */
+/* Checks that all arrays except source_faces have the same bits. */
 static inline void assert_same_mesh(const fct_mesh *a, const fct_mesh *b) {
     size_t vertices = a->vertex_count, faces = a->face_count;
     assert_int_equal(a->vertex_count, b->vertex_count);

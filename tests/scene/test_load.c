@@ -333,7 +333,7 @@ static void opens_the_hierarchy_beside_a_mesh(void **unused) {
     assert_int_equal(load(&env, "grid.ply", &scene), FCT_OK);
     assert_string_not_equal(fct_tree_get(fct_scene_get(scene).models[0].tree).source, "told by the test");
     fct_scene_destroy(scene);
-    /* a hierarchy that is none is an error, not passed over */
+    /* a broken hierarchy file is an error; it is not ignored */
     write_text("grid.fct", "no hierarchy");
     assert_int_equal(load(&env, "grid.ply", &scene), FCT_ERROR_DATA);
     assert_non_null(strstr(r.text, "grid.fct"));

@@ -1,4 +1,4 @@
-/* One contraction against a copy of the mesh; the order, the cost and the stops of many; the queue. */
+/* One contraction against a copy of the mesh; order, costs and stops of a run; the queue. */
 #include "oracle.h"
 #include "simplify/collapse.h"
 #include "simplify/contract.h"

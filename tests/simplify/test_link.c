@@ -19,7 +19,7 @@ static bool has_face(const complex *k, uint32_t a, uint32_t b, uint32_t c) {
         for (int i = 0; i < 3; ++i) found += t[i] == a || t[i] == b || t[i] == c;
         if (found == 3) return true;
     }
-    /* Each boundary edge spans a triangle with the cone. */
+    /* Each boundary edge forms a triangle with the tip of the cone. */
     uint32_t v[3] = {a, b, c};
     for (int i = 0; i < 3; ++i)
         if (v[i] == CONE) return k->edge_faces[v[(i + 1) % 3]][v[(i + 2) % 3]] == 1;
