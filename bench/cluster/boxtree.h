@@ -21,8 +21,8 @@ typedef struct box_tree {
 /* The boxes of our tree. The box of a leaf is the smallest rectangle around its triangle. */
 void box_tree_take(const fct_mesh *mesh, const fct_tree *tree, box_tree *out);
 /* An OBB tree from the top (Gottschalk, Lin, Manocha 1996). The axes are those of the surface's covariance.
- * The cut is at the mean, across the longest axis that has faces on both sides; if there is none, the faces
- * are halved. */
+ * The cut is at the mean, across the longest axis that has faces on both sides. Without such an axis, the
+ * faces are halved. */
 void box_tree_oriented(const fct_mesh *mesh, box_tree *out);
 /* Axis-aligned boxes by the surface area heuristic with 16 bins. */
 void box_tree_aligned(const fct_mesh *mesh, box_tree *out);

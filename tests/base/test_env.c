@@ -1,5 +1,5 @@
-/* Memory, messages and progress through the caller's environment: sizes that do not fit, alignment, growth
- * that keeps what was there, one line a message, hooks that are absent. */
+/* Memory, messages and progress through the caller's environment: sizes that overflow, alignment, growth that
+ * keeps the old contents, one line per message, absent hooks. */
 #include "support.h"
 
 static void sizes_that_do_not_fit_are_refused(void **state) {

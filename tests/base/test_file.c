@@ -1,5 +1,5 @@
-/* Whole files in and out: what is written is read, an output appears only when it is complete, links and
- * permissions stay, pipes and folders, errors of every kind leave the old file and no temporary one. */
+/* Reading and writing whole files. Written bytes are read back. An output appears only when it is complete.
+ * Links and permissions stay. Every error leaves the old file and no temporary file. Pipes and folders. */
 #define _GNU_SOURCE
 #include "support.h"
 
@@ -40,7 +40,7 @@ static uint32_t files_here(void) {
 typedef struct content {
     const void *data;
     size_t size;
-    fct_result result; /* what the producer says in the end */
+    fct_result result; /* the result of the producer */
 } content;
 
 static fct_result produce(void *user, FILE *stream) {

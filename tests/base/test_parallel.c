@@ -209,7 +209,7 @@ static void a_chunk_that_takes_long_holds_nobody_up(void **state) {
     }
 }
 
-/* What `run` returns in a child process, 99 if it dies or takes longer than a minute. */
+/* Returns the result of `run` in a child process; 99 if it dies or takes longer than a minute. */
 static int in_child(int (*run)(void)) {
     fflush(NULL);
     pid_t child = fork();
@@ -322,7 +322,7 @@ static void progress_rises_and_cancels(void **state) {
             t = (tally){.count = MOST, .grain = 1, .threads = threads};
             assert_int_equal(fct_parallel_for_progress(&env, "test", t.count, t.grain, count_items, &t),
                              FCT_ERROR_CANCELLED);
-            assert_int_equal(stopped.calls, stop); /* and nobody is asked again */
+            assert_int_equal(stopped.calls, stop); /* and the hook is not called again */
             size_t done = 0;
             for (size_t i = 0; i < MOST; ++i) done += t.visits[i];
             assert_true(stop == 1 ? done == 0 : done > 0);

@@ -1,10 +1,10 @@
-/* v3_round and fct_round give what the float holds, also where gcc vectorises the code around them. Without
+/* v3_round and fct_round return the value of the float, also if gcc vectorises the code around them. Without
  * the barrier in base/math/round.h these tests fail under gcc 12 at -O2 and -O3. */
 #include "support.h"
 
 #include "base/math/round.h"
 
-/* As a bound is computed: round, store the floats, go on with what they hold. */
+/* Rounds, stores the floats and continues with their values, as the code that computes bounds does. */
 __attribute__((noinline)) static void round_scaled(const double *in, float *stored, double *held) {
     v3 a = v3_round((v3){in[0] * 3, in[1] * 5, in[2] * 7});
     v3_store(stored, a);

@@ -1,4 +1,5 @@
-/* Every operation on eight or four numbers does to each lane what it says, in either form of the header. */
+/* Compares each operation on eight or four numbers with its scalar meaning, lane by lane, for both forms of
+ * the header. */
 #include "support.h"
 
 #include "base/math/simd_d8.h"

@@ -99,7 +99,7 @@ static void blocks_are_kept_and_replaced(void **state) {
     n.fail_at = 50;
     assert_null(fct_cache_get(&cache, 50));
     assert_int_equal(cache.result, FCT_ERROR_INPUT);
-    n.fail_at = UINT64_MAX; /* what failed is not taken for filled */
+    n.fail_at = UINT64_MAX; /* the cache does not keep a block that failed to load */
     assert_int_equal(number_at(&cache, 801), 801);
     fct_cache_release(&cache);
     assert_int_equal(r.alive, 0);

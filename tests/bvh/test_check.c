@@ -44,8 +44,8 @@ static void made_models_have_no_unexplained_difference(void **state) {
     }
 }
 
-/* Two triangles and a third that lies along a part of their side, joined by faces without area. No ray meets
- * those, and what slips between the others by rounding has slipped through no surface. */
+/* Two triangles, a third one along a part of their side, and faces without area that join them. A ray never
+ * hits faces without area. A ray that slips between the triangles by rounding passes through no surface. */
 static void a_slit_behind_faces_without_area_is_explained(void **state) {
     (void)state;
     static const float positions[8][3] = {{4, -2, 0}, {6, 0, 0}, {4, 0, 0}, {2, 0, 0},

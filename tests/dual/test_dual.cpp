@@ -186,7 +186,7 @@ void odd_faces(void **) {
     fct_dual_release(&env, &dual);
 }
 
-/* What dual.h promises, edge by edge. */
+/* Checks the guarantees of dual.h for each edge. */
 void against_brute_force(Soup &soup) {
     std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> faces; /* of an edge, ascending */
     std::map<std::pair<uint32_t, uint32_t>, double> expected;

@@ -1,5 +1,5 @@
-/* Whatever the bytes are: an error, or a tree on which nothing that a user may ask crashes or hangs, checked
- * or not, verified or not. Checksums are mended first, for no mutation would ever get past them. */
+/* Any bytes give an error, or a tree on which no public call crashes or hangs, with and without a check of
+ * the tree. The fuzzer corrects the checksums first, because otherwise every mutation would fail there. */
 #include <math.h>
 #include <string.h>
 

@@ -105,7 +105,7 @@ static inline void refuse(const char *format, const char *text, const char *mess
     refuse_bytes(format, text, strlen(text), message);
 }
 
-/* Runs the parser with the nth allocation failing, for every n, until it gets through. */
+/* Runs the parser with a failing nth allocation, for n = 1, 2, ... until it succeeds. */
 static inline void starve(const char *format, const void *data, size_t size) {
     for (long n = 1;; ++n) {
         recorder r = {.fail_at = n};

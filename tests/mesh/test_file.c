@@ -136,7 +136,7 @@ static void pipes_are_read_into_memory(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
-/* A save that fails anywhere leaves what was there, and no other file; the same bytes from every run. */
+/* A failed save leaves the old file and no other. Every run writes the same bytes. */
 static void saves_are_whole(void **state) {
     (void)state;
     static const char *const endings[] = {"ply", "obj", "off", "stl", "glb", "om"};

@@ -1,4 +1,4 @@
-/* tests/mesh/test_formats.c: OFF, STL, GLB, OM; what one format writes it reads back; what is refused. */
+/* tests/mesh/test_formats.c: OFF, STL, GLB, OM: writing and reading back; refused files. */
 #include "mesh/color.h"
 #include "mesh_support.h"
 
@@ -188,7 +188,7 @@ static void refuses_glb(void **state) {
     refuse("glb", "glTF", "no GLB file");
 }
 
-/* Saves, loads, and returns what came back. */
+/* Saves a mesh, loads it, and returns the loaded mesh. */
 static fct_mesh there_and_back(const fct_env *env, const fct_mesh *mesh, const char *path, bool ascii) {
     fct_mesh_save_def def = fct_mesh_save_def_default();
     def.ascii = ascii;

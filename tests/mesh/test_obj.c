@@ -1,4 +1,4 @@
-/* tests/mesh/test_obj.c: OBJ: indices of all forms, colours, materials, and what is refused. */
+/* tests/mesh/test_obj.c: OBJ: indices of all forms, colours, materials, refused files. */
 #include "mesh_support.h"
 
 static const char square[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";

@@ -1,4 +1,4 @@
-/* tests/mesh/test_ply.c: PLY in every form, and what is refused. */
+/* tests/mesh/test_ply.c: PLY in every form; refused files. */
 #include "mesh_support.h"
 
 static const char head_ascii[] = "ply\nformat ascii 1.0\n";

@@ -173,7 +173,7 @@ static void noise_is_the_standard_error(void **state) {
     }
 }
 
-/* A shadow border splits the leaves it crosses, down to min_edge, and no others. */
+/* A shadow border splits only the leaves that it crosses, down to min_edge. */
 static void borders_split_leaves(void **state) {
     (void)state;
     fixture f = begin();

@@ -1,5 +1,5 @@
 /* tests/scene/test_gltf.c: glTF scenes: materials, shared meshes, nodes, cameras, buffers in files and in the
- * text, and what is refused. */
+ * text, refused files. */
 #include "support.h"
 
 #include "facetree/scene.h"

@@ -167,7 +167,7 @@ static void cuts_models_by_material(void **unused) {
 }
 
 typedef struct bad {
-    const char *text, *message; /* what the message holds */
+    const char *text, *message; /* a part of the message */
     fct_result result;
 } bad;
 

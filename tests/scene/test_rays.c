@@ -363,7 +363,7 @@ static void volumes_hold_every_instance_once(void **unused) {
     static fct_bounds bounds[3000];
     static fct_volume volumes[6000];
     static const uint32_t counts[] = {1, 2, 3, 9, 500, 3000};
-    for (int kind = 0; kind < 3; ++kind) /* scattered, all the same, growing by the power of two */
+    for (int kind = 0; kind < 3; ++kind) /* scattered; all equal; each twice the one before */
         for (size_t k = 0; k < sizeof counts / sizeof *counts; ++k) {
             for (uint32_t i = 0; i < counts[k]; ++i)
                 for (int c = 0; c < 3; ++c) {

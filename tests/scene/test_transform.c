@@ -204,7 +204,7 @@ static void bounds_hold_the_surface_and_are_tight(void **unused) {
         assert_int_equal(fct_transform_bounds(&env, tree, &view.bounds, m, &bounds), FCT_OK);
         world_bounds(m, &view, low, high);
         for (int k = 0; k < 3; ++k) {
-            /* Boxes of 256 clusters stand out by no more than their own thickness. */
+            /* The boxes of 256 clusters reach beyond the surface by at most their own thickness. */
             assert_true((double)bounds.lower[k] < low[k] && (double)bounds.lower[k] > low[k] - .05);
             assert_true((double)bounds.upper[k] > high[k] && (double)bounds.upper[k] < high[k] + .05);
         }
