@@ -2,8 +2,9 @@
  * spools its nodes and tops.
  *
  * Faces with a side on the cut are frozen: they offer prices but do not merge. A cluster whose cheapest
- * partner is frozen waits too. So both clusters of a merge prefer each other to all neighbours that they will
- * have in the whole model. The clusters that remain, the tops, are small near the cut and large inside.
+ * partner is frozen waits too. So, as a rule, both clusters of a merge prefer each other to all neighbours
+ * that they will have in the whole model. The clusters that remain, the tops, are small near the cut and
+ * large inside.
  *
  * If a part leaves more tops than its share of top_limit, press() goes on, until they fit: contract without
  * frozen faces, join clusters without neighbours by proximity, then join all clusters.

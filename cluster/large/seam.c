@@ -19,8 +19,8 @@ typedef struct seam {
     uint32_t *by_part;    /* sides sorted by vertices, then part, then face */
     uint32_t count;
     double scale;
-    fct_top_edge
-        *edges; /* room for 2 x count: a chain adds fewer than it has sides, and has one sign or the other */
+    /* Room for 2 x count: a chain adds fewer edges than it has sides, and each side is in two chains. */
+    fct_top_edge *edges;
     size_t edge_count;
 } seam;
 
