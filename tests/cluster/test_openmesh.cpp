@@ -1,6 +1,8 @@
 /* The OpenMesh adapter: the same tree as for an fct_mesh, properties by handle, deleted elements, points and
  * colours of every type, errors as exceptions. */
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* in OpenMesh, inlined */
+#ifndef __clang__
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc warns about inlined code of OpenMesh */
+#endif
 
 #include <cmath>
 #include <cstdlib>

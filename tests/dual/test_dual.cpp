@@ -1,5 +1,7 @@
 /* The dual graph against OpenMesh's half-edges on manifold meshes, and by hand on the others. */
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* in OpenMesh, inlined */
+#ifndef __clang__
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc warns about inlined code of OpenMesh */
+#endif
 
 #include <algorithm>
 #include <cmath>
