@@ -102,18 +102,20 @@ static void a_thousand_clusters_read_less_than_a_megabyte(void **state) {
     (void)state;
     fct_env env = fct_env_default();
     fct_tree *tree;
-    uint32_t nodes[2048], count, leaves = 0, faces = 0;
+    uint32_t nodes[2048], count, leaves = 0;
     for (uint32_t k = 1000; k <= 2048; k += 1048) {
         if (!dropped()) skip();
         assert_int_equal(fct_tree_open(&env, path, &tree), FCT_OK);
         assert_int_equal(fct_tree_partition(&env, tree, k, nodes, &count), FCT_OK);
         assert_int_equal(count, k);
+        uint32_t faces = 0;
         for (uint32_t i = 0; i < count; ++i) {
             fct_cluster c;
             assert_int_equal(fct_tree_cluster(tree, nodes[i], &c), FCT_OK);
             leaves += c.count == 1;
             faces += c.count;
         }
+        assert_int_equal(faces, fct_tree_get(tree).face_count);
         /* the nodes above the cut, its ids and its clusters */
         size_t pages = resident(), least = k * sizeof(fct_cluster) / PAGE;
         size_t most = 2048 * (2 * sizeof(fct_cluster) + 4) / PAGE + 4;
