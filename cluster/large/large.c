@@ -12,7 +12,7 @@
 enum {
     PART_BYTES = 235,        /* per face of a part */
     VERTEX_BYTES = 32,       /* per vertex of a part */
-    MEAN_BYTES = 80,         /* more per face with the cost MEAN */
+    MEAN_BYTES = 168,        /* more per face with the cost MEAN: an fct_mean_record */
     TOP_BYTES = 640,         /* per top */
     BUFFER_BYTES = 12 << 20, /* of all buffers */
     LEAST_PART = 1 << 16     /* faces of the smallest part that least_bytes plans for */
