@@ -87,7 +87,9 @@ static inline v3 fct_cosine_direction(v3 n, double u, double v) {
     } else {
         radius = b, angle = b != 0 ? FCT_PI / 2 - FCT_PI / 4 * (a / b) : 0;
     }
-    double x = radius * fct_cos(angle), y = radius * fct_sin(angle), z2 = 1 - radius * radius;
+    double sine, cosine;
+    fct_sine_cosine(angle, &sine, &cosine);
+    double x = radius * cosine, y = radius * sine, z2 = 1 - radius * radius;
     v3 s, t;
     v3_frame(n, &s, &t);
     return v3_mad(v3_mad(v3_scale(n, sqrt(z2 > 0 ? z2 : 0)), x, s), y, t);

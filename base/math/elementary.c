@@ -9,17 +9,19 @@
 
 /* 1 - z/3! + z^2/5! ..., z = x^2: sin(x) / x for |x| <= pi / 4 */
 static double sum_sine(double z) {
-    static const double divisors[] = {16 * 17, 14 * 15, 12 * 13, 10 * 11, 8 * 9, 6 * 7, 4 * 5, 2 * 3};
+    static const double factors[] = {1. / (16 * 17), 1. / (14 * 15), 1. / (12 * 13), 1. / (10 * 11),
+                                     1. / (8 * 9),   1. / (6 * 7),   1. / (4 * 5),   1. / (2 * 3)};
     double sum = 1;
-    for (int i = 0; i < 8; ++i) sum = 1 - z / divisors[i] * sum;
+    for (int i = 0; i < 8; ++i) sum = 1 - z * factors[i] * sum;
     return sum;
 }
 
 /* 1 - z/2! + z^2/4! ...: cos(x) for |x| <= pi / 4 */
 static double sum_cosine(double z) {
-    static const double divisors[] = {17 * 18, 15 * 16, 13 * 14, 11 * 12, 9 * 10, 7 * 8, 5 * 6, 3 * 4};
+    static const double factors[] = {1. / (17 * 18), 1. / (15 * 16), 1. / (13 * 14), 1. / (11 * 12),
+                                     1. / (9 * 10),  1. / (7 * 8),   1. / (5 * 6),   1. / (3 * 4)};
     double sum = 1;
-    for (int i = 0; i < 8; ++i) sum = 1 - z / divisors[i] * sum;
+    for (int i = 0; i < 8; ++i) sum = 1 - z * factors[i] * sum;
     return 1 - 0.5 * z * sum;
 }
 
@@ -51,6 +53,13 @@ double fct_cos(double x) {
     int quadrant;
     double rest = reduce_angle(x, &quadrant);
     return sine_of_quadrant(rest, (quadrant + 1) & 3);
+}
+
+void fct_sine_cosine(double x, double *sine, double *cosine) {
+    int quadrant;
+    double rest = reduce_angle(x, &quadrant);
+    *sine = sine_of_quadrant(rest, quadrant);
+    *cosine = sine_of_quadrant(rest, (quadrant + 1) & 3);
 }
 
 /* t in [0, 1]: atan(t) = atan(c) + atan((t - c) / (1 + t c)) for the nearest c of 0, 1/4, 1/2, 3/4, 1. */

@@ -11,6 +11,8 @@
 /* The absolute error is below 1e-15 for |x| <= 1e5, and 1e-16 |x| beyond. */
 double fct_sin(double x);
 double fct_cos(double x);
+/* Both, with one reduction of the angle. */
+void fct_sine_cosine(double x, double *sine, double *cosine);
 
 /* In [-pi, pi]; 0 if both are 0. Neither may be infinite. */
 double fct_atan2(double y, double x);

@@ -21,6 +21,9 @@ static void sines_and_cosines(void **state) {
         double x = (2 * next_unit(&seed) - 1) * (i % 3 == 0 ? 1e5 : i % 3 == 1 ? 7 : 1e-3);
         assert_true(fabsl((long double)fct_sin(x) - sinl((long double)x)) < 1e-15L);
         assert_true(fabsl((long double)fct_cos(x) - cosl((long double)x)) < 1e-15L);
+        double sine, cosine;
+        fct_sine_cosine(x, &sine, &cosine);
+        assert_true(sine == fct_sin(x) && cosine == fct_cos(x));
         if (fabs(x) < 0.7) assert_true(x == 0 || count_ulps(fct_sin(x), sinl((long double)x)) < 4);
     }
     assert_true(fct_sin(0) == 0 && fct_cos(0) == 1);
