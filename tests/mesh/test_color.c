@@ -39,16 +39,16 @@ static void expect_colors(const char *format, const char *text, const double exp
 
 static void readers_take_integers_for_srgb_and_floats_for_linear(void **state) {
     (void)state;
-    double bytes[9], plain[9] = {.25, .5, 1, 0, .125, .75, .5, .5, .5};
+    double decoded[9], plain[9] = {.25, .5, 1, 0, .125, .75, .5, .5, .5};
     static const int values[9] = {10, 100, 255, 0, 11, 200, 37, 128, 64};
-    for (int i = 0; i < 9; ++i) bytes[i] = linear_of(values[i] / 255.0);
+    for (int i = 0; i < 9; ++i) decoded[i] = linear_of(values[i] / 255.0);
     expect_colors(
         "ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n"
         "property list uchar int vertex_indices\nend_header\n"
         "0 0 0 10 100 255\n1 0 0 0 11 200\n0 1 0 37 128 64\n3 0 1 2\n",
-        bytes);
+        decoded);
     expect_colors(
         "ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -58,7 +58,7 @@ static void readers_take_integers_for_srgb_and_floats_for_linear(void **state) {
         plain);
     expect_colors("off",
                   "COFF\n3 1 0\n0 0 0 10 100 255 255\n1 0 0 0 11 200 255\n0 1 0 37 128 64 255\n3 0 1 2\n",
-                  bytes);
+                  decoded);
     expect_colors("off",
                   "COFF\n3 1 0\n0 0 0 .25 .5 1.0 1.0\n1 0 0 0.0 .125 .75 1.0\n0 1 0 .5 .5 .5 1.0\n3 0 1 2\n",
                   plain);
