@@ -4,7 +4,7 @@
  *   2. Find the eigenvalue farthest from the other two, the largest root of a cubic, with two Newton steps.
  *   3. Take its vector from the two most independent rows.
  *   4. Solve the 2x2 problem in the plane across that vector. This is exact for equal eigenvalues too.
- * Diagonal matrices are treated apart. The only library function is the square root, so every machine gives
+ * Diagonal matrices take another path. The only library function is the square root, so every machine gives
  * the same bits. The cubic: Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961.
  */
 #include "base/math/eigen.h"
@@ -16,11 +16,11 @@ typedef struct w3 {
     d8 x, y, z;
 } w3;
 
-static inline d8 mad(d8 a, d8 b, d8 c) {
+static inline d8 d8_mad(d8 a, d8 b, d8 c) {
     return d8_add(a, d8_mul(b, c));
 }
 static inline d8 w3_dot(w3 a, w3 b) {
-    return mad(mad(d8_mul(a.x, b.x), a.y, b.y), a.z, b.z);
+    return d8_mad(d8_mad(d8_mul(a.x, b.x), a.y, b.y), a.z, b.z);
 }
 static inline w3 w3_cross(w3 a, w3 b) {
     return (w3){d8_sub(d8_mul(a.y, b.z), d8_mul(a.z, b.y)), d8_sub(d8_mul(a.z, b.x), d8_mul(a.x, b.z)),
@@ -31,15 +31,17 @@ static inline w3 w3_scale(w3 a, d8 s) {
 }
 /* s a + t b */
 static inline w3 w3_mix(w3 a, d8 s, w3 b, d8 t) {
-    return (w3){mad(d8_mul(a.x, s), b.x, t), mad(d8_mul(a.y, s), b.y, t), mad(d8_mul(a.z, s), b.z, t)};
+    return (w3){d8_mad(d8_mul(a.x, s), b.x, t), d8_mad(d8_mul(a.y, s), b.y, t),
+                d8_mad(d8_mul(a.z, s), b.z, t)};
 }
 static inline w3 w3_if_lt(d8 p, d8 q, w3 a, w3 b) {
     return (w3){d8_if_lt(p, q, a.x, b.x), d8_if_lt(p, q, a.y, b.y), d8_if_lt(p, q, a.z, b.z)};
 }
-static inline d8 form(const d8 m[6], w3 a, w3 b) {
-    w3 mb = {mad(mad(d8_mul(m[0], b.x), m[1], b.y), m[2], b.z),
-             mad(mad(d8_mul(m[1], b.x), m[3], b.y), m[4], b.z),
-             mad(mad(d8_mul(m[2], b.x), m[4], b.y), m[5], b.z)};
+/* a^T M b */
+static inline d8 d8_form(const d8 m[6], w3 a, w3 b) {
+    w3 mb = {d8_mad(d8_mad(d8_mul(m[0], b.x), m[1], b.y), m[2], b.z),
+             d8_mad(d8_mad(d8_mul(m[1], b.x), m[3], b.y), m[4], b.z),
+             d8_mad(d8_mad(d8_mul(m[2], b.x), m[4], b.y), m[5], b.z)};
     return w3_dot(a, mb);
 }
 
@@ -49,8 +51,8 @@ static inline d8 largest_entry(const d8 m[6]) {
     return most;
 }
 
-/* The unit eigenvector of the simple eigenvalue `value`: across the two most independent rows of b - value I.
- */
+/* The unit eigenvector of the simple eigenvalue `value`: it is perpendicular to the two most independent rows
+ * of b - value I. */
 static inline w3 null_vector(const d8 b[6], d8 value) {
     w3 r0 = {d8_sub(b[0], value), b[1], b[2]}, r1 = {b[1], d8_sub(b[3], value), b[4]};
     w3 r2 = {b[2], b[4], d8_sub(b[5], value)};
@@ -65,8 +67,8 @@ static inline w3 null_vector(const d8 b[6], d8 value) {
 
 /* cos(acos(r) / 3) for r in [0, 1]: the root of 4 c^3 - 3 c = r in [cos(pi / 6), 1]. */
 static inline d8 largest_root(d8 r) {
-    d8 c = mad(d8_set(-0.0408812), d8_set(0.00944362), r);
-    c = mad(d8_set(0.866062), r, mad(d8_set(0.165404), c, r)); /* within .00004 */
+    d8 c = d8_mad(d8_set(-0.0408812), d8_set(0.00944362), r);
+    c = d8_mad(d8_set(0.866062), r, d8_mad(d8_set(0.165404), c, r)); /* within .00004 */
     for (int i = 0; i < 2; ++i) {
         d8 cc4 = d8_mul(d8_set(4), d8_mul(c, c)), three = d8_set(3);
         d8 excess = d8_sub(d8_mul(d8_sub(cc4, three), c), r);
@@ -82,9 +84,9 @@ static inline void half_angle(d8 x, d8 y, d8 *c, d8 *s) {
     d8 least = d8_set(0x1p-1000), known = d8_if_lt(least, largest, one, none);
     d8 invert = d8_div(one, d8_max(largest, least)); /* because squares of tiny numbers lose their digits */
     x = d8_mul(x, invert), y = d8_mul(y, invert);
-    d8 h = d8_div(one, d8_sqrt(mad(d8_mul(x, x), y, y)));
+    d8 h = d8_div(one, d8_sqrt(d8_mad(d8_mul(x, x), y, y)));
     d8 cosine = d8_mul(x, h), sine = d8_mul(y, h);
-    d8 large = d8_sqrt(mad(half, half, d8_abs(cosine))); /* the larger of the two, at least sqrt(1/2) */
+    d8 large = d8_sqrt(d8_mad(half, half, d8_abs(cosine))); /* the larger of the two, at least sqrt(1/2) */
     d8 small = d8_div(d8_mul(half, d8_abs(sine)), large);
     d8 sign = d8_if_lt(y, none, d8_set(-1), one);
     *c = d8_if_lt(none, known, d8_if_lt(x, none, small, large), one);
@@ -92,15 +94,16 @@ static inline void half_angle(d8 x, d8 y, d8 *c, d8 *s) {
 }
 
 /* Two unit vectors that complete w to a right-handed frame (u, v, w) (Duff et al. 2017). */
-static inline void frame(w3 w, w3 *u, w3 *v) {
+static inline void build_frame(w3 w, w3 *u, w3 *v) {
     d8 one = d8_set(1), sign = d8_if_lt(w.z, d8_set(0), d8_set(-1), one), minus = d8_set(-1);
     d8 a = d8_div(minus, d8_add(sign, w.z)), c = d8_mul(d8_mul(w.x, w.y), a);
-    *u = (w3){mad(one, sign, d8_mul(d8_mul(w.x, w.x), a)), d8_mul(sign, c), d8_mul(minus, d8_mul(sign, w.x))};
-    *v = (w3){c, mad(sign, d8_mul(w.y, w.y), a), d8_mul(minus, w.y)};
+    *u = (w3){d8_mad(one, sign, d8_mul(d8_mul(w.x, w.x), a)), d8_mul(sign, c),
+              d8_mul(minus, d8_mul(sign, w.x))};
+    *v = (w3){c, d8_mad(sign, d8_mul(w.y, w.y), a), d8_mul(minus, w.y)};
 }
 
 /* Divides m by its largest entry and returns that entry. */
-static inline d8 normalize(d8 m[6]) {
+static inline d8 scale_to_unit(d8 m[6]) {
     d8 largest = largest_entry(m), tiny = d8_set(0x1p-1000), one = d8_set(1);
     d8 boost = d8_if_lt(largest, tiny, d8_set(0x1p500), one); /* because 1 / tiny overflows */
     d8 invert = d8_div(one, d8_mul(largest, boost));
@@ -109,21 +112,21 @@ static inline d8 normalize(d8 m[6]) {
 }
 
 /* Unit eigenvectors by ascending eigenvalue. No lane of a is diagonal, and its entries are at most 1. */
-static inline void solve(const d8 a[6], w3 vectors[3]) {
+static inline void find_vectors(const d8 a[6], w3 vectors[3]) {
     d8 one = d8_set(1), b[6], third = d8_mul(d8_add(d8_add(a[0], a[3]), a[5]), d8_set(1.0 / 3));
     for (int i = 0; i < 6; ++i) b[i] = i == 0 || i == 3 || i == 5 ? d8_sub(a[i], third) : a[i];
-    normalize(b); /* the rest may be far below 1 */
-    d8 diagonal = mad(mad(d8_mul(b[0], b[0]), b[3], b[3]), b[5], b[5]);
-    d8 others = mad(mad(d8_mul(b[1], b[1]), b[2], b[2]), b[4], b[4]);
-    d8 p = d8_sqrt(d8_mul(mad(diagonal, d8_set(2), others), d8_set(1.0 / 6))), reciprocal = d8_div(one, p);
+    scale_to_unit(b); /* because the entries of b may be far below 1 */
+    d8 diagonal = d8_mad(d8_mad(d8_mul(b[0], b[0]), b[3], b[3]), b[5], b[5]);
+    d8 others = d8_mad(d8_mad(d8_mul(b[1], b[1]), b[2], b[2]), b[4], b[4]);
+    d8 p = d8_sqrt(d8_mul(d8_mad(diagonal, d8_set(2), others), d8_set(1.0 / 6))), reciprocal = d8_div(one, p);
     for (int i = 0; i < 6; ++i) b[i] = d8_mul(b[i], reciprocal);
     d8 r = d8_mul(b[0], d8_sub(d8_mul(b[3], b[5]), d8_mul(b[4], b[4])));
     r = d8_sub(r, d8_mul(b[1], d8_sub(d8_mul(b[1], b[5]), d8_mul(b[4], b[2]))));
-    r = d8_mul(d8_set(0.5), mad(r, b[2], d8_sub(d8_mul(b[1], b[4]), d8_mul(b[3], b[2]))));
+    r = d8_mul(d8_set(0.5), d8_mad(r, b[2], d8_sub(d8_mul(b[1], b[4]), d8_mul(b[3], b[2]))));
     d8 none = d8_set(0), apart = d8_mul(d8_set(2), largest_root(d8_min(d8_abs(r), one)));
     w3 w = null_vector(b, d8_if_lt(r, none, d8_mul(apart, d8_set(-1)), apart)), u, v;
-    frame(w, &u, &v);
-    d8 uu = form(a, u, u), uv = form(a, u, v), vv = form(a, v, v), c, s;
+    build_frame(w, &u, &v);
+    d8 uu = d8_form(a, u, u), uv = d8_form(a, u, v), vv = d8_form(a, v, v), c, s;
     half_angle(d8_sub(uu, vv), d8_add(uv, uv), &c, &s);
     /* the vector of the greater eigenvalue of the plane; its sign makes both frames right-handed */
     w3 greater = w3_scale(w3_mix(u, c, v, s), d8_set(-1)), lesser = w3_mix(v, c, u, d8_mul(s, d8_set(-1)));
@@ -135,7 +138,7 @@ static inline void solve(const d8 a[6], w3 vectors[3]) {
 /* Rounding may swap nearly equal eigenvalues, so the function sorts them. */
 static inline void find_values(const d8 a[6], d8 scale, const w3 vectors[3], d8 values[3]) {
     d8 f[3];
-    for (int i = 0; i < 3; ++i) f[i] = d8_mul(scale, form(a, vectors[i], vectors[i]));
+    for (int i = 0; i < 3; ++i) f[i] = d8_mul(scale, d8_form(a, vectors[i], vectors[i]));
     d8 low = d8_min(f[0], f[1]), high = d8_max(f[0], f[1]), rest = d8_min(high, f[2]);
     values[0] = d8_min(low, rest), values[1] = d8_max(low, rest), values[2] = d8_max(high, f[2]);
 }
@@ -154,7 +157,7 @@ static void solve_diagonal(const double entries[3], double values[3], v3 vectors
     if (v3_dot(v3_cross(vectors[0], vectors[1]), vectors[2]) < 0) vectors[2] = v3_scale(vectors[2], -1);
 }
 
-static inline void put(d8 *a, int lane, double value) {
+static inline void set_lane(d8 *a, int lane, double value) {
     double all[8];
     d8_store(all, *a);
     all[lane] = value;
@@ -167,10 +170,10 @@ static void solve_diagonal_lane(const d8 m[6], int lane, d8 values[3], d8 vector
     for (int i = 0; i < 3; ++i) d8_store(entries[i], m[i == 0 ? 0 : i == 1 ? 3 : 5]);
     solve_diagonal((const double[3]){entries[0][lane], entries[1][lane], entries[2][lane]}, own, axes);
     for (int i = 0; i < 3; ++i) {
-        if (values) put(&values[i], lane, own[i]);
-        put(&vectors[i][0], lane, axes[i].x);
-        put(&vectors[i][1], lane, axes[i].y);
-        put(&vectors[i][2], lane, axes[i].z);
+        if (values) set_lane(&values[i], lane, own[i]);
+        set_lane(&vectors[i][0], lane, axes[i].x);
+        set_lane(&vectors[i][1], lane, axes[i].y);
+        set_lane(&vectors[i][2], lane, axes[i].z);
     }
 }
 
@@ -180,8 +183,8 @@ void fct_eigen3_eight(const d8 m[6], d8 values[3], d8 vectors[3][3]) {
     uint32_t diagonal = 255 & ~d8_lt(none, most);
     w3 found[3];
     for (int i = 0; i < 6; ++i) a[i] = d8_if_lt(none, most, m[i], d8_set(stand_in[i]));
-    d8 scale = normalize(a);
-    solve(a, found);
+    d8 scale = scale_to_unit(a);
+    find_vectors(a, found);
     if (values) find_values(a, scale, found, values);
     for (int i = 0; i < 3; ++i)
         vectors[i][0] = found[i].x, vectors[i][1] = found[i].y, vectors[i][2] = found[i].z;

@@ -7,21 +7,22 @@ static uint32_t little_32(const unsigned char *p) {
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-static fct_result fail(const fct_glb *glb, const char *what) {
+static fct_result fail_glb(const fct_glb *glb, const char *what) {
     return fct_fail(glb->source->env, FCT_ERROR_DATA, "%s: %s", glb->source->name, what);
 }
 
 static fct_result parse_json(fct_glb *glb, const char *text, size_t size) {
     json_error_t error;
     glb->root = json_loadb(text, size, JSON_ALLOW_NUL, &error);
-    if (glb->root) return json_is_object(glb->root) ? FCT_OK : fail(glb, "its JSON is no object");
+    if (glb->root) return json_is_object(glb->root) ? FCT_OK : fail_glb(glb, "its JSON is no object");
     if (json_error_code(&error) == json_error_out_of_memory)
         return fct_fail_memory(glb->source->env, "the JSON of a GLB file");
     return fct_fail(glb->source->env, FCT_ERROR_DATA, "%s: JSON line %d column %d: %s", glb->source->name,
                     error.line, error.column, error.text);
 }
 
-/* Extensions that leave the meaning of what is read here as it is. */
+/* Accepts only extensions that do not change how this reader must interpret positions, attributes and nodes.
+ */
 static fct_result check_extensions(const fct_glb *glb) {
     json_t *required = json_object_get(glb->root, "extensionsRequired"), *item;
     size_t i;
@@ -41,20 +42,20 @@ fct_result fct_glb_open(const fct_source *source, fct_glb *out) {
     *out = (fct_glb){.source = source};
     const unsigned char *p = source->data;
     if (source->size < 20 || memcmp(p, "glTF", 4))
-        return fail(out, "no GLB file: it does not begin with glTF");
-    if (little_32(p + 4) != 2) return fail(out, "only version 2 of glTF is read");
+        return fail_glb(out, "no GLB file: it does not begin with glTF");
+    if (little_32(p + 4) != 2) return fail_glb(out, "only version 2 of glTF is read");
     if (little_32(p + 8) != source->size)
         return fct_fail(source->env, FCT_ERROR_DATA, "%s: its head says %u bytes, but the file has %zu",
                         source->name, little_32(p + 8), source->size);
     size_t json_size = little_32(p + 12), left = source->size - 20;
     if (memcmp(p + 16, "JSON", 4) || json_size > left)
-        return fail(out, "the first chunk is no JSON, or longer than the file");
+        return fail_glb(out, "the first chunk is no JSON, or longer than the file");
     left -= json_size;
     const unsigned char *next = p + 20 + json_size;
     if (left >= 8 && !memcmp(next + 4, "BIN", 4)) {
         out->binary_size = little_32(next);
         out->binary = next + 8;
-        if (out->binary_size > left - 8) return fail(out, "the BIN chunk is longer than the file");
+        if (out->binary_size > left - 8) return fail_glb(out, "the BIN chunk is longer than the file");
     }
     fct_result result = parse_json(out, (const char *)p + 20, json_size);
     return result == FCT_OK ? check_extensions(out) : result;
@@ -99,16 +100,16 @@ static int component_size(int64_t component) {
     }
 }
 
-static int width_of(const char *type) {
+static int count_components(const char *type) {
     static const char *const names[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
     for (int i = 0; type && i < 4; ++i)
         if (!strcmp(type, names[i])) return i + 1;
     return 0;
 }
 
-/* The bytes of a buffer view. */
-static fct_result view_of(const fct_glb *glb, int64_t index, const unsigned char **data, size_t *size,
-                          int64_t *stride) {
+/* Finds the bytes of a buffer view. Only buffer 0, the BIN chunk, is supported. */
+static fct_result find_view(const fct_glb *glb, int64_t index, const unsigned char **data, size_t *size,
+                            int64_t *stride) {
     json_t *view, *buffer;
     int64_t number, offset, length;
     fct_result result = fct_glb_item(glb, "bufferViews", index, &view);
@@ -119,7 +120,7 @@ static fct_result view_of(const fct_glb *glb, int64_t index, const unsigned char
     if (result == FCT_OK) result = fct_glb_item(glb, "buffers", number, &buffer);
     if (result != FCT_OK) return result;
     if (number || json_object_get(buffer, "uri") || !glb->binary)
-        return fail(glb, "a buffer outside the file, which is not read");
+        return fail_glb(glb, "a buffer outside the file, which is not read");
     if (offset < 0) offset = 0;
     if (length < 0 || (uint64_t)offset > glb->binary_size ||
         (uint64_t)length > glb->binary_size - (uint64_t)offset)
@@ -140,14 +141,14 @@ fct_result fct_glb_array_of(const fct_glb *glb, int64_t index, int least, int mo
     if (result == FCT_OK) result = fct_glb_index(glb, accessor, "componentType", &component);
     if (result == FCT_OK) result = fct_glb_index(glb, accessor, "count", &count);
     if (result != FCT_OK) return result;
-    int width = width_of(json_string_value(json_object_get(accessor, "type")));
+    int width = count_components(json_string_value(json_object_get(accessor, "type")));
     if (!component_size(component) || width < least || width > most || count < 0)
         return fct_fail(glb->source->env, FCT_ERROR_DATA, "%s: accessor %lld is not of the type expected",
                         glb->source->name, (long long)index);
     if (json_object_get(accessor, "sparse") || view == FCT_GLB_ABSENT)
         return fct_fail(glb->source->env, FCT_ERROR_DATA, "%s: accessor %lld is sparse, which is not read",
                         glb->source->name, (long long)index);
-    result = view_of(glb, view, &out->data, &size, &stride);
+    result = find_view(glb, view, &out->data, &size, &stride);
     if (result != FCT_OK) return result;
     uint64_t element = (uint64_t)width * (uint64_t)component_size(component);
     uint64_t step = stride > 0 ? (uint64_t)stride : element, begin = offset > 0 ? (uint64_t)offset : 0;

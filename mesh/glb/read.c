@@ -1,10 +1,10 @@
-/* mesh/glb/read.c: the meshes of a GLB file, placed by their nodes, as one soup.
+/* mesh/glb/read.c: places the meshes of a GLB file by their nodes and joins them to one soup.
  *
- * Nodes are visited in the order of the scene, each once (a node with two parents is an error, so there are
- * no cycles). Primitives of one mesh that share their arrays share their vertices. Triangles, strips and fans
- * become triangles, points become vertices; a mirroring transform reverses the winding, as the specification
- * requires. Cameras, lights, skins and animations are left out. The size of the file bounds the number of
- * placed elements, so that a short file of many references cannot exhaust the memory.
+ * The reader visits each node once, in the order of the scene. A node with two parents is an error, so there
+ * are no cycles. Consecutive primitives of a mesh that use the same accessors share their vertices. Lists,
+ * strips and fans become triangles; points become vertices. A mirroring transform reverses the winding, as
+ * the specification demands. Cameras, lights, skins and animations are ignored. The size of the file limits
+ * the number of vertices and triangles, so that a short file with many references cannot exhaust the memory.
  */
 #include "mesh/glb/read.h"
 
@@ -40,7 +40,7 @@ typedef struct reader {
     unsigned char *visited;
     size_t node_count, vertex_capacity, color_capacity, normal_capacity, corner_capacity, texcoord_capacity,
         material_capacity;
-    uint32_t unnamed; /* number of the material of primitives that have none */
+    uint32_t unnamed; /* number of the material that primitives without one get */
 } reader;
 
 static size_t count_of(const reader *r, const char *name) {
@@ -62,8 +62,9 @@ static fct_result read_primitive(const reader *r, json_t *object, primitive *out
     return result;
 }
 
-/* Arrays that some primitive has (colours, texture coordinates, materials) or that all have (normals). */
-static fct_result survey(reader *r) {
+/* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
+ * normals if all primitives have them. */
+static fct_result choose_arrays(reader *r) {
     json_t *meshes = json_object_get(r->glb.root, "meshes"), *mesh, *object;
     size_t i, j;
     r->has_normals = true;
@@ -85,7 +86,7 @@ static fct_result survey(reader *r) {
     return FCT_OK;
 }
 
-/* The file's materials in its order, and one without a name for primitives that have none. */
+/* Numbers the materials as the file does. Adds one with an empty name if a primitive has no material. */
 static fct_result name_materials(reader *r) {
     if (!r->has_materials) return FCT_OK;
     size_t count = count_of(r, "materials");
@@ -104,7 +105,7 @@ static fct_result name_materials(reader *r) {
     return FCT_OK;
 }
 
-static transform compose(const transform *a, const transform *b) {
+static transform compose_transforms(const transform *a, const transform *b) {
     transform c = {.identity = a->identity && b->identity};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 4; ++j) {
@@ -115,7 +116,7 @@ static transform compose(const transform *a, const transform *b) {
     return c;
 }
 
-/* Reads `count` numbers of an array; leaves them as they are when there is none. */
+/* Reads the `count` numbers of object[key]. Leaves the values unchanged if there is no such key. */
 static fct_result read_numbers(const reader *r, json_t *object, const char *key, size_t count, double *values,
                                bool *there) {
     json_t *array = json_object_get(object, key);
@@ -130,7 +131,7 @@ static fct_result read_numbers(const reader *r, json_t *object, const char *key,
               : fct_fail(r->env, FCT_ERROR_DATA, "%s: a node's %s is not %zu numbers", r->name, key, count);
 }
 
-static fct_result local_transform(const reader *r, json_t *node, transform *out) {
+static fct_result read_transform(const reader *r, json_t *node, transform *out) {
     double matrix[16], t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
     bool has_matrix = false, has_parts = false;
     fct_result result = read_numbers(r, node, "matrix", 16, matrix, &has_matrix);
@@ -149,18 +150,18 @@ static fct_result local_transform(const reader *r, json_t *node, transform *out)
     return FCT_OK;
 }
 
-static double cofactor(const double *m, int i, int j) {
+static double compute_cofactor(const double *m, int i, int j) {
     int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
     return m[4 * a + c] * m[4 * b + d] - m[4 * a + d] * m[4 * b + c];
 }
 
-static bool mirrors(const transform *t) {
+static bool is_mirroring(const transform *t) {
     double determinant = 0;
-    for (int j = 0; j < 3; ++j) determinant += t->m[j] * cofactor(t->m, 0, j);
+    for (int j = 0; j < 3; ++j) determinant += t->m[j] * compute_cofactor(t->m, 0, j);
     return determinant < 0;
 }
 
-static fct_result put_positions(reader *r, const transform *t, const fct_glb_array *positions) {
+static fct_result append_positions(reader *r, const transform *t, const fct_glb_array *positions) {
     float *to = r->soup->positions + 3 * (size_t)r->soup->vertex_count;
     for (size_t v = 0; v < positions->count; ++v) {
         double p[3];
@@ -176,17 +177,16 @@ static fct_result put_positions(reader *r, const transform *t, const fct_glb_arr
     return FCT_OK;
 }
 
-/* Normals turn with the cofactors of the transform, which hold for any scale; their length is 1 afterwards.
- */
-static void put_normals(reader *r, const transform *t, const fct_glb_array *normals) {
+/* Multiplies normals by the cofactor matrix, which is right for any scale, and makes them unit vectors. */
+static void append_normals(reader *r, const transform *t, const fct_glb_array *normals) {
     float *to = r->soup->normals + 3 * (size_t)r->soup->vertex_count;
-    double sign = mirrors(t) ? -1 : 1;
+    double sign = is_mirroring(t) ? -1 : 1;
     for (size_t v = 0; v < normals->count; ++v) {
         double n[3], turned[3], length = 0;
         for (int k = 0; k < 3; ++k) n[k] = fct_glb_value(normals, v, k);
         for (int k = 0; k < 3; ++k) {
             turned[k] = 0;
-            for (int j = 0; j < 3; ++j) turned[k] += sign * cofactor(t->m, k, j) * n[j];
+            for (int j = 0; j < 3; ++j) turned[k] += sign * compute_cofactor(t->m, k, j) * n[j];
             length += turned[k] * turned[k];
         }
         length = sqrt(length);
@@ -210,7 +210,7 @@ static fct_result grow_vertices(reader *r, size_t count) {
     if (total > r->limit || total > FCT_MESH_LIMIT)
         return fct_fail(r->env, FCT_ERROR_DATA, "%s: its nodes place more than %llu vertices", r->name,
                         (unsigned long long)r->limit);
-    size_t room = total > 0 ? total : 1; /* no array is NULL, whatever follows */
+    size_t room = total > 0 ? total : 1; /* so that no array is NULL */
     fct_result result =
         fct_grow(r->env, (void **)&soup->positions, &r->vertex_capacity, room, 3 * sizeof(float));
     if (result == FCT_OK && r->has_colors)
@@ -221,17 +221,17 @@ static fct_result grow_vertices(reader *r, size_t count) {
 }
 
 /* Appends the primitive's vertices. */
-static fct_result put_vertices(reader *r, const transform *t, const primitive *p) {
+static fct_result append_vertices(reader *r, const transform *t, const primitive *p) {
     fct_soup *soup = r->soup;
     fct_glb_array positions, values;
     fct_result result = fct_glb_array_of(&r->glb, p->position, 3, 3, &positions);
     if (result == FCT_OK) result = grow_vertices(r, positions.count);
-    if (result == FCT_OK) result = put_positions(r, t, &positions);
+    if (result == FCT_OK) result = append_positions(r, t, &positions);
     if (result != FCT_OK) return result;
     if (r->has_normals) {
         result = get_array(r, p->normal, 3, 3, positions.count, &values);
         if (result != FCT_OK) return result;
-        put_normals(r, t, &values);
+        append_normals(r, t, &values);
     }
     if (r->has_colors) {
         float *to = soup->colors + 3 * (size_t)soup->vertex_count;
@@ -262,8 +262,8 @@ static fct_result grow_corners(reader *r, size_t corners) {
     return result;
 }
 
-/* Places in the index list of triangle k of a list, a strip or a fan. */
-static void triangle_places(int64_t mode, size_t k, size_t places[3]) {
+/* Finds the three places in the index list that form triangle k of a list (4), strip (5) or fan (6). */
+static void find_places(int64_t mode, size_t k, size_t places[3]) {
     if (mode == 4) {
         for (size_t j = 0; j < 3; ++j) places[j] = 3 * k + j;
     } else if (mode == 5) {
@@ -273,8 +273,8 @@ static void triangle_places(int64_t mode, size_t k, size_t places[3]) {
     }
 }
 
-/* Appends the primitive's triangles, whose vertices begin at `first`. */
-static fct_result put_triangles(reader *r, const primitive *p, uint32_t first, bool turn) {
+/* Appends the primitive's triangles. Its vertices begin at `first`. turn: reverse the winding. */
+static fct_result append_triangles(reader *r, const primitive *p, uint32_t first, bool turn) {
     fct_soup *soup = r->soup;
     fct_glb_array indices = {0}, texcoords = {0};
     size_t vertices = soup->vertex_count - first, count = vertices;
@@ -294,7 +294,7 @@ static fct_result put_triangles(reader *r, const primitive *p, uint32_t first, b
     if (result != FCT_OK) return result;
     for (size_t k = 0; k < triangles; ++k) {
         size_t places[3];
-        triangle_places(p->mode, k, places);
+        find_places(p->mode, k, places);
         for (size_t j = 0; j < 3; ++j) {
             size_t place = places[turn && j ? 3 - j : j], corner = soup->corner_count + j;
             double index = p->indices >= 0 ? fct_glb_value(&indices, place, 0) : (double)place;
@@ -315,19 +315,19 @@ static fct_result put_triangles(reader *r, const primitive *p, uint32_t first, b
     return FCT_OK;
 }
 
-static bool same_vertices(const primitive *a, const primitive *b) {
+static bool share_vertices(const primitive *a, const primitive *b) {
     return a->position == b->position && a->normal == b->normal && a->color == b->color &&
            a->radiosity == b->radiosity;
 }
 
-static fct_result put_mesh(reader *r, int64_t index, const transform *t) {
+static fct_result append_mesh(reader *r, int64_t index, const transform *t) {
     json_t *mesh, *object;
     size_t i;
     fct_result result = fct_glb_item(&r->glb, "meshes", index, &mesh);
     if (result != FCT_OK) return result;
     primitive before = {.position = FCT_GLB_ABSENT};
     uint32_t first = 0;
-    bool turn = mirrors(t);
+    bool turn = is_mirroring(t);
     json_array_foreach(json_object_get(mesh, "primitives"), i, object) {
         primitive p;
         result = read_primitive(r, object, &p);
@@ -340,18 +340,18 @@ static fct_result put_mesh(reader *r, int64_t index, const transform *t) {
             ++r->lines;
             continue;
         }
-        if (!same_vertices(&before, &p)) {
+        if (!share_vertices(&before, &p)) {
             first = r->soup->vertex_count;
-            result = put_vertices(r, t, &p);
+            result = append_vertices(r, t, &p);
         }
-        if (result == FCT_OK && p.mode) result = put_triangles(r, &p, first, turn);
+        if (result == FCT_OK && p.mode) result = append_triangles(r, &p, first, turn);
         if (result != FCT_OK) return result;
         before = p;
     }
     return FCT_OK;
 }
 
-static fct_result push(reader *r, json_t *nodes, const transform *to_world) {
+static fct_result push_nodes(reader *r, json_t *nodes, const transform *to_world) {
     for (size_t i = json_array_size(nodes); i-- > 0;) {
         json_t *item = json_array_get(nodes, i);
         if (!json_is_integer(item))
@@ -373,15 +373,15 @@ static fct_result visit_node(reader *r, const visit *v) {
     r->visited[v->node] = 1;
     transform local;
     int64_t mesh;
-    result = local_transform(r, node, &local);
+    result = read_transform(r, node, &local);
     if (result == FCT_OK) result = fct_glb_index(&r->glb, node, "mesh", &mesh);
     if (result != FCT_OK) return result;
-    transform t = compose(&v->to_world, &local);
-    if (mesh >= 0) result = put_mesh(r, mesh, &t);
-    return result == FCT_OK ? push(r, json_object_get(node, "children"), &t) : result;
+    transform t = compose_transforms(&v->to_world, &local);
+    if (mesh >= 0) result = append_mesh(r, mesh, &t);
+    return result == FCT_OK ? push_nodes(r, json_object_get(node, "children"), &t) : result;
 }
 
-/* Puts the nodes where the walk begins onto the stack: those of the scene, else all that are no children. */
+/* Pushes the root nodes: those of the scene, or all nodes without a parent if the file has no scene. */
 static fct_result push_roots(reader *r, const transform *identity) {
     int64_t scene;
     json_t *object;
@@ -390,7 +390,7 @@ static fct_result push_roots(reader *r, const transform *identity) {
     if (scene == FCT_GLB_ABSENT && count_of(r, "scenes")) scene = 0;
     if (scene != FCT_GLB_ABSENT) {
         result = fct_glb_item(&r->glb, "scenes", scene, &object);
-        return result == FCT_OK ? push(r, json_object_get(object, "nodes"), identity) : result;
+        return result == FCT_OK ? push_nodes(r, json_object_get(object, "nodes"), identity) : result;
     }
     unsigned char *child = fct_allocate_zero(r->env, r->node_count, 1);
     if (!child) return fct_fail_memory(r->env, "nodes");
@@ -411,13 +411,13 @@ static fct_result push_roots(reader *r, const transform *identity) {
     return result;
 }
 
-static fct_result walk(reader *r) {
+static fct_result visit_scene(reader *r) {
     transform identity = {.m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, .identity = true};
     fct_result result = FCT_OK;
     r->node_count = count_of(r, "nodes");
-    if (!r->node_count) { /* a library of meshes that nothing places */
+    if (!r->node_count) { /* without nodes, each mesh is placed once */
         for (size_t i = 0; result == FCT_OK && i < count_of(r, "meshes"); ++i)
-            result = put_mesh(r, (int64_t)i, &identity);
+            result = append_mesh(r, (int64_t)i, &identity);
         return result;
     }
     r->visited = fct_allocate_zero(r->env, r->node_count, 1);
@@ -431,7 +431,7 @@ static fct_result walk(reader *r) {
     return result;
 }
 
-static void tell(const reader *r) {
+static void report_left_out(const reader *r) {
     if (r->without_color)
         fct_note(r->env, FCT_MESSAGE_WARNING, "%s: %zu vertices have no colour and get white", r->name,
                  r->without_color);
@@ -448,17 +448,17 @@ fct_result fct_read_glb(const fct_source *source, fct_soup *out) {
                 .soup = out,
                 .limit = 64 * (uint64_t)source->size + 4000000};
     fct_result result = fct_glb_open(source, &r.glb);
-    if (result == FCT_OK) result = survey(&r);
+    if (result == FCT_OK) result = choose_arrays(&r);
     if (result == FCT_OK) result = name_materials(&r);
     if (result == FCT_OK) result = grow_vertices(&r, 0);
     if (result == FCT_OK) result = grow_corners(&r, 0);
     if (result == FCT_OK && !out->positions) out->positions = fct_allocate(r.env, 0, 1);
     if (result == FCT_OK && !out->corners) out->corners = fct_allocate(r.env, 0, 1);
     if (result == FCT_OK && (!out->positions || !out->corners)) result = fct_fail_memory(r.env, "a mesh");
-    if (result == FCT_OK) result = walk(&r);
+    if (result == FCT_OK) result = visit_scene(&r);
     if (result == FCT_OK) {
         out->polygon_count = (uint32_t)(out->corner_count / 3);
-        tell(&r);
+        report_left_out(&r);
     }
     fct_glb_close(&r.glb);
     fct_release(r.env, r.stack);

@@ -1,9 +1,9 @@
-/* mesh/glb/write.c: glTF 2.0 binary: one mesh, one primitive a material, which share their vertices.
+/* mesh/glb/write.c: writes glTF 2.0 binary: one mesh, one primitive per material, shared vertices.
  *
- * A coloured mesh is unlit (KHR_materials_unlit): COLOR_0 holds the exposed, clamped, linear colours as
- * normalized shorts, _RADIOSITY the colours as they are. Texture coordinates belong to vertices in glTF: a
- * vertex whose corners have different ones is repeated behind the last vertex. Everything is little endian
- * and aligned to four bytes; the JSON is made first, for the file begins with its length.
+ * A coloured mesh is unlit (KHR_materials_unlit). COLOR_0 holds the exposed, clamped, linear colours as
+ * normalized shorts; _RADIOSITY holds the unchanged colours. In glTF, texture coordinates belong to vertices,
+ * so a vertex whose corners have different ones is repeated after the last vertex. All data are little endian
+ * and aligned to four bytes. The JSON is made first, because its length comes before it in the file.
  */
 #define _GNU_SOURCE
 #include "mesh/glb/write.h"
@@ -15,20 +15,20 @@
 #include "base/env.h"
 #include "base/math/vec.h"
 
-/* The vertices as they are written and the corners' indices into them. */
+/* The vertices in the file, and the corners' indices into them. */
 typedef struct layout {
     uint32_t vertex_count;
-    uint32_t *origins; /* vertex of the mesh of each, NULL: the same */
+    uint32_t *origins; /* mesh vertex of each file vertex, NULL: the same */
     float *texcoords;  /* vertex_count x 2, or NULL */
-    uint32_t *corners; /* 3 x face_count, NULL: those of the mesh */
-    uint32_t *order;   /* faces by material, NULL: as they are */
-    uint32_t *firsts;  /* material_count + 1 places in order, NULL: all one */
+    uint32_t *corners; /* 3 x face_count, NULL: the triangles of the mesh */
+    uint32_t *order;   /* faces sorted by material, NULL: mesh order */
+    uint32_t *firsts;  /* material_count + 1 places in `order`, NULL: one material */
 } layout;
 
 enum { LONGEST_CHAIN = 64 };
 
-/* Finds or appends the copy of the corner's vertex with its texture coordinates. Long chains are given up, at
- * the price of repeated vertices. */
+/* Returns the copy of `vertex` that has these texture coordinates, or appends one. The search stops after
+ * LONGEST_CHAIN copies, so that it takes constant time; it may then append a copy that already exists. */
 static uint32_t place_corner(const float *uv, uint32_t vertex, layout *l, uint32_t *next,
                              unsigned char *used) {
     uint32_t at = vertex;
@@ -76,14 +76,15 @@ static fct_result order_faces(const fct_sink *sink, layout *l) {
                                 FCT_ARRAY_ZERO(l->firsts, (size_t)m->material_count + 2)};
     fct_result result = fct_allocate_all(sink->env, arrays, FCT_LENGTH(arrays), "materials");
     if (result != FCT_OK) return result;
-    /* firsts[i + 1] counts up from where material i begins to where it ends, which is where i + 1 begins. */
+    /* While faces are placed, firsts[i + 1] is the next place of material i. It ends as the first of i + 1.
+     */
     for (uint32_t f = 0; f < m->face_count; ++f) ++l->firsts[m->materials[f] + 2];
     for (uint32_t i = 2; i <= m->material_count; ++i) l->firsts[i] += l->firsts[i - 1];
     for (uint32_t f = 0; f < m->face_count; ++f) l->order[l->firsts[m->materials[f] + 1]++] = f;
     return FCT_OK;
 }
 
-/* A JSON string. Bytes that are no UTF-8 are taken for Latin-1. */
+/* Prints a JSON string. Bytes that are not UTF-8 are read as Latin-1. */
 static void print_string(FILE *json, const char *text) {
     const unsigned char *p = (const unsigned char *)text;
     fputc('"', json);
@@ -127,8 +128,7 @@ static void print_materials(const fct_sink *sink, FILE *json) {
     fprintf(json, "]");
 }
 
-/* Bounds of the positions, which the accessor has to tell exactly: every float prints whole with 17 digits.
- */
+/* glTF demands the exact bounds of the positions. 17 digits print every float exactly. */
 static void print_bounds(const fct_sink *sink, FILE *json) {
     const fct_mesh *m = sink->mesh;
     float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -259,14 +259,14 @@ static void write_floats(FILE *stream, const float *values, int count) {
     }
 }
 
-static size_t origin(const layout *l, uint32_t i) {
+static size_t find_origin(const layout *l, uint32_t i) {
     return l->origins ? l->origins[i] : i;
 }
 
-/* Normals have length 1 in glTF; one that has no direction points along z. */
+/* glTF demands unit normals. A zero normal becomes (0, 0, 1). */
 static void write_normals(const fct_mesh *m, const layout *l, FILE *stream) {
     for (uint32_t i = 0; i < l->vertex_count; ++i) {
-        v3 n = v3_unit(v3_load(m->normals + 3 * origin(l, i)));
+        v3 n = v3_unit(v3_load(m->normals + 3 * find_origin(l, i)));
         float values[3];
         v3_store(values, v3_norm2(n) > 0 ? n : v3_make(0, 0, 1));
         write_floats(stream, values, 3);
@@ -276,7 +276,7 @@ static void write_normals(const fct_mesh *m, const layout *l, FILE *stream) {
 static void write_colors(const fct_sink *sink, const layout *l, FILE *stream) {
     for (uint32_t i = 0; i < l->vertex_count; ++i) {
         for (int k = 0; k < 3; ++k) {
-            double x = (double)sink->mesh->colors[3 * origin(l, i) + k] * (double)sink->def->exposure;
+            double x = (double)sink->mesh->colors[3 * find_origin(l, i) + k] * (double)sink->def->exposure;
             write_16(stream, (unsigned)(65535 * (x < 0 ? 0 : x < 1 ? x : 1) + .5));
         }
         write_16(stream, 65535);
@@ -285,11 +285,13 @@ static void write_colors(const fct_sink *sink, const layout *l, FILE *stream) {
 
 static void write_binary(const fct_sink *sink, const layout *l, FILE *stream) {
     const fct_mesh *m = sink->mesh;
-    for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, m->positions + 3 * origin(l, i), 3);
+    for (uint32_t i = 0; i < l->vertex_count; ++i)
+        write_floats(stream, m->positions + 3 * find_origin(l, i), 3);
     if (m->normals) write_normals(m, l, stream);
     if (m->colors) {
         write_colors(sink, l, stream);
-        for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, m->colors + 3 * origin(l, i), 3);
+        for (uint32_t i = 0; i < l->vertex_count; ++i)
+            write_floats(stream, m->colors + 3 * find_origin(l, i), 3);
     }
     if (l->texcoords)
         for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, l->texcoords + 2 * (size_t)i, 2);

@@ -1,5 +1,5 @@
-// mesh/om/openmesh.hpp: what the OM reader and writer share. OpenMesh's readers and writers are singletons
-// that keep state, and report on std::cerr: while a call_guard lives, this is the only call and nothing is
+// mesh/om/openmesh.hpp: a guard for calls of OpenMesh. OpenMesh's readers and writers are singletons with
+// state, and print to std::cerr. While a call_guard exists, no other thread is inside OpenMesh and nothing is
 // printed.
 #ifndef FCT_MESH_OPENMESH_HPP
 #define FCT_MESH_OPENMESH_HPP

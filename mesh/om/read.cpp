@@ -1,10 +1,10 @@
-// mesh/om/read.cpp: OM files through OpenMesh's reader, behind extern "C".
+// mesh/om/read.cpp: reads OM files with OpenMesh's reader, behind extern "C".
 //
-// OM holds half-edges, not faces with corners. An importer of our own keeps the records as they come and
-// walks each face's half-edges afterwards, so that faces keep their order and non-manifold ones are not
-// detached as in a mesh of OpenMesh. Before the reader sees the file its chunks are walked and must fill it
-// exactly, for the reader believes the counts in the head and dereferences a mesh it does not have at named
-// properties (refused here).
+// OM stores half-edges, not faces with corners. Our importer stores the records unchanged, then follows the
+// half-edges of each face. Faces keep their order, and non-manifold faces stay connected (a mesh of OpenMesh
+// would detach them). check_chunks runs before the reader, because the reader trusts the counts in the
+// header, and at named properties dereferences a mesh that does not exist. The chunks must fill the file
+// exactly, and named properties are an error.
 #include <algorithm>
 #include <cstring>
 #include <istream>
@@ -28,7 +28,7 @@ namespace {
 using namespace OpenMesh;
 using IO::OMFormat::Chunk;
 
-// The elements in the order of the reader. Edge e has the half-edges 2e and 2e + 1.
+// Receives the records from OpenMesh's reader, in file order. Half-edges 2e and 2e + 1 belong to edge e.
 class soup_importer : public IO::BaseImporter {
   public:
     struct half {
@@ -65,31 +65,39 @@ class soup_importer : public IO::BaseImporter {
     void set_next(HalfedgeHandle h, HalfedgeHandle next) override {
         if (h.idx() >= 0 && size_t(h.idx()) < halves.size()) halves[size_t(h.idx())].next = next.idx();
     }
-    void set_point(VertexHandle v, const Vec3f &p) override { put(points, v, p.data(), 3, n_vertices()); }
-    void set_normal(VertexHandle v, const Vec3f &n) override { put(normals, v, n.data(), 3, n_vertices()); }
+    void set_point(VertexHandle v, const Vec3f &p) override { store(points, v, p.data(), 3, n_vertices()); }
+    void set_normal(VertexHandle v, const Vec3f &n) override { store(normals, v, n.data(), 3, n_vertices()); }
     void set_normal(VertexHandle v, const Vec3d &n) override {
         set_normal(v, Vec3f(float(n[0]), float(n[1]), float(n[2])));
     }
-    void set_color(VertexHandle v, const Vec3uc &c) override { put_bytes(colors, v, c.data(), n_vertices()); }
-    void set_color(VertexHandle v, const Vec4uc &c) override { put_bytes(colors, v, c.data(), n_vertices()); }
-    void set_color(VertexHandle v, const Vec3f &c) override { put(colors, v, c.data(), 3, n_vertices()); }
-    void set_color(VertexHandle v, const Vec4f &c) override { put(colors, v, c.data(), 3, n_vertices()); }
-    void set_color(FaceHandle f, const Vec3uc &c) override { put_bytes(face_colors, f, c.data(), n_faces()); }
-    void set_color(FaceHandle f, const Vec4uc &c) override { put_bytes(face_colors, f, c.data(), n_faces()); }
-    void set_color(FaceHandle f, const Vec3f &c) override { put(face_colors, f, c.data(), 3, n_faces()); }
-    void set_color(FaceHandle f, const Vec4f &c) override { put(face_colors, f, c.data(), 3, n_faces()); }
+    void set_color(VertexHandle v, const Vec3uc &c) override {
+        store_bytes(colors, v, c.data(), n_vertices());
+    }
+    void set_color(VertexHandle v, const Vec4uc &c) override {
+        store_bytes(colors, v, c.data(), n_vertices());
+    }
+    void set_color(VertexHandle v, const Vec3f &c) override { store(colors, v, c.data(), 3, n_vertices()); }
+    void set_color(VertexHandle v, const Vec4f &c) override { store(colors, v, c.data(), 3, n_vertices()); }
+    void set_color(FaceHandle f, const Vec3uc &c) override {
+        store_bytes(face_colors, f, c.data(), n_faces());
+    }
+    void set_color(FaceHandle f, const Vec4uc &c) override {
+        store_bytes(face_colors, f, c.data(), n_faces());
+    }
+    void set_color(FaceHandle f, const Vec3f &c) override { store(face_colors, f, c.data(), 3, n_faces()); }
+    void set_color(FaceHandle f, const Vec4f &c) override { store(face_colors, f, c.data(), 3, n_faces()); }
     void set_texcoord(VertexHandle v, const Vec2f &t) override {
-        put(texcoords, v, t.data(), 2, n_vertices());
+        store(texcoords, v, t.data(), 2, n_vertices());
     }
     void set_texcoord(HalfedgeHandle h, const Vec2f &t) override {
-        put(half_texcoords, h, t.data(), 2, halves.size());
+        store(half_texcoords, h, t.data(), 2, halves.size());
     }
     size_t n_vertices() const override { return points.size() / 3; }
     size_t n_faces() const override { return face_halves.size() + starts.size() - 1; }
     size_t n_edges() const override { return halves.size() / 2; }
     BaseKernel *kernel() override { return &no_properties; }
 
-    // Counts of data that a soup cannot store.
+    // A soup cannot hold these.
     void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<Vec2f> &) override {}
     void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<Vec3f> &) override {}
     void set_face_texindex(FaceHandle, int) override {}
@@ -111,17 +119,17 @@ class soup_importer : public IO::BaseImporter {
     void add_texture_information(int, std::string) override {}
 
   private:
-    BaseKernel no_properties; // the reader gives up without one
+    BaseKernel no_properties; // because the reader fails without one
 
-    static void put(std::vector<float> &to, BaseHandle h, const float *values, size_t width, size_t count) {
+    static void store(std::vector<float> &to, BaseHandle h, const float *values, size_t width, size_t count) {
         if (h.idx() < 0 || size_t(h.idx()) >= count) return;
         if (to.size() < count * width) to.resize(count * width, 0.f);
         std::memcpy(to.data() + size_t(h.idx()) * width, values, width * sizeof(float));
     }
-    static void put_bytes(std::vector<float> &to, BaseHandle h, const unsigned char *c, size_t count) {
+    static void store_bytes(std::vector<float> &to, BaseHandle h, const unsigned char *c, size_t count) {
         float linear[3];
         for (int k = 0; k < 3; ++k) linear[k] = fct_linear_from_srgb(c[k] / 255.0);
-        put(to, h, linear, 3, count);
+        store(to, h, linear, 3, count);
     }
 };
 
@@ -140,13 +148,13 @@ fct_result fail_om(const fct_source *s, const char *what) {
     return fct_fail(s->env, FCT_ERROR_DATA, "%s: %s", s->name, what);
 }
 
-// The kinds of chunks that are let through: OpenMesh asserts that others do not come, which in Debian's build
-// ends the program. Ids of topology: a half-edge is its next, its vertex and its face; a vertex or a face is
-// a half-edge.
+// The supported kinds of chunks. Any other chunk is an error, because OpenMesh asserts on it, and Debian's
+// build keeps asserts. Topology: a half-edge stores its next half-edge, vertex and face; a vertex or face
+// stores a half-edge.
 struct chunk_kind {
     unsigned entity, type, components;
     bool is_float;
-    unsigned largest_bits; // as in the chunk's head: 0 is 8 bits of an integer and 32 of a float
+    unsigned largest_bits; // code in the chunk's header: 0 is an integer of 8 bits or a float of 32
 };
 
 const chunk_kind kinds[] = {
@@ -162,10 +170,10 @@ const chunk_kind kinds[] = {
     {Chunk::Entity_Halfedge, Chunk::Type_Topology, 3, false, 2},
 };
 
-// The bytes of the chunk's data, or SIZE_MAX for a chunk that is not let through.
+// The size of the chunk's data in bytes, or SIZE_MAX if the chunk is not supported.
 size_t chunk_bytes(const Chunk::Header &h, const IO::OMFormat::Header &head) {
     if (h.name_) return SIZE_MAX;
-    bool topology = h.type_ == Chunk::Type_Topology; // OpenMesh sets the bit for floats there as well
+    bool topology = h.type_ == Chunk::Type_Topology; // OpenMesh sets the float bit of topology chunks too
     uint64_t count = h.entity_ == Chunk::Entity_Vertex ? head.n_vertices_
                      : h.entity_ == Chunk::Entity_Face ? head.n_faces_
                                                        : 2 * uint64_t(head.n_edges_);
@@ -220,8 +228,8 @@ float *copy_floats(const fct_env *env, const std::vector<float> &from, size_t co
     return to;
 }
 
-// Walks each face's half-edges. A walk that leaves the file or does not come back is an error; in all no more
-// corners are made than there are half-edges.
+// Makes the corners of each face from its loop of half-edges. A half-edge outside the file and a loop that
+// does not close are errors. The total number of corners cannot exceed the number of half-edges.
 fct_result walk_faces(const fct_source *s, soup_importer &in, std::vector<int> &corner_halves) {
     size_t total = 0;
     for (size_t f = 0; f < in.face_halves.size(); ++f) {
@@ -261,7 +269,8 @@ fct_result fill_soup(const fct_source *s, soup_importer &in, const std::vector<i
     if (!ok) return fct_fail_memory(env, "a mesh");
     std::memcpy(out->starts, in.starts.data(), (faces + 1) * sizeof(uint32_t));
     for (size_t i = 0; i < corners; ++i) {
-        out->corners[i] = uint32_t(in.corners[i]); // -1 becomes an index out of range, which is found later
+        out->corners[i] =
+            uint32_t(in.corners[i]); // -1 becomes an index out of range, which fct_soup_mesh reports
         size_t from = by_half ? size_t(corner_halves[i]) : size_t(in.corners[i]);
         const std::vector<float> &values = by_half ? in.half_texcoords : in.texcoords;
         if ((by_half || by_vertex) && 2 * from + 2 <= values.size())

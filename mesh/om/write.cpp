@@ -1,8 +1,8 @@
-// mesh/om/write.cpp: OM files through OpenMesh's writer, behind extern "C".
+// mesh/om/write.cpp: writes OM files with OpenMesh's writer, behind extern "C".
 //
-// An exporter of our own makes half-edges from the triangles. Sides that run opposite ways along an edge are
-// paired in face order; a side left over, as on edges of three faces, gets an edge of its own with a boundary
-// on its other side, so that every triangle is kept.
+// Our exporter makes half-edges from the triangles. It pairs sides that run in opposite directions along an
+// edge, in face order. An unpaired side, for example at an edge of three faces, gets its own edge with a
+// boundary on the other side. So the file holds every triangle.
 #include <algorithm>
 #include <ostream>
 #include <streambuf>
@@ -23,8 +23,7 @@ namespace {
 
 using namespace OpenMesh;
 
-// Half-edges of triangles: half-edge 2e and 2e + 1 are the sides of edge e; a side without a face has face
-// -1.
+// Half-edges 2e and 2e + 1 are the sides of edge e. A boundary side has face -1.
 class mesh_exporter : public IO::BaseExporter {
   public:
     struct half {
@@ -37,9 +36,9 @@ class mesh_exporter : public IO::BaseExporter {
         side_halves.assign(count, -1);
         for (size_t begin = 0, end; begin < count; begin = end) {
             for (end = begin + 1; end < count && keys[end] == keys[begin];) ++end;
-            pair_up(sides + begin, end - begin);
+            pair_sides(sides + begin, end - begin);
         }
-        link();
+        link_halves();
     }
 
     size_t n_vertices() const override { return mesh->vertex_count; }
@@ -76,7 +75,7 @@ class mesh_exporter : public IO::BaseExporter {
         return HalfedgeHandle();
     }
 
-    // Not asked for with the options given.
+    // The writer does not call these with the options in fct_write_om.
     Vec3d pointd(VertexHandle v) const override { return Vec3d(point(v)); }
     Vec3d normald(VertexHandle v) const override { return Vec3d(normal(v)); }
     Vec3uc color(VertexHandle v) const override { return bytes(mesh->colors, v); }
@@ -120,8 +119,9 @@ class mesh_exporter : public IO::BaseExporter {
 
     uint32_t end_of(uint32_t side) const { return mesh->triangles[side % 3 == 2 ? side - 2 : side + 1]; }
 
-    // The sides of one edge: the i-th that runs up meets the i-th that runs down; the others have no partner.
-    void pair_up(const uint32_t *sides, size_t count) {
+    // Takes the sides of one edge. Pairs the i-th ascending side with the i-th descending side. An unpaired
+    // side gets an edge of its own.
+    void pair_sides(const uint32_t *sides, size_t count) {
         std::vector<uint32_t> ways[2];
         for (size_t i = 0; i < count; ++i)
             ways[mesh->triangles[sides[i]] < end_of(sides[i])].push_back(sides[i]);
@@ -136,8 +136,9 @@ class mesh_exporter : public IO::BaseExporter {
         }
     }
 
-    // Next half-edges within faces; along boundaries by turning about the vertex from face to face.
-    void link() {
+    // Sets `next` within faces. At a boundary, turns about the end vertex from face to face to find the next
+    // boundary half-edge.
+    void link_halves() {
         std::vector<int> before(halves.size(), -1);
         for (size_t side = 0; side < side_halves.size(); ++side) {
             size_t next = side % 3 == 2 ? side - 2 : side + 1;
@@ -157,7 +158,7 @@ class mesh_exporter : public IO::BaseExporter {
 
     const fct_mesh *mesh;
     float exposure;
-    BaseKernel no_properties; // the writer asks it for named properties, without looking whether it is there
+    BaseKernel no_properties; // because the writer dereferences it without a check
     std::vector<half> halves;
     std::vector<int> side_halves, vertex_halves;
 };

@@ -28,20 +28,20 @@ static const group groups[] = {
     {FCT_PLY_FACES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, POLYGON_COLORS},
 };
 
-static bool named(const fct_ply_property *property, const char *name) {
+static bool has_name(const fct_ply_property *property, const char *name) {
     return fct_text_word_is(property->name, property->name_length, name);
 }
 
 static ptrdiff_t find_property(const fct_ply_property *properties, size_t count, bool list,
                                const char *name) {
     for (size_t i = 0; i < count; ++i)
-        if ((properties[i].count_type != FCT_PLY_NONE) == list && named(properties + i, name))
+        if ((properties[i].count_type != FCT_PLY_NONE) == list && has_name(properties + i, name))
             return (ptrdiff_t)i;
     return FCT_PLY_NOWHERE;
 }
 
-static ptrdiff_t find_any(const fct_ply_property *properties, size_t count, bool list, const char *a,
-                          const char *b) {
+static ptrdiff_t find_either(const fct_ply_property *properties, size_t count, bool list, const char *a,
+                             const char *b) {
     ptrdiff_t found = find_property(properties, count, list, a);
     return found != FCT_PLY_NOWHERE ? found : find_property(properties, count, list, b);
 }
@@ -98,13 +98,13 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
         return fct_fail(t->env, FCT_ERROR_DATA, "%s: element vertex lacks one of the properties x, y and z",
                         t->name);
     if (out->kind != FCT_PLY_FACES && out->kind != FCT_PLY_STRIPS) return FCT_OK;
-    out->indices = find_any(properties, count, true, "vertex_indices", "vertex_index");
+    out->indices = find_either(properties, count, true, "vertex_indices", "vertex_index");
     if (out->indices == FCT_PLY_NOWHERE && element->count)
         return fct_fail(t->env, FCT_ERROR_DATA, "%s: element %.*s has no list vertex_indices", t->name,
                         (int)element->name_length, element->name);
     if (out->kind == FCT_PLY_STRIPS) return FCT_OK;
     out->texcoords = find_property(properties, count, true, "texcoord");
-    out->material = find_any(properties, count, false, "material_index", "material");
+    out->material = find_either(properties, count, false, "material_index", "material");
     if (out->material != FCT_PLY_NOWHERE) {
         soup->materials = fct_allocate(t->env, (size_t)element->count, sizeof(uint32_t));
         if (!soup->materials) return fct_fail_memory(t->env, "a mesh");

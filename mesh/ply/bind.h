@@ -1,4 +1,4 @@
-/* mesh/ply/bind.h: which property of a PLY element fills which array of the soup. */
+/* mesh/ply/bind.h: assigns the properties of a PLY element to the arrays of the soup. */
 #ifndef FCT_MESH_PLY_BIND_H
 #define FCT_MESH_PLY_BIND_H
 
@@ -7,7 +7,7 @@
 
 typedef enum fct_ply_kind { FCT_PLY_OTHER, FCT_PLY_VERTICES, FCT_PLY_FACES, FCT_PLY_STRIPS } fct_ply_kind;
 
-/* Scalar property number `property` of an element goes to to[record * stride]. */
+/* Property number `property`, a scalar, is stored at to[record * stride]. */
 typedef struct fct_ply_column {
     size_t property;
     float *to;
@@ -24,17 +24,17 @@ typedef struct fct_ply_target {
     ptrdiff_t indices, texcoords, material; /* property numbers or NOWHERE */
 } fct_ply_target;
 
-/* The kind of the element, by its name. */
+/* The kind that the element's name stands for. */
 fct_ply_kind fct_ply_kind_of(const fct_ply_element *element);
 
-/* Binds each property of the element to an array of the soup, and allocates the arrays that have one or three
- * values per record. *vertex_texcoords receives V x 2 values if texture coordinates belong to vertices. The
- * caller has checked the count against the size of the file. Errors: DATA, MEMORY. */
+/* Assigns the element's properties to arrays, and allocates the arrays that have a fixed size per record.
+ * *vertex_texcoords receives an array V x 2 if vertices have texture coordinates. The caller must have
+ * checked the element's count against the size of the file. Errors: DATA, MEMORY. */
 fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const fct_ply_element *element,
                         fct_soup *soup, float **vertex_texcoords, fct_ply_target *out);
 
-/* Fills to[...] of every column for records [begin, end); record i begins at base + i * size and its property
- * k at offsets[k] in it. as_double: values are doubles of this machine, whatever their declared type. */
+/* Fills every column for records [begin, end). Record i begins at base + i * size; its property k begins
+ * offsets[k] bytes later. as_double: the values are native doubles, whatever their declared type. */
 void fct_ply_fill_columns(const fct_ply_target *target, const fct_ply_property *properties,
                           const unsigned char *base, size_t size, const size_t *offsets, bool swap,
                           bool as_double, size_t begin, size_t end);

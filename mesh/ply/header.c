@@ -7,7 +7,7 @@
 
 #define WORD_IS(text) fct_text_word_is(word, length, text)
 
-static fct_ply_type type_of(const char *word, size_t length) {
+static fct_ply_type find_type(const char *word, size_t length) {
     static const struct {
         const char *name;
         fct_ply_type type;
@@ -26,7 +26,7 @@ static fct_result read_type(fct_text *t, fct_ply_type *type) {
     const char *begin = t->p;
     size_t length;
     const char *word = fct_text_word(t, &length);
-    *type = type_of(word, length);
+    *type = find_type(word, length);
     if (*type != FCT_PLY_NONE) return FCT_OK;
     t->p = begin;
     return fct_text_expected(t, "a PLY type such as float or uchar");
@@ -96,7 +96,7 @@ static fct_result read_property(fct_text *t, fct_ply_header *h) {
     return FCT_OK;
 }
 
-/* "comment facetree material NAME": the rest of the line behind one blank is the name. */
+/* "comment facetree material NAME". The name begins after one blank and ends with the line. */
 static fct_result read_comment(fct_text *t, fct_ply_header *h) {
     size_t length;
     const char *word = fct_text_word(t, &length);

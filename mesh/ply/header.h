@@ -1,4 +1,4 @@
-/* mesh/ply/header.h: the header of a PLY file as data. */
+/* mesh/ply/header.h: parses the header of a PLY file. */
 #ifndef FCT_MESH_PLY_HEADER_H
 #define FCT_MESH_PLY_HEADER_H
 
@@ -18,7 +18,7 @@ typedef enum fct_ply_type {
 
 typedef enum fct_ply_format { FCT_PLY_ASCII, FCT_PLY_LITTLE, FCT_PLY_BIG } fct_ply_format;
 
-/* A name is a word of the file, without a zero behind it. */
+/* Names point into the file and have no zero at their end. */
 typedef struct fct_ply_property {
     const char *name;
     size_t name_length;
@@ -43,14 +43,14 @@ typedef struct fct_ply_header {
     size_t element_capacity, property_capacity, material_capacity;
 } fct_ply_header;
 
-/* The bytes of a scalar. */
+/* Bytes per scalar. */
 static inline size_t fct_ply_size(fct_ply_type type) {
     static const unsigned char sizes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
     return sizes[type];
 }
 
-/* Reads the header and its last line, "end_header". Then t is at the first byte of the data. The caller
- * releases the header also after an error. Errors: DATA, MEMORY. */
+/* Reads the header. t is then at the first byte after the line "end_header". Errors: DATA, MEMORY. Release
+ * the header even after an error. */
 fct_result fct_ply_read_header(fct_text *t, fct_ply_header *out);
 void fct_ply_release_header(const fct_env *env, fct_ply_header *header);
 

@@ -1,11 +1,12 @@
 /* mesh/ply/read.c: PLY files, text and binary of both byte orders.
  *
- * Elements are read in the file's order. Records of one fixed layout (vertices, and faces that all have the
- * same number of corners, which the first record suggests and a pass over the lengths confirms) are converted
- * in parallel straight from the file; others are measured one after another; records of text become rows of
- * doubles and then go the same way. A count is compared with the bytes that are left before anything is
- * allocated. Elements and properties without a meaning here are passed over; triangle strips (with -1 between
- * strips) become triangles that keep the winding.
+ * The reader takes the elements in the file's order:
+ *   1. Compare the element's count with the bytes left in the file, before anything is allocated.
+ *   2. If all binary records have the layout of the first (a pass over the list lengths checks this), convert
+ *      them in parallel straight from the file.
+ *   3. Else convert record by record. A text record first becomes a row of doubles.
+ * Unknown elements and properties are skipped. Triangle strips (-1 separates strips) become triangles with
+ * the same winding.
  */
 #include "mesh/ply/read.h"
 
@@ -25,12 +26,13 @@ typedef struct reader {
     const fct_ply_element *element;
     const fct_ply_property *properties; /* of the element */
     fct_ply_target target;
-    const char *body; /* first byte behind the header */
+    const char *body; /* first byte after the header */
     bool swap, text;
-    unsigned seen;           /* bits of the kinds that came before */
+    unsigned seen;           /* bit k: an element of kind k came before */
     float *vertex_texcoords; /* V x 2 or NULL */
-    size_t *offsets;         /* of each property's value in a record, behind a list's length */
-    uint32_t *lengths;       /* of each list */
+    size_t
+        *offsets; /* bytes from the record's start to each property's value; for lists, to the first item */
+    uint32_t *lengths; /* of each list */
     size_t layout_capacity;
     double *row; /* of a text record */
     size_t row_capacity, corner_capacity, texcoord_capacity, start_capacity;
@@ -48,12 +50,12 @@ static fct_result fail_record(const reader *r, uint64_t record, const char *what
                     r->element->name, (unsigned long long)record, what);
 }
 
-static size_t bytes_left(const reader *r) {
+static size_t count_bytes_left(const reader *r) {
     return (size_t)(r->t.end - r->t.p);
 }
 
-/* The fewest bytes a record can take. */
-static size_t least_size(const reader *r) {
+/* The size in bytes of the shortest possible record. */
+static size_t compute_least_size(const reader *r) {
     size_t size = 0;
     for (size_t i = 0; i < r->element->property_count; ++i) {
         const fct_ply_property *p = r->properties + i;
@@ -64,7 +66,7 @@ static size_t least_size(const reader *r) {
 
 static fct_result check_count(const reader *r) {
     uint64_t count = r->element->count;
-    size_t least = least_size(r), left = bytes_left(r) + (r->text ? 1 : 0);
+    size_t least = compute_least_size(r), left = count_bytes_left(r) + (r->text ? 1 : 0);
     if (r->target.kind == FCT_PLY_OTHER && !least) return FCT_OK;
     if (r->target.kind != FCT_PLY_OTHER && count > FCT_MESH_LIMIT)
         return fct_fail(r->t.env, FCT_ERROR_DATA, "%s: element %.*s %llu: at most %llu are allowed",
@@ -74,12 +76,13 @@ static fct_result check_count(const reader *r) {
         return fct_fail(
             r->t.env, FCT_ERROR_DATA,
             "%s: element %.*s: %llu records of at least %zu bytes are declared, but %zu bytes are left",
-            r->t.name, shown_length(r), r->element->name, (unsigned long long)count, least, bytes_left(r));
+            r->t.name, shown_length(r), r->element->name, (unsigned long long)count, least,
+            count_bytes_left(r));
     return FCT_OK;
 }
 
-/* Finds the offsets and lengths of the binary record at p; its size, or 0 when it does not fit before the end
- * (a record of no bytes does not get here). */
+/* Finds the offsets and list lengths of the binary record at p. Returns the record's size, or 0 if it does
+ * not fit before `end` or a length is negative. No caller passes an element of empty records. */
 static size_t measure_record(const reader *r, const unsigned char *p, const unsigned char *end,
                              size_t *offsets, uint32_t *lengths) {
     const unsigned char *begin = p;
@@ -101,7 +104,7 @@ static size_t measure_record(const reader *r, const unsigned char *p, const unsi
     return (size_t)(p - begin);
 }
 
-/* Room for `corners` more corners and `polygons` more polygons. */
+/* Grows the arrays by `corners` corners and `polygons` polygons. */
 static fct_result make_room(reader *r, size_t corners, size_t polygons) {
     fct_soup *soup = r->soup;
     if (soup->corner_count + corners > UINT32_MAX || soup->polygon_count + polygons > FCT_MESH_LIMIT)
@@ -115,7 +118,7 @@ static fct_result make_room(reader *r, size_t corners, size_t polygons) {
     if (result == FCT_OK)
         result = fct_grow(r->t.env, (void **)&soup->starts, &r->start_capacity,
                           soup->polygon_count + polygons + 1, sizeof(uint32_t));
-    if (result == FCT_OK && !before) /* what is there so far are triangles */
+    if (result == FCT_OK && !before) /* all earlier polygons are triangles */
         for (size_t i = 0; i <= soup->polygon_count; ++i) soup->starts[i] = (uint32_t)(3 * i);
     return result;
 }
@@ -136,9 +139,9 @@ static void load_floats(const reader *r, const unsigned char *p, fct_ply_type ty
     for (size_t i = 0; i < count; ++i) to[i] = (float)fct_ply_load(p + size * i, type, r->swap);
 }
 
-/* Puts the corners and the material of face record `i` at p into the soup, from corner `first` on. */
-static void put_face(const reader *r, const unsigned char *p, const size_t *offsets, size_t count, size_t i,
-                     size_t first) {
+/* Stores face record `i`, which is at p, in the soup. Its corners begin at corner `first`. */
+static void store_face(const reader *r, const unsigned char *p, const size_t *offsets, size_t count, size_t i,
+                       size_t first) {
     fct_soup *soup = r->soup;
     ptrdiff_t k = r->target.indices;
     load_ids(r, p + offsets[k], r->properties[k].type, count, soup->corners + first);
@@ -149,8 +152,8 @@ static void put_face(const reader *r, const unsigned char *p, const size_t *offs
     if (k != FCT_PLY_NOWHERE) load_ids(r, p + offsets[k], r->properties[k].type, 1, soup->materials + i);
 }
 
-/* Tells what is wrong with the lengths of a face's lists, NULL when nothing is. */
-static const char *face_fault(const reader *r, const uint32_t *lengths) {
+/* Returns what is wrong with the list lengths of a face, NULL if they are right. */
+static const char *find_face_fault(const reader *r, const uint32_t *lengths) {
     if (lengths[r->target.indices] < 3) return "fewer than three corners";
     if (r->target.texcoords != FCT_PLY_NOWHERE &&
         lengths[r->target.texcoords] != 2 * (uint64_t)lengths[r->target.indices])
@@ -189,7 +192,7 @@ static void fill_uniform(void *user, size_t begin, size_t end, size_t chunk, uin
     if (r->target.kind != FCT_PLY_FACES) return;
     size_t corners = r->lengths[r->target.indices];
     for (size_t i = begin; i < end; ++i)
-        put_face(r, u->base + i * u->size, r->offsets, corners, i, i * corners);
+        store_face(r, u->base + i * u->size, r->offsets, corners, i, i * corners);
     if (r->soup->starts)
         for (size_t i = begin; i < end; ++i) r->soup->starts[i + 1] = (uint32_t)((i + 1) * corners);
 }
@@ -217,7 +220,7 @@ static fct_result make_uniform_room(reader *r) {
     return result;
 }
 
-/* Reads the element if all its records have the layout of the first one; *done tells whether they had. */
+/* Reads the element if all its records have the layout of the first. *done: they have, and it is read. */
 static fct_result read_uniform(reader *r, bool *done) {
     size_t count = (size_t)r->element->count;
     const unsigned char *base = (const unsigned char *)r->t.p, *end = (const unsigned char *)r->t.end;
@@ -225,7 +228,7 @@ static fct_result read_uniform(reader *r, bool *done) {
     size_t size = measure_record(r, base, end, r->offsets, r->lengths);
     if (!size || (size_t)(end - base) / size < count) return FCT_OK;
     if (r->target.kind == FCT_PLY_STRIPS) return FCT_OK;
-    if (r->target.kind == FCT_PLY_FACES && (r->soup->polygon_count || face_fault(r, r->lengths)))
+    if (r->target.kind == FCT_PLY_FACES && (r->soup->polygon_count || find_face_fault(r, r->lengths)))
         return FCT_OK;
     uniform u = {.r = r, .base = base, .size = size};
     fct_parallel_for(r->t.env, count, 16384, check_uniform, &u);
@@ -240,18 +243,18 @@ static fct_result read_uniform(reader *r, bool *done) {
     return FCT_OK;
 }
 
-static bool fits(double value, fct_ply_type type) {
+static bool fits_type(double value, fct_ply_type type) {
     static const double lower[] = {0, -128, 0, -32768, 0, -2147483648.0, 0};
     static const double upper[] = {0, 127, 255, 32767, 65535, 2147483647.0, 4294967295.0};
     return type >= FCT_PLY_FLOAT || (value >= lower[type] && value <= upper[type]);
 }
 
-/* One value of text. Values of properties without a meaning here may be any word (a quality of nan, say). */
+/* Reads one value of a text file. A float that no array uses may be any word, for example nan. */
 static fct_result read_value(reader *r, fct_ply_type type, bool used, double *value) {
     const char *begin = r->t.p;
     if (type < FCT_PLY_FLOAT) {
         int64_t integer;
-        if (fct_text_integer(&r->t, &integer) && fits((double)integer, type)) {
+        if (fct_text_integer(&r->t, &integer) && fits_type((double)integer, type)) {
             *value = (double)integer;
             return FCT_OK;
         }
@@ -259,7 +262,7 @@ static fct_result read_value(reader *r, fct_ply_type type, bool used, double *va
         return fct_text_expected(&r->t, "an integer in the range of its type");
     }
     if (used) {
-        float number; /* says what is wrong with the number */
+        float number; /* not used: the call makes the message */
         if (!fct_text_double(&r->t, value) || !isfinite((float)*value)) {
             r->t.p = begin;
             return fct_text_float(&r->t, "a number", &number);
@@ -291,7 +294,7 @@ static fct_result read_row(reader *r) {
         fct_result result = FCT_OK;
         if (property->count_type != FCT_PLY_NONE) {
             result = read_value(r, property->count_type, true, &length);
-            if (result == FCT_OK && (length < 0 || length > (double)bytes_left(r)))
+            if (result == FCT_OK && (length < 0 || length > (double)count_bytes_left(r)))
                 result =
                     fct_text_fail(&r->t, "a list of %.0f values on a line that has no room for them", length);
         }
@@ -311,8 +314,8 @@ static fct_result read_row(reader *r) {
     return FCT_OK;
 }
 
-/* Strip a b c d ...: triangles abc, cbd, cde, ...; ids of -1 end a strip. */
-static fct_result put_strip(reader *r, const unsigned char *p) {
+/* Strip a b c d e ... becomes triangles abc, cbd, cde, ... An id of -1 ends a strip. */
+static fct_result append_strip(reader *r, const unsigned char *p) {
     uint32_t length = r->lengths[r->target.indices];
     fct_ply_type type = r->properties[r->target.indices].type;
     size_t size = r->text ? sizeof(double) : fct_ply_size(type);
@@ -337,20 +340,20 @@ static fct_result put_strip(reader *r, const unsigned char *p) {
     return FCT_OK;
 }
 
-static fct_result put_record(reader *r, const unsigned char *p, uint64_t record) {
+static fct_result store_record(reader *r, const unsigned char *p, uint64_t record) {
     fct_soup *soup = r->soup;
     fct_ply_target target = r->target;
     for (size_t c = 0; c < target.column_count; ++c)
         target.columns[c].to += (size_t)record * target.columns[c].stride;
     fct_ply_fill_columns(&target, r->properties, p, 0, r->offsets, r->swap, r->text, 0, 1);
-    if (target.kind == FCT_PLY_STRIPS) return put_strip(r, p + r->offsets[target.indices]);
+    if (target.kind == FCT_PLY_STRIPS) return append_strip(r, p + r->offsets[target.indices]);
     if (target.kind != FCT_PLY_FACES) return FCT_OK;
-    const char *fault = face_fault(r, r->lengths);
+    const char *fault = find_face_fault(r, r->lengths);
     if (fault) return fail_record(r, record, fault);
     size_t corners = r->lengths[target.indices];
     fct_result result = make_room(r, corners, 1);
     if (result != FCT_OK) return result;
-    put_face(r, p, r->offsets, corners, (size_t)record, soup->corner_count);
+    store_face(r, p, r->offsets, corners, (size_t)record, soup->corner_count);
     soup->corner_count += corners;
     soup->starts[++soup->polygon_count] = (uint32_t)soup->corner_count;
     return FCT_OK;
@@ -373,7 +376,7 @@ static fct_result read_records(reader *r) {
             if (!size) return fail_record(r, i, "the file ends within it, or a list's length is wrong");
             r->t.p += size;
         }
-        if (result == FCT_OK) result = put_record(r, p, i);
+        if (result == FCT_OK) result = store_record(r, p, i);
         if (result != FCT_OK) return result;
     }
     return FCT_OK;
@@ -410,8 +413,8 @@ static fct_result read_element(reader *r, const fct_ply_element *element) {
     return result;
 }
 
-/* Materials without names keep their numbers; a number far beyond the count of faces is refused, for others
- * allocate by it. */
+/* Moves the names to the soup. A file without names keeps its material numbers. A number far above the count
+ * of faces is an error, because callers allocate memory per material. */
 static fct_result name_materials(reader *r) {
     fct_soup *soup = r->soup;
     soup->material_names = r->h.material_names;
@@ -429,7 +432,7 @@ static fct_result name_materials(reader *r) {
     return FCT_OK;
 }
 
-/* Strips carry no values for each triangle: where there are faces with such values too, the values go. */
+/* Strips have no values per triangle. If the file has strips, the values of its faces are dropped. */
 static void drop_partial(reader *r) {
     fct_soup *soup = r->soup;
     if (!(r->seen >> FCT_PLY_STRIPS & 1) || (!soup->materials && !soup->polygon_colors && !soup->texcoords))
@@ -443,7 +446,7 @@ static void drop_partial(reader *r) {
     soup->polygon_colors = soup->texcoords = NULL;
 }
 
-/* Texture coordinates of vertices become those of corners, unless corners have their own. */
+/* Copies the vertices' texture coordinates to the corners, unless the corners have their own. */
 static fct_result spread_texcoords(reader *r) {
     fct_soup *soup = r->soup;
     if (!r->vertex_texcoords || soup->texcoords || !soup->corner_count) return FCT_OK;
@@ -456,13 +459,13 @@ static fct_result spread_texcoords(reader *r) {
     return FCT_OK;
 }
 
-static fct_result finish(reader *r) {
+static fct_result complete_mesh(reader *r) {
     fct_soup *soup = r->soup;
     if (!(r->seen >> FCT_PLY_VERTICES & 1))
         return fct_fail(r->t.env, FCT_ERROR_DATA, "%s: the header declares no vertices", r->t.name);
     if (r->text ? fct_text_skip_lines(&r->t, 0) : r->t.p < r->t.end)
         fct_note(r->t.env, FCT_MESSAGE_WARNING, "%s: %zu bytes behind the last element are left out",
-                 r->t.name, bytes_left(r));
+                 r->t.name, count_bytes_left(r));
     drop_partial(r);
     fct_result result = name_materials(r);
     if (result == FCT_OK) result = spread_texcoords(r);
@@ -480,7 +483,7 @@ fct_result fct_read_ply(const fct_source *source, fct_soup *out) {
     r.body = r.t.p;
     for (size_t i = 0; result == FCT_OK && i < r.h.element_count; ++i)
         result = read_element(&r, r.h.elements + i);
-    if (result == FCT_OK) result = finish(&r);
+    if (result == FCT_OK) result = complete_mesh(&r);
     fct_ply_release_header(source->env, &r.h);
     fct_release(source->env, r.vertex_texcoords);
     fct_release(source->env, r.offsets);

@@ -1,4 +1,4 @@
-/* mesh/ply/value.h: scalars of PLY records, of either byte order and any type. */
+/* mesh/ply/value.h: loads scalars of any PLY type and byte order. */
 #ifndef FCT_MESH_PLY_VALUE_H
 #define FCT_MESH_PLY_VALUE_H
 
@@ -59,7 +59,7 @@ static inline double fct_ply_load(const unsigned char *p, fct_ply_type type, boo
     return 0;
 }
 
-/* An id. FCT_NONE if the value is not a whole number in range. */
+/* Converts a value to an id. FCT_NONE if it is not an integer in the range of ids. */
 static inline uint32_t fct_ply_id(double value) {
     return value >= 0 && value < 4294967295.0 && value == (double)(uint32_t)value ? (uint32_t)value
                                                                                   : FCT_NONE;

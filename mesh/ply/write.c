@@ -1,9 +1,10 @@
-/* mesh/ply/write.c: PLY with everything an fct_mesh holds, so that reading gives the same bits back.
+/* mesh/ply/write.c: writes every array of an fct_mesh as PLY. The reader restores the same bits.
  *
- * Vertices: x y z [nx ny nz] [red green blue radiosity_r radiosity_g radiosity_b]; the bytes are what viewers
- * show (exposed, clamped, sRGB), the floats are the linear values. Faces: vertex_indices [texcoord, six
- * floats] [red green blue radiosity_r ...] [material_index], with the names in "comment facetree material
- * NAME" lines.
+ *   vertex: x y z [nx ny nz] [red green blue radiosity_r radiosity_g radiosity_b]
+ *   face:   vertex_indices [texcoord, six floats] [red green blue radiosity_r ...] [material_index]
+ *
+ * red, green and blue are bytes for viewers (exposed, clamped, sRGB). radiosity_* are the linear floats.
+ * Lines "comment facetree material NAME" hold the names of the materials.
  */
 #include "mesh/ply/write.h"
 
@@ -49,12 +50,12 @@ static unsigned char *put_floats(unsigned char *p, const float *values, int coun
     return p;
 }
 
-static void color_bytes(const fct_sink *sink, const float *color, unsigned char bytes[3]) {
+static void convert_color(const fct_sink *sink, const float *color, unsigned char bytes[3]) {
     for (int k = 0; k < 3; ++k) bytes[k] = fct_srgb_byte((double)color[k] * (double)sink->def->exposure);
 }
 
 static unsigned char *put_color(unsigned char *p, const fct_sink *sink, const float *color) {
-    color_bytes(sink, color, p);
+    convert_color(sink, color, p);
     return put_floats(p + 3, color, 3);
 }
 
@@ -109,7 +110,7 @@ static void print_floats(FILE *stream, const char *before, const float *values, 
 
 static void print_color(const fct_sink *sink, FILE *stream, const float *color) {
     unsigned char bytes[3];
-    color_bytes(sink, color, bytes);
+    convert_color(sink, color, bytes);
     fprintf(stream, " %u %u %u", bytes[0], bytes[1], bytes[2]);
     print_floats(stream, " ", color, 3);
 }

@@ -1,11 +1,11 @@
 /* mesh/text/obj_read.c: Wavefront OBJ.
  *
- * Two passes: the first counts statements and corners, so that every array is allocated once and at its size;
- * the second reads. Faces keep their order and their corners, repeated ones too. `v` may carry a weight,
- * which is left out, and a colour (three floats, linear). Texture coordinates are per corner, materials are
- * numbered in the order of their first use. Normals are taken when every corner has one and the corners of a
- * vertex agree. Lines, points and free-form surfaces are left out with a message, groups and smoothing
- * without one.
+ * The first pass counts statements and corners, so that each array is allocated once. The second pass reads.
+ * Faces keep their order and all their corners, repeated ones too. A `v` line may carry a weight, which the
+ * reader ignores, and a colour (three linear floats). Texture coordinates are stored per corner. Materials
+ * are numbered in the order of their first use. Normals are kept only if every corner has one and all
+ * corners of a vertex have the same one. The reader skips lines, points and free-form surfaces with a
+ * message, and groups and smoothing without one.
  */
 #include "mesh/text/obj_read.h"
 
@@ -24,17 +24,17 @@ typedef struct reader {
     counts total; /* of the file */
     counts seen;  /* so far */
     float *texcoords, *normals;
-    uint32_t *corner_normals; /* per corner, FCT_NONE where there is none; NULL without vn */
+    uint32_t *corner_normals; /* per corner, FCT_NONE: the corner has none; NULL: the file has no vn */
     size_t corners_without_texcoord, corners_without_normal, vertices_without_color;
     size_t unknown, elements_left_out;
     uint32_t material; /* FCT_NONE before the first usemtl */
-    uint32_t *slots;   /* hash table of material numbers, FCT_NONE where free */
+    uint32_t *slots;   /* hash table of material numbers, FCT_NONE: free slot */
     size_t slot_count;
     size_t name_capacity, material_capacity;
-    bool known; /* a statement was understood */
+    bool known; /* the reader has understood a statement */
 } reader;
 
-/* Blanks of OBJ include a backslash at the end of a line. */
+/* In OBJ, a backslash at the end of a line continues it. It counts as a blank. */
 static void skip_blanks(fct_text *t) {
     for (;;) {
         fct_text_skip_blanks(t);
@@ -53,7 +53,7 @@ static bool at_line_end(fct_text *t) {
     return t->p == t->end || *t->p == '\n' || *t->p == '#';
 }
 
-/* To the end of the word, which a backslash at the end of a line is no part of. */
+/* Moves to the end of the word. A backslash that continues the line ends the word. */
 static void skip_word(fct_text *t) {
     while (t->p < t->end && *t->p != '\n' && !fct_text_is_blank(*t->p)) {
         if (*t->p == '\\') {
@@ -72,7 +72,7 @@ static void count_face(fct_text *t, counts *c) {
     c->corners += corners;
 }
 
-/* Both passes have to cut the text at the same places: what is counted here is the size of the arrays. */
+/* Sizes the arrays, so both passes must split the text into the same statements and corners. */
 static void count_statements(fct_text t, counts *c) {
     while (fct_text_skip_lines(&t, '#')) {
         const char *p = t.p;
@@ -93,7 +93,7 @@ static void count_statements(fct_text t, counts *c) {
     }
 }
 
-/* Reads up to `most` floats of the line; how many there were goes to *count. */
+/* Reads `least` to `most` floats of the line. *count receives their number. */
 static fct_result read_floats(reader *r, size_t least, size_t most, float *values, size_t *count) {
     *count = 0;
     while (*count < most && (*count < least || !at_line_end(&r->t))) {
@@ -126,8 +126,8 @@ static fct_result read_vertex(reader *r) {
     return FCT_OK;
 }
 
-/* A number from 1, or from -1 for the one seen last, to an index from 0. Indices of what the file has later
- * are allowed, as others do. */
+/* Converts an OBJ number to an index from 0. OBJ counts from 1 forwards, and from -1 backwards from the last
+ * element read so far. A positive number may refer to an element that follows later in the file. */
 static fct_result read_index(reader *r, const char *what, size_t seen, size_t total, uint32_t *index) {
     fct_text *t = &r->t;
     const char *p = t->p, *digits;
@@ -147,7 +147,7 @@ static fct_result read_index(reader *r, const char *what, size_t seen, size_t to
     return FCT_OK;
 }
 
-static bool take(fct_text *t, char c) {
+static bool skip_char(fct_text *t, char c) {
     if (t->p == t->end || *t->p != c) return false;
     ++t->p;
     return true;
@@ -160,10 +160,10 @@ static fct_result read_corner(reader *r) {
     uint32_t texcoord = FCT_NONE, normal = FCT_NONE;
     fct_result result =
         read_index(r, "vertex", r->seen.vertices, r->total.vertices, r->soup->corners + corner);
-    if (result == FCT_OK && take(t, '/')) {
+    if (result == FCT_OK && skip_char(t, '/')) {
         if (t->p < t->end && *t->p != '/' && !fct_text_is_blank(*t->p) && *t->p != '\n')
             result = read_index(r, "texture coordinate", r->seen.texcoords, r->total.texcoords, &texcoord);
-        if (result == FCT_OK && take(t, '/'))
+        if (result == FCT_OK && skip_char(t, '/'))
             result = read_index(r, "normal", r->seen.normals, r->total.normals, &normal);
     }
     if (result != FCT_OK) return result;
@@ -171,19 +171,19 @@ static fct_result read_corner(reader *r) {
     r->corners_without_texcoord += texcoord == FCT_NONE;
     r->corners_without_normal += normal == FCT_NONE;
     if (r->corner_normals) r->corner_normals[corner] = normal;
-    /* Texture coordinates may follow their faces: their numbers are kept here and looked up at the end. */
+    /* vt lines may follow the faces, so this array holds their numbers until look_up_texcoords. */
     if (r->soup->texcoords) memcpy(r->soup->texcoords + 2 * corner, &texcoord, sizeof texcoord);
     return FCT_OK;
 }
 
-static uint32_t hash(const char *text, size_t length) {
+static uint32_t hash_name(const char *text, size_t length) {
     uint32_t h = 2166136261u; /* FNV-1a */
     for (size_t i = 0; i < length; ++i) h = (h ^ (unsigned char)text[i]) * 16777619u;
     return h;
 }
 
 static uint32_t *find_slot(const reader *r, const char *text, size_t length) {
-    size_t i = hash(text, length) & (r->slot_count - 1);
+    size_t i = hash_name(text, length) & (r->slot_count - 1);
     for (;; i = (i + 1) & (r->slot_count - 1)) {
         uint32_t number = r->slots[i];
         if (number == FCT_NONE) return r->slots + i;
@@ -207,7 +207,7 @@ static fct_result grow_slots(reader *r) {
     return FCT_OK;
 }
 
-/* The number of the material of that name, a new one if need be. */
+/* Finds the material of that name or adds one, and returns its number. */
 static fct_result number_material(reader *r, const char *text, size_t length, uint32_t *number) {
     fct_soup *soup = r->soup;
     fct_result result = FCT_OK;
@@ -227,7 +227,7 @@ static fct_result number_material(reader *r, const char *text, size_t length, ui
     return FCT_OK;
 }
 
-/* The name is the rest of the line, with blanks, `#` and `\` in it. */
+/* The name is the rest of the line. It may contain blanks, `#` and `\`. */
 static fct_result read_usemtl(reader *r) {
     fct_text *t = &r->t;
     fct_text_skip_blanks(t);
@@ -241,7 +241,7 @@ static fct_result read_usemtl(reader *r) {
     if (!soup->materials) {
         soup->materials = fct_allocate(r->t.env, r->total.faces, sizeof(uint32_t));
         if (!soup->materials) return fct_fail_memory(r->t.env, "materials");
-        /* Faces before the first usemtl have the material without a name. */
+        /* Faces before the first usemtl get a material with an empty name. */
         if (r->seen.faces) {
             fct_result result = number_material(r, "", 0, &r->material);
             if (result != FCT_OK) return result;
@@ -279,13 +279,13 @@ static fct_result read_normal(reader *r) {
     return read_floats(r, 3, 3, r->normals + 3 * r->seen.normals++, &count);
 }
 
-static bool is_in(const char *word, size_t length, const char *const *list) {
+static bool list_contains(const char *word, size_t length, const char *const *list) {
     for (; *list; ++list)
         if (fct_text_word_is(word, length, *list)) return true;
     return false;
 }
 
-/* Skips a statement that defines no triangles. Curves, lines and points are counted; unknown words too. */
+/* Skips statements that hold neither vertices nor faces. The first statement must be a known one. */
 static fct_result read_other(reader *r, const char *word, size_t length) {
     static const char *const silent[] = {"o",      "g",          "s",         "mg",    "mtllib", "maplib",
                                          "usemap", "bevel",      "c_interp",  "lod",   "vp",     "d_interp",
@@ -293,9 +293,9 @@ static fct_result read_other(reader *r, const char *word, size_t length) {
     static const char *const geometry[] = {"p",    "l",    "curv", "curv2",  "surf", "parm",
                                            "trim", "hole", "scrv", "sp",     "end",  "con",
                                            "deg",  "bmat", "step", "cstype", NULL};
-    if (is_in(word, length, geometry)) {
+    if (list_contains(word, length, geometry)) {
         ++r->elements_left_out;
-    } else if (!is_in(word, length, silent)) {
+    } else if (!list_contains(word, length, silent)) {
         if (!r->known) {
             r->t.p = word;
             return fct_text_expected(&r->t, "an OBJ statement");
@@ -358,10 +358,10 @@ static fct_result allocate_mesh(reader *r) {
     return result;
 }
 
-static void finish_texcoords(reader *r) {
+static void look_up_texcoords(reader *r) {
     fct_soup *soup = r->soup;
     if (!soup->texcoords) return;
-    if (r->corners_without_texcoord == soup->corner_count) { /* there are vt, but none is used */
+    if (r->corners_without_texcoord == soup->corner_count) { /* the file has vt, but no face uses them */
         fct_release(r->t.env, soup->texcoords);
         soup->texcoords = NULL;
         return;
@@ -378,7 +378,8 @@ static void finish_texcoords(reader *r) {
     }
 }
 
-/* Whether every corner has a normal and no vertex two different ones; numbers[v] receives the vertex's. */
+/* Whether every corner has a normal and all corners of a vertex have the same. numbers[v] receives the number
+ * of vertex v's normal. */
 static bool normals_agree(const reader *r, uint32_t *numbers) {
     const fct_soup *soup = r->soup;
     memset(numbers, 0xff, soup->vertex_count * sizeof(uint32_t));
@@ -393,7 +394,7 @@ static bool normals_agree(const reader *r, uint32_t *numbers) {
     return true;
 }
 
-static fct_result finish_normals(reader *r) {
+static fct_result collect_normals(reader *r) {
     fct_soup *soup = r->soup;
     if (!r->corner_normals || r->corners_without_normal == soup->corner_count) return FCT_OK;
     uint32_t *numbers = fct_allocate(r->t.env, soup->vertex_count, sizeof(uint32_t));
@@ -413,7 +414,7 @@ static fct_result finish_normals(reader *r) {
     return result;
 }
 
-static fct_result finish(reader *r) {
+static fct_result complete_mesh(reader *r) {
     if (!r->known) return fct_fail(r->t.env, FCT_ERROR_DATA, "%s: the file has no OBJ statement", r->t.name);
     if (r->soup->colors && r->vertices_without_color)
         fct_note(r->t.env, FCT_MESSAGE_WARNING, "%s: %zu vertices have no colour and get white", r->t.name,
@@ -422,8 +423,8 @@ static fct_result finish(reader *r) {
         fct_note(r->t.env, FCT_MESSAGE_NOTE,
                  "%s: %zu statements of points, lines and free-form shapes are left out", r->t.name,
                  r->elements_left_out);
-    finish_texcoords(r);
-    return finish_normals(r);
+    look_up_texcoords(r);
+    return collect_normals(r);
 }
 
 fct_result fct_read_obj(const fct_source *source, fct_soup *out) {
@@ -438,7 +439,7 @@ fct_result fct_read_obj(const fct_source *source, fct_soup *out) {
         if (result == FCT_OK) result = read_statement(&r);
         if (result == FCT_OK) fct_text_next_line(&r.t);
     }
-    if (result == FCT_OK) result = finish(&r);
+    if (result == FCT_OK) result = complete_mesh(&r);
     fct_release(source->env, r.texcoords);
     fct_release(source->env, r.normals);
     fct_release(source->env, r.corner_normals);

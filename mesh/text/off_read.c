@@ -1,9 +1,9 @@
 /* mesh/text/off_read.c: Geomview OFF, text, with the prefixes ST, C and N in any combination.
  *
  * A vertex line holds x y z, then a normal (N), a colour of 3 or 4 components (C), texture coordinates (ST).
- * A face line holds n, n indices, and nothing, 3 or 4 colour components, or the number of a colour map's
- * entry, which is passed over, for the map is not in the file. Components written with a point or an exponent
- * are linear floats, others sRGB bytes.
+ * A face line holds n, n indices, and optionally 3 or 4 colour components or one index into a colour map. The
+ * reader ignores the index, because the file does not contain the map. Colour components with a point or an
+ * exponent are linear floats; components without are sRGB bytes.
  */
 #include "mesh/text/off_read.h"
 
@@ -48,7 +48,7 @@ static fct_result read_head(reader *r) {
     return FCT_OK;
 }
 
-/* "V F E" on one line; E is of no use and may be missing or wrong. */
+/* "V F E" on one line. E is not used, so it may be missing or wrong. */
 static fct_result read_counts(reader *r, int64_t *vertices, int64_t *faces) {
     int64_t edges;
     fct_text *t = &r->t;
@@ -75,7 +75,7 @@ static fct_result end_line(reader *r) {
     return FCT_OK;
 }
 
-/* One component of a colour; *whole tells whether it is written as an integer. */
+/* Reads one colour component. *whole: it is written as an integer. */
 static fct_result read_component(reader *r, float *value, bool *whole) {
     const char *begin = r->t.p;
     fct_result result = fct_text_float(&r->t, "a colour component", value);
@@ -85,8 +85,8 @@ static fct_result read_component(reader *r, float *value, bool *whole) {
     return result;
 }
 
-/* Reads the colour components that are left on the line into color[3]; *count tells how many. The last
- * `behind` (0 or 2) numbers of the line are no colour and go to color + 3. */
+/* Reads the rest of the line: a colour, then `behind` (0 or 2) texture coordinates. The colour goes to
+ * color[0..2], the texture coordinates to color[3..4]. *count receives the number of colour components. */
 static fct_result read_color(reader *r, size_t behind, float *color, size_t *count) {
     float values[8];
     bool whole = true, one;
@@ -197,7 +197,7 @@ static fct_result allocate_mesh(reader *r, size_t vertices, size_t faces) {
     return fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "a mesh");
 }
 
-static fct_result finish(reader *r) {
+static fct_result complete_mesh(reader *r) {
     fct_soup *soup = r->soup;
     if (fct_text_skip_lines(&r->t, '#')) return fct_text_expected(&r->t, "the end of the file");
     if (soup->polygon_colors && r->faces_without_color)
@@ -230,7 +230,7 @@ fct_result fct_read_off(const fct_source *source, fct_soup *out) {
             result = fct_progress(source->env, "read", (double)(r.t.p - begin) / (double)source->size);
         if (result == FCT_OK) result = read_face(&r, (uint32_t)i);
     }
-    if (result == FCT_OK) result = finish(&r);
+    if (result == FCT_OK) result = complete_mesh(&r);
     fct_release(source->env, r.texcoords);
     return result;
 }

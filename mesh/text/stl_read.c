@@ -1,6 +1,8 @@
-/* mesh/text/stl_read.c: STL, binary and text. Corners with equal coordinates are one vertex (-0 equals 0),
- * numbered in the order of their first use, so that face f of the file is face f of the mesh. Facet normals
- * are left out: they follow from the winding.
+/* mesh/text/stl_read.c: STL, binary and text.
+ *
+ * Corners with equal coordinates become one vertex (-0 equals 0). Vertices are numbered in the order of their
+ * first use. Face f of the file is face f of the mesh. The reader ignores facet normals, because the winding
+ * gives them.
  */
 #include "mesh/text/stl_read.h"
 
@@ -13,11 +15,11 @@ typedef struct welder {
     const fct_env *env;
     fct_soup *soup;
     size_t corner_capacity, vertex_capacity;
-    uint32_t *slots; /* vertex numbers, FCT_NONE where free; at most half full */
+    uint32_t *slots; /* hash table of vertex numbers, FCT_NONE: free slot; at most half full */
     size_t slot_count;
 } welder;
 
-static size_t slot_of(const welder *w, const float *p) {
+static size_t hash_position(const welder *w, const float *p) {
     uint32_t bits[3];
     memcpy(bits, p, sizeof bits);
     uint64_t h = 0;
@@ -26,7 +28,7 @@ static size_t slot_of(const welder *w, const float *p) {
 }
 
 static uint32_t *find_slot(const welder *w, const float *p) {
-    for (size_t i = slot_of(w, p);; i = (i + 1) & (w->slot_count - 1)) {
+    for (size_t i = hash_position(w, p);; i = (i + 1) & (w->slot_count - 1)) {
         uint32_t v = w->slots[i];
         if (v == FCT_NONE || !memcmp(w->soup->positions + 3 * (size_t)v, p, 3 * sizeof(float)))
             return w->slots + i;
@@ -46,7 +48,7 @@ static fct_result grow_slots(welder *w) {
     return FCT_OK;
 }
 
-/* Appends a corner at p, which is finite. */
+/* Appends a corner at p. p must be finite. */
 static fct_result add_corner(welder *w, const float *p) {
     fct_soup *soup = w->soup;
     float q[3] = {p[0] + 0.f, p[1] + 0.f, p[2] + 0.f}; /* -0 becomes 0 */
@@ -105,8 +107,8 @@ static fct_result read_binary(const fct_source *source, welder *w) {
     return FCT_OK;
 }
 
-/* The next word of the file has to be this one. */
-static fct_result expect(fct_text *t, const char *expected) {
+/* Fails unless the next word of the file is `expected`. */
+static fct_result expect_word(fct_text *t, const char *expected) {
     char what[32] = "'";
     if (fct_text_skip_lines(t, 0)) {
         const char *begin = t->p;
@@ -122,30 +124,30 @@ static fct_result expect(fct_text *t, const char *expected) {
 static fct_result read_facet(fct_text *t, welder *w) {
     double ignored;
     float p[3];
-    fct_result result = expect(t, "normal");
-    for (int k = 0; result == FCT_OK && k < 3; ++k) { /* some programs write nan here */
+    fct_result result = expect_word(t, "normal");
+    for (int k = 0; result == FCT_OK && k < 3; ++k) { /* because some programs write nan here */
         size_t length;
         if (!fct_text_double(t, &ignored)) fct_text_word(t, &length);
     }
-    if (result == FCT_OK) result = expect(t, "outer");
-    if (result == FCT_OK) result = expect(t, "loop");
+    if (result == FCT_OK) result = expect_word(t, "outer");
+    if (result == FCT_OK) result = expect_word(t, "loop");
     for (int c = 0; result == FCT_OK && c < 3; ++c) {
-        result = expect(t, "vertex");
+        result = expect_word(t, "vertex");
         for (int k = 0; result == FCT_OK && k < 3; ++k) result = fct_text_float(t, "a coordinate", p + k);
         if (result == FCT_OK) result = add_corner(w, p);
     }
-    if (result == FCT_OK) result = expect(t, "endloop");
-    if (result == FCT_OK) result = expect(t, "endfacet");
+    if (result == FCT_OK) result = expect_word(t, "endloop");
+    if (result == FCT_OK) result = expect_word(t, "endfacet");
     ++w->soup->polygon_count;
     return result;
 }
 
-/* One solid after another. */
+/* A text file may hold several solids. */
 static fct_result read_text(const fct_source *source, welder *w) {
     const char *begin = source->data;
     fct_text t = {begin, begin + source->size, w->env, source->name, 1};
     while (fct_text_skip_lines(&t, 0)) {
-        fct_result result = expect(&t, "solid");
+        fct_result result = expect_word(&t, "solid");
         if (result != FCT_OK) return result;
         fct_text_next_line(&t);
         for (;;) {
@@ -169,7 +171,7 @@ static fct_result read_text(const fct_source *source, welder *w) {
     return FCT_OK;
 }
 
-/* Binary files may begin with "solid" too: the size decides first. */
+/* Binary files may also begin with "solid", so the size decides first. */
 static bool is_binary(const fct_source *source) {
     const unsigned char *p = source->data;
     if (source->size >= 84 && 84 + 50 * (uint64_t)little_32(p + 80) == source->size) return true;

@@ -41,7 +41,7 @@ static const long double powers[] = {1e0L,  1e1L,  1e2L,  1e3L,  1e4L,  1e5L,  1
                                      1e10L, 1e11L, 1e12L, 1e13L, 1e14L, 1e15L, 1e16L, 1e17L, 1e18L, 1e19L,
                                      1e20L, 1e21L, 1e22L, 1e23L, 1e24L, 1e25L, 1e26L, 1e27L};
 
-static double scale(uint64_t digits, int exponent) {
+static double scale_by_power(uint64_t digits, int exponent) {
     if (digits < (uint64_t)1 << 53 && exponent >= -22 && exponent <= 22) {
         double power = (double)powers[exponent < 0 ? -exponent : exponent];
         return exponent < 0 ? (double)digits / power : (double)digits * power;
@@ -58,7 +58,7 @@ static bool is_digit(const char *p, const char *end) {
     return p < end && (unsigned char)(*p - '0') < 10;
 }
 
-/* Reads "e-12" at p; returns p where there is no exponent. */
+/* Reads an exponent such as "e-12" at p. Returns p if there is none. */
 static const char *read_exponent(const char *p, const char *end, int *exponent) {
     if (p == end || (*p != 'e' && *p != 'E')) return p;
     const char *q = p + 1;
@@ -99,7 +99,7 @@ bool fct_text_double(fct_text *t, double *value) {
     if (!count) return false;
     p = read_exponent(p, end, &exponent);
     if (!ends_word(p, end)) return false;
-    double magnitude = scale(digits, exponent);
+    double magnitude = scale_by_power(digits, exponent);
     *value = negative ? -magnitude : magnitude;
     t->p = p;
     return true;
@@ -148,7 +148,9 @@ fct_result fct_text_expected(fct_text *t, const char *what) {
     char shown[48];
     size_t count = length < 40 ? length : 40;
     for (size_t i = 0; i < count; ++i)
-        shown[i] = word[i] < ' ' || word[i] > '~' ? '?' : word[i]; /* messages are one line of text */
+        shown[i] = word[i] < ' ' || word[i] > '~'
+                       ? '?'
+                       : word[i]; /* because a message is one line of printable text */
     strcpy(shown + count, length > count ? "..." : "");
     return fct_text_fail(t, "expected %s, found '%s'", what, shown);
 }

@@ -1,8 +1,8 @@
-/* mesh/text/text.h: numbers and words from text in memory, with line numbers for messages.
+/* mesh/text/text.h: reads numbers and words from text in memory, and counts lines for messages.
  *
- * Numbers are read without regard to the locale: up to 19 digits into an integer, scaled by a power of ten.
- * With at most 15 digits and a power within 10^22 the double is the nearest one, and always the float rounded
- * from it is the one that was printed with 9 digits or more.
+ * Numbers do not depend on the locale. The first 19 digits form an integer, which is scaled by a power of
+ * ten. With at most 15 digits and a power within 10^22, the double is the nearest one. A float that was
+ * printed with 9 digits or more reads back as the same float.
  */
 #ifndef FCT_MESH_TEXT_H
 #define FCT_MESH_TEXT_H
@@ -20,37 +20,38 @@ static inline bool fct_text_is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
 }
 
-/* Skips blanks, but no line end. */
+/* Skips blanks but stops at a line end. */
 static inline void fct_text_skip_blanks(fct_text *t) {
     while (t->p < t->end && fct_text_is_blank(*t->p)) ++t->p;
 }
 
-/* Whether nothing but blanks is left on the line (p then stands at its end). */
+/* Skips blanks. Returns whether p is then at the end of the line or file. */
 static inline bool fct_text_at_line_end(fct_text *t) {
     fct_text_skip_blanks(t);
     return t->p == t->end || *t->p == '\n';
 }
 
-/* To the begin of the next line, or the end. */
+/* Moves to the start of the next line, or to the end of the file. */
 void fct_text_next_line(fct_text *t);
-/* Skips blanks and line ends, and whole lines that begin with `comment` (0: none). False at the end. */
+/* Skips blanks, line ends and lines that begin with `comment` (0: none). False at the end of the file. */
 bool fct_text_skip_lines(fct_text *t, char comment);
 
-/* The next word of the line: its begin and length; length 0 at the line's end. p moves behind it. */
+/* Returns the next word of the line and moves p behind it. The length is 0 at the end of the line. */
 const char *fct_text_word(fct_text *t, size_t *length);
 bool fct_text_word_is(const char *word, size_t length, const char *expected);
 
-/* A number after blanks on this line. False, with p unmoved behind the blanks, when there is none, or when
- * letters follow it directly. Overflow gives infinity. */
+/* Reads a number on this line. Skips blanks before it. Returns false, with p behind the blanks, if no number
+ * follows or if the number does not end at a blank or line end. An overflowing double becomes infinity. */
 bool fct_text_double(fct_text *t, double *value);
 bool fct_text_integer(fct_text *t, int64_t *value);
 
-/* A finite number that fits a float. Errors: DATA with the line and what was found. */
+/* Reads a finite number that fits a float. `what` names it in messages. Errors: DATA, with the line and the
+ * word found. */
 fct_result fct_text_float(fct_text *t, const char *what, float *value);
 
-/* "name:line: expected WHAT, found 'word'". */
+/* Fails with "name:line: expected WHAT, found 'word'". */
 fct_result fct_text_expected(fct_text *t, const char *what);
-/* "name:line: ...". */
+/* Fails with "name:line: ...". */
 fct_result fct_text_fail(const fct_text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 #endif

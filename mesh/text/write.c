@@ -64,7 +64,7 @@ fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
     return fct_progress(sink->env, "write", 1);
 }
 
-/* A float that cannot be taken for an integer: OFF tells linear floats from bytes by the point. */
+/* Prints a float with a point or an exponent, because OFF readers take integers for sRGB bytes. */
 static void print_component(FILE *stream, float value) {
     char text[32];
     snprintf(text, sizeof text, "%.9g", (double)value);
@@ -92,7 +92,7 @@ fct_result fct_write_off(const fct_sink *sink, FILE *stream) {
     return fct_progress(sink->env, "write", 1);
 }
 
-static void facet_normal(const fct_mesh *m, size_t f, float normal[3]) {
+static void compute_facet_normal(const fct_mesh *m, size_t f, float normal[3]) {
     const uint32_t *t = m->triangles + 3 * f;
     v3 p = v3_load(m->positions + 3 * (size_t)t[0]);
     v3 a = v3_sub(v3_load(m->positions + 3 * (size_t)t[1]), p);
@@ -107,7 +107,7 @@ static void put_32(unsigned char *p, uint32_t x) {
 
 static void write_stl_facet(const fct_mesh *m, size_t f, bool ascii, FILE *stream) {
     float values[12];
-    facet_normal(m, f, values);
+    compute_facet_normal(m, f, values);
     for (int c = 0; c < 3; ++c)
         memcpy(values + 3 + 3 * c, m->positions + 3 * (size_t)m->triangles[3 * f + c], 3 * sizeof(float));
     if (ascii) {
@@ -128,7 +128,7 @@ static void write_stl_facet(const fct_mesh *m, size_t f, bool ascii, FILE *strea
     fwrite(record, sizeof record, 1, stream);
 }
 
-/* The head of a binary file must not begin with "solid". */
+/* The header of a binary file must not begin with "solid", because readers take that for text. */
 fct_result fct_write_stl(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
     fct_note_left_out(sink, FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_FACE_COLORS |
