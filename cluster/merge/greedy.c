@@ -97,10 +97,7 @@ static void price_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     (void)chunk, (void)thread;
     greedy *g = user;
     for (size_t e = begin; e < end && g->mean_costs; ++e) price_mean(g, (uint32_t)e);
-    for (size_t e = begin; e < end && !g->mean_costs; e += FCT_LANES) {
-        uint32_t count = end - e < FCT_LANES ? (uint32_t)(end - e) : FCT_LANES;
-        fct_work_costs(g->work, g->edges + e, count, g->costs + e);
-    }
+    if (!g->mean_costs) fct_work_costs(g->work, g->edges + begin, (uint32_t)(end - begin), g->costs + begin);
 }
 
 static void link_edges(greedy *g) {

@@ -206,67 +206,88 @@ static inline void apply(const f8 m[6], const f8 x[3], f8 out[3]) {
     out[2] = f8_mad(f8_mad(f8_mul(m[2], x[0]), m[4], x[1]), m[5], x[2]);
 }
 
-/* The unit eigenvector of c, whose trace is 1, for the eigenvalue that stands apart from the other two. With
- * B = (c - I / 3) / p and tr B^2 = 6, that eigenvalue of B is 2 cos(acos(r) / 3), r = det B / 2, with the
- * sign of r. The polynomial is within 4e-5 of the cosine, and the eigenvector within as much of its own,
- * which changes no Rayleigh quotient by more than 2e-9. Smith, "Eigenvalues of a symmetric 3x3 matrix", CACM
- * 4(4), 1961. */
-static inline void find_apart(const f8 c[6], f8 u[3]) {
-    f8 third = f8_set(1.0f / 3), one = f8_set(1), none = f8_set(0), two = f8_set(2);
-    f8 b[6] = {f8_sub(c[0], third), c[1], c[2], f8_sub(c[3], third), c[4], f8_sub(c[5], third)};
-    f8 diagonal = f8_mad(f8_mad(f8_mul(b[0], b[0]), b[3], b[3]), b[5], b[5]);
-    f8 others = f8_mad(f8_mad(f8_mul(b[1], b[1]), b[2], b[2]), b[4], b[4]);
-    f8 squared = f8_mul(f8_add(diagonal, f8_twice(others)), f8_set(1.0f / 6));
-    f8 invert = f8_div(one, f8_sqrt(at_least(squared, TINY)));
-    for (int i = 0; i < 6; ++i) b[i] = f8_mul(b[i], invert);
-    f8 r = f8_mul(b[0], f8_sub(f8_mul(b[3], b[5]), f8_mul(b[4], b[4])));
-    r = f8_mad(r, b[1], f8_sub(f8_mul(b[2], b[4]), f8_mul(b[1], b[5])));
-    r = f8_mul(f8_set(0.5f), f8_mad(r, b[2], f8_sub(f8_mul(b[1], b[4]), f8_mul(b[2], b[3]))));
-    f8 size = f8_min(f8_abs(r), one), cosine = f8_mad(f8_set(-0.0408812f), f8_set(0.00944362f), size);
-    cosine = f8_mad(f8_set(0.866062f), size, f8_mad(f8_set(0.165404f), cosine, size));
-    f8 value = f8_copysign(f8_mul(two, cosine), r);
-    b[0] = f8_sub(b[0], value), b[3] = f8_sub(b[3], value), b[5] = f8_sub(b[5], value);
-    /* the adjugate of B - value I is a multiple of u u^T: its column with the largest diagonal entry */
-    f8 xx = f8_sub(f8_mul(b[3], b[5]), f8_mul(b[4], b[4])),
-       xy = f8_sub(f8_mul(b[2], b[4]), f8_mul(b[1], b[5]));
-    f8 xz = f8_sub(f8_mul(b[1], b[4]), f8_mul(b[2], b[3])),
-       yy = f8_sub(f8_mul(b[0], b[5]), f8_mul(b[2], b[2]));
-    f8 yz = f8_sub(f8_mul(b[1], b[2]), f8_mul(b[0], b[4])),
-       zz = f8_sub(f8_mul(b[0], b[3]), f8_mul(b[1], b[1]));
-    f8 yes = f8_if_lt(f8_abs(xx), f8_abs(yy), one, none), most = f8_max(f8_abs(xx), f8_abs(yy));
-    u[0] = f8_if_lt(none, yes, xy, xx), u[1] = f8_if_lt(none, yes, yy, xy),
-    u[2] = f8_if_lt(none, yes, yz, xz);
-    u[0] = f8_if_lt(most, f8_abs(zz), xz, u[0]), u[1] = f8_if_lt(most, f8_abs(zz), yz, u[1]);
-    u[2] = f8_if_lt(most, f8_abs(zz), zz, u[2]);
-    invert = f8_div(one, f8_sqrt(at_least(dot3(u, u), TINY)));
-    for (int i = 0; i < 3; ++i) u[i] = f8_mul(u[i], invert);
+/* The adjugate of m, in the same order. */
+static inline void adjugate(const f8 m[6], f8 out[6]) {
+    out[0] = f8_sub(f8_mul(m[3], m[5]), f8_mul(m[4], m[4]));
+    out[1] = f8_sub(f8_mul(m[2], m[4]), f8_mul(m[1], m[5]));
+    out[2] = f8_sub(f8_mul(m[1], m[4]), f8_mul(m[2], m[3]));
+    out[3] = f8_sub(f8_mul(m[0], m[5]), f8_mul(m[2], m[2]));
+    out[4] = f8_sub(f8_mul(m[1], m[2]), f8_mul(m[0], m[4]));
+    out[5] = f8_sub(f8_mul(m[0], m[3]), f8_mul(m[1], m[1]));
 }
 
-/* The least eigenvalue of Z (8.11). It is the sum of squared distances to the best plane, because P (8.4) is
- * n^T Z n at the best d = -n^T b / c. Within 4e-5 of itself and 6e-8 of the trace of the eigenvalue in
- * double. It is the least of the Rayleigh quotient of the eigenvector u that stands apart and of the lesser
- * eigenvalue of the 2x2 matrix (ee ef; ef ff) across u. */
-static inline f8 least_spread(const lanes *l) {
-    f8 trace = f8_add(f8_add(l->covariance[0], l->covariance[3]), l->covariance[5]);
-    f8 one = f8_set(1), invert = f8_div(one, at_least(trace, TINY)), c[6], u[3], cu[3], ce[3], cf[3];
+/* 1 / sqrt(a). The processor divides and takes the root at the same time. */
+static inline f8 invert_root(f8 a) {
+    a = at_least(a, TINY);
+    return f8_mul(f8_sqrt(a), f8_div(f8_set(1), a));
+}
+
+/* The search for the least eigenvalue of Z (8.11), in three steps. It is the sum of squared distances to the
+ * best plane, because P (8.4) is n^T Z n at the best d = -n^T b / c. Within 4e-5 of itself and 1.5e-7 of the
+ * trace of the eigenvalue in double. Each step waits long for its roots and divisions, so that the processor
+ * gains if several searches take a step before any takes the next. */
+typedef struct spread_search {
+    f8 trace, c[6]; /* c = Z / trace */
+    f8 size;        /* p^2 of find_apart */
+    f8 apart[3];    /* a multiple of the eigenvector of the eigenvalue that stands apart */
+} spread_search;
+
+static inline void start_search(const lanes *l, spread_search *s) {
+    f8 third = f8_set(1.0f / 3);
+    s->trace = f8_add(f8_add(l->covariance[0], l->covariance[3]), l->covariance[5]);
+    f8 invert = f8_div(f8_set(1), at_least(s->trace, TINY)), *c = s->c;
     for (int i = 0; i < 6; ++i) c[i] = f8_mul(l->covariance[i], invert);
-    find_apart(c, u);
+    f8 x = f8_sub(c[0], third), y = f8_sub(c[3], third), z = f8_sub(c[5], third);
+    f8 diagonal = f8_mad(f8_mad(f8_mul(x, x), y, y), z, z);
+    f8 others = f8_mad(f8_mad(f8_mul(c[1], c[1]), c[2], c[2]), c[4], c[4]);
+    s->size = f8_mul(f8_add(diagonal, f8_twice(others)), f8_set(1.0f / 6));
+}
+
+/* With B = (c - I / 3) / p and tr B^2 = 6, the eigenvalue of B that stands apart from the other two is
+ * 2 cos(acos(r) / 3), r = det B / 2, with the sign of r. The polynomial is within 4e-5 of the cosine, and the
+ * eigenvector within as much of its own, which changes no Rayleigh quotient by more than 2e-9. Smith,
+ * "Eigenvalues of a symmetric 3x3 matrix", CACM 4(4), 1961. */
+static inline void find_apart(spread_search *s) {
+    f8 third = f8_set(1.0f / 3), invert = invert_root(s->size), a[6], *u = s->apart;
+    f8 b[6] = {f8_sub(s->c[0], third), s->c[1], s->c[2],
+               f8_sub(s->c[3], third), s->c[4], f8_sub(s->c[5], third)};
+    for (int i = 0; i < 6; ++i) b[i] = f8_mul(b[i], invert);
+    adjugate(b, a);
+    f8 r = f8_mul(f8_set(0.5f), f8_mad(f8_mad(f8_mul(b[0], a[0]), b[1], a[1]), b[2], a[2]));
+    f8 x = f8_min(f8_abs(r), f8_set(1)), cosine = f8_mad(f8_set(-0.0408812f), f8_set(0.00944362f), x);
+    cosine = f8_mad(f8_set(0.866062f), x, f8_mad(f8_set(0.165404f), cosine, x));
+    f8 value = f8_copysign(f8_twice(cosine), r);
+    b[0] = f8_sub(b[0], value), b[3] = f8_sub(b[3], value), b[5] = f8_sub(b[5], value);
+    /* the adjugate of B - value I is a multiple of u u^T: its column with the largest diagonal entry */
+    adjugate(b, a);
+    f8 xx = f8_abs(a[0]), yy = f8_abs(a[3]), zz = f8_abs(a[5]), most = f8_max(xx, yy);
+    u[0] = f8_if_lt(xx, yy, a[1], a[0]), u[1] = f8_if_lt(xx, yy, a[3], a[1]);
+    u[2] = f8_if_lt(xx, yy, a[4], a[2]);
+    u[0] = f8_if_lt(most, zz, a[2], u[0]), u[1] = f8_if_lt(most, zz, a[4], u[1]);
+    u[2] = f8_if_lt(most, zz, a[5], u[2]);
+}
+
+/* The least of the Rayleigh quotient of the eigenvector u that stands apart and of the lesser eigenvalue of
+ * the 2x2 matrix (ee ef; ef ff) across u. */
+static inline f8 finish_search(const spread_search *s) {
+    f8 one = f8_set(1), length = invert_root(dot3(s->apart, s->apart)), u[3], cu[3], ce[3], cf[3];
+    for (int i = 0; i < 3; ++i) u[i] = f8_mul(s->apart[i], length);
     /* unit vectors e, f across u (Duff et al. 2017) */
     f8 sign = f8_copysign(one, u[2]), a = f8_div(f8_set(-1), f8_add(sign, u[2])),
        xy = f8_mul(f8_mul(u[0], u[1]), a);
     f8 e[3] = {f8_mad(one, f8_mul(sign, f8_mul(u[0], u[0])), a), f8_mul(sign, xy),
                f8_mul(f8_set(-1), f8_mul(sign, u[0]))};
     f8 f[3] = {xy, f8_mad(sign, f8_mul(u[1], u[1]), a), f8_mul(f8_set(-1), u[1])};
-    apply(c, u, cu), apply(c, e, ce), apply(c, f, cf);
+    apply(s->c, u, cu), apply(s->c, e, ce), apply(s->c, f, cf);
     f8 ee = dot3(e, ce), ef = dot3(f, ce), ff = dot3(f, cf), squared = f8_mul(ef, ef);
     f8 half = f8_mul(f8_set(0.5f), f8_abs(f8_sub(ee, ff))), root = f8_sqrt(f8_mad(squared, half, half));
     f8 lesser = f8_sub(f8_min(ee, ff), f8_div(squared, at_least(f8_add(half, root), TINY)));
-    return f8_mul(trace, at_least(f8_min(lesser, dot3(u, cu)), 0));
+    return f8_mul(s->trace, at_least(f8_min(lesser, dot3(u, cu)), 0));
 }
 
-static inline f8 total_fit(const fct_metric *metric, const lanes *u, f8 invert_weight) {
-    f8 spread = least_spread(u);
-    return metric->measure == FCT_FIT_AREA ? spread : f8_mul(f8_mul(spread, u->area), invert_weight);
+/* Times the spread: the fit of the union. */
+static inline f8 fit_factor(const fct_metric *metric, const lanes *u, f8 invert_weight) {
+    return metric->measure == FCT_FIT_AREA ? f8_set(1) : f8_mul(u->area, invert_weight);
 }
 
 /* 2 (|a| + |b| - |a + b|) of area vectors, as 4 |a x b|^2 / ((|a| |b| + a.b) (|a| + |b| + |a + b|)) where
@@ -295,37 +316,72 @@ static inline f8 shape_share(f8 length) {
     return f8_min(at_least(bend, FLAT_SHARE), f8_set(1));
 }
 
-void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_pair *pairs,
-                      uint32_t count, float *costs) {
+/* Eight merges whose costs are found step by step. */
+typedef struct pricing {
+    spread_search spread;
+    f8 fit_factor, fit_of_parts, rest; /* rest: the terms of direction and shape */
+} pricing;
+
+static inline void start_pricing(const fct_metric *metric, const fct_record *records, const fct_pair *pairs,
+                                 pricing *p) {
     lanes a, b, u;
     f8 invert_area, invert_weight, length;
-    pair_lanes filled;
-    pairs = fill_up(pairs, count, &filled);
     load_lanes(records, pairs, false, &a);
     load_lanes(records, pairs, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
     join(metric, &a, &b, load_shared(pairs), invert_weight, &u);
-    f8 fit = at_least(f8_sub(f8_sub(total_fit(metric, &u, invert_weight), a.fit), b.fit), 0);
+    start_search(&u, &p->spread);
+    p->fit_factor = fit_factor(metric, &u, invert_weight);
+    p->fit_of_parts = f8_add(a.fit, b.fit);
     f8 direction = direction_growth(&a, &b, &u, invert_area, &length);
     f8 shape = f8_mul(f8_mul(u.area, shape_share(length)), shape_error(&a, &b, &u, invert_area));
-    f8 cost = f8_mul(f8_set((float)metric->fit_weight), fit);
-    cost = f8_mad(cost, f8_set((float)metric->direction_weight), direction);
-    cost = f8_mad(cost, f8_set((float)metric->shape_weight), shape);
-    float all[FCT_LANES];
-    f8_store(all, cost);
-    memcpy(costs, all, count * sizeof *costs);
+    p->rest = f8_mul(f8_set((float)metric->direction_weight), direction);
+    p->rest = f8_mad(p->rest, f8_set((float)metric->shape_weight), shape);
+}
+
+static inline f8 finish_pricing(const fct_metric *metric, const pricing *p) {
+    f8 fit = f8_sub(f8_mul(finish_search(&p->spread), p->fit_factor), p->fit_of_parts);
+    return f8_mad(p->rest, f8_set((float)metric->fit_weight), at_least(fit, 0));
+}
+
+/* times FCT_LANES merges take each step of the search together; more gain nothing */
+enum { BATCH = 4 };
+
+void fct_metric_costs(const fct_metric *metric, const fct_record *records, const fct_pair *pairs,
+                      uint32_t count, float *costs) {
+    pricing batch[BATCH];
+    for (uint32_t done = 0; done < count; done += BATCH * FCT_LANES) {
+        const uint32_t left = count - done, size = left < BATCH * FCT_LANES ? left : BATCH * FCT_LANES,
+                       octets = (size + FCT_LANES - 1) / FCT_LANES;
+        for (uint32_t i = 0; i < octets; ++i) {
+            const uint32_t first = done + i * FCT_LANES, rest = count - first;
+            pair_lanes filled;
+            start_pricing(metric, records,
+                          fill_up(pairs + first, rest < FCT_LANES ? rest : FCT_LANES, &filled), &batch[i]);
+        }
+        for (uint32_t i = 0; i < octets; ++i) find_apart(&batch[i].spread);
+        for (uint32_t i = 0; i < octets; ++i) {
+            float all[FCT_LANES];
+            f8_store(all, finish_pricing(metric, &batch[i]));
+            const uint32_t rest = size - i * FCT_LANES;
+            memcpy(costs + done + i * FCT_LANES, all, (rest < FCT_LANES ? rest : FCT_LANES) * sizeof *costs);
+        }
+    }
 }
 
 void fct_metric_merges(const fct_metric *metric, fct_record *records, const fct_pair *pairs, uint32_t count) {
     lanes a, b, u;
     f8 invert_area, invert_weight;
     pair_lanes filled;
+    spread_search spread;
     pairs = fill_up(pairs, count, &filled);
     load_lanes(records, pairs, false, &a);
     load_lanes(records, pairs, true, &b);
     invert(metric, &a, &b, &invert_area, &invert_weight);
     join(metric, &a, &b, load_shared(pairs), invert_weight, &u);
-    u.fit = total_fit(metric, &u, invert_weight);
+    start_search(&u, &spread);
+    find_apart(&spread);
+    u.fit = f8_mul(finish_search(&spread), fit_factor(metric, &u, invert_weight));
     f8_transpose(u.rows);
     f8_transpose(u.rows + 8);
     for (uint32_t i = 0; i < count; ++i) store_record(&u, i, &records[pairs[i].a]);

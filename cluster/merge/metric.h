@@ -1,4 +1,4 @@
-/* cluster/merge/metric.h: the default cost of a merge, INCREMENT, eight merges at once.
+/* cluster/merge/metric.h: the default cost of a merge, INCREMENT, for many merges at once.
  *
  * All lengths are those of the unit model: the mesh, moved to the origin and scaled to a bounding-box
  * diagonal of 1. A record holds the sums of one cluster in floats. Its covariance is centred on the cluster's
@@ -37,7 +37,7 @@ typedef struct fct_pair {
     float shared;
 } fct_pair;
 
-enum { FCT_LANES = 8 }; /* pairs or triangles per call */
+enum { FCT_LANES = 8 }; /* pairs or triangles in one vector */
 
 /* The records of count <= FCT_LANES triangles (count x 3 vertex ids, count perimeters). */
 #define fct_metric_faces FCT_KERNEL(fct_metric_faces)
@@ -45,7 +45,8 @@ FCT_DECLARE_KERNEL(void, fct_metric_faces,
                    (const fct_metric *metric, const float *positions, const uint32_t *triangles,
                     const float *perimeters, uint32_t count, fct_record *records));
 
-/* The INCREMENT costs of count <= FCT_LANES merges. Never NaN. Swapping a and b changes rounding only. */
+/* The INCREMENT costs of merges. The more in one call, the faster. Never NaN. Swapping a and b changes
+ * rounding only. */
 #define fct_metric_costs FCT_KERNEL(fct_metric_costs)
 FCT_DECLARE_KERNEL(void, fct_metric_costs,
                    (const fct_metric *metric, const fct_record *records, const fct_pair *pairs,

@@ -61,7 +61,7 @@ void fct_work_release(fct_work *work);
 /* Releases everything except the merges. */
 void fct_work_release_clusters(fct_work *work);
 
-/* Costs of merging count <= FCT_LANES pairs of slots. */
+/* Costs of merging pairs of slots. */
 static inline void fct_work_costs(const fct_work *work, const fct_pair *pairs, uint32_t count, float *costs) {
     if (!work->means) {
         fct_metric_costs(&work->metric, work->records, pairs, count, costs);

@@ -52,24 +52,39 @@ static void offer_unpaired(const fct_rounds *r, fct_edge_queue *queue) {
     queue->count = 0;
 }
 
-void fct_pair_offer(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    const fct_rounds *r = user;
+/* Offers the edges of some clusters to higher ones. */
+static inline void offer_lists(const fct_rounds *r, const uint32_t *clusters, uint32_t count,
+                               fct_edge_queue *queue) {
     const uint32_t *starts = r->now.starts, *lengths = r->now.lengths, *all_others = r->now.others;
     const uint32_t *keys = r->now.keys, *limits = r->limits;
-    fct_edge_queue queue;
-    queue.count = 0;
-    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
-        uint32_t start = starts[i], length = lengths[i];
+    for (uint32_t n = 0; n < count; ++n) {
+        uint32_t i = clusters[n], start = starts[i], length = lengths[i];
         i8 limit = i8_set(limits[i]);
         for (uint32_t k = 0; k < length; k += 8) {
             i8 others = i8_load(all_others + start + k);
             uint32_t mask =
                 fct_higher_ends(i, others, length - k) & i8_no_more(i8_load(keys + start + k), limit);
-            fct_enqueue(&queue, i, start + k, others, mask);
-            if (queue.count >= FCT_QUEUE) offer_unpaired(r, &queue);
+            fct_enqueue(queue, i, start + k, others, mask);
+            if (queue->count >= FCT_QUEUE) offer_unpaired(r, queue);
         }
     }
+}
+
+void fct_pair_offer(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const fct_rounds *r = user;
+    const uint32_t *limits = r->limits;
+    uint32_t open[256], count = 0; /* clusters without a mate */
+    fct_edge_queue queue;
+    queue.count = 0;
+    for (uint32_t i = (uint32_t)begin; i < end; ++i) {
+        open[count] = i;
+        count += limits[i] > 0;
+        if (count < FCT_LENGTH(open)) continue;
+        offer_lists(r, open, count, &queue);
+        count = 0;
+    }
+    offer_lists(r, open, count, &queue);
     offer_unpaired(r, &queue);
 }
 

@@ -33,14 +33,12 @@ static inline i8 keys_of(const float costs[FCT_LANES], const uint32_t faces[FCT_
     return i8_or(i8_without(order, i8_set(FCT_KEY_SIZE_BITS)), size);
 }
 
-/* Prices queue entries `at` and on, the first `count` of the FCT_LANES pairs. */
-static void price_eight(const fct_rounds *r, const fct_edge_queue *queue, uint32_t at, const fct_pair *pairs,
-                        uint32_t count) {
+/* Offers queue entries `at` and on at the costs of the first `count` of the FCT_LANES pairs. */
+static void offer_eight(const fct_rounds *r, const fct_edge_queue *queue, uint32_t at, const fct_pair *pairs,
+                        const float *costs, uint32_t count) {
     uint32_t *keys = r->now.keys, faces[FCT_LANES], new_keys[FCT_LANES], ties[FCT_LANES];
-    float costs[FCT_LANES];
     for (uint32_t k = 0; k < FCT_LANES; ++k)
         faces[k] = r->work->records[pairs[k].a].count + r->work->records[pairs[k].b].count;
-    fct_work_costs(r->work, pairs, FCT_LANES, costs);
     i8_store(new_keys, keys_of(costs, faces));
     i8_store(ties, scramble_eight(r->round, i8_load(queue->clusters + at), i8_load(queue->others + at)));
     for (uint32_t k = 0; k < count; ++k) {
@@ -58,15 +56,18 @@ static void price_eight(const fct_rounds *r, const fct_edge_queue *queue, uint32
 /* Prices and removes the queued edges; those beyond the last whole eight stay unless `all`. */
 static void price_queued(const fct_rounds *r, fct_edge_queue *queue, bool all) {
     fct_pair pairs[FCT_QUEUE + FCT_LIST_SLACK];
-    uint32_t left = all ? 0 : queue->count % FCT_LANES, count = queue->count - left;
+    float costs[FCT_QUEUE + FCT_LIST_SLACK];
+    uint32_t left = all ? 0 : queue->count % FCT_LANES, count = queue->count - left, filled = count;
     for (uint32_t q = 0; q < count; ++q) {
         uint32_t a = r->now.slots[queue->clusters[q]], b = r->now.slots[queue->others[q]];
         pairs[q] = (fct_pair){a, b, r->now.shared[queue->entries[q]]};
         __builtin_prefetch(&r->work->records[b]);
     }
-    for (uint32_t q = count; q % FCT_LANES; ++q) pairs[q] = pairs[0];
+    while (filled % FCT_LANES) pairs[filled++] = pairs[0];
+    fct_work_costs(r->work, pairs, filled, costs);
     for (uint32_t done = 0; done < count; done += FCT_LANES)
-        price_eight(r, queue, done, pairs + done, count - done < FCT_LANES ? count - done : FCT_LANES);
+        offer_eight(r, queue, done, pairs + done, costs + done,
+                    count - done < FCT_LANES ? count - done : FCT_LANES);
     queue->count = left;
     if (left == 0) return;
     i8_store(queue->clusters, i8_load(queue->clusters + count));
