@@ -129,7 +129,7 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     fct_solution *s = &bake->solution;
     s->env = env, s->scene = scene, s->def = *def;
     s->max_edge = def->max_edge > 0 ? def->max_edge : fct_surface_default_edge(scene);
-    s->fineness = fmin(fmax(sqrt(DEFAULT_ERROR / def->error), LEAST_FINENESS), MOST_FINENESS);
+    s->fineness = fct_min(fct_max(sqrt(DEFAULT_ERROR / def->error), LEAST_FINENESS), MOST_FINENESS);
     if (def->method == FCT_BAKE_FACE) {
         result = fct_lamps_create(env, scene, &s->lamps);
         if (result == FCT_OK) result = fct_elements_create(env, scene, s->max_edge / 4, &s->elements);

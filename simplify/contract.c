@@ -138,7 +138,7 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
     }
     if (!confirm_cost(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
-    if (candidate.error > 0) s->max_error2 = fmax(s->max_error2, candidate.error / candidate.area);
+    if (candidate.error > 0) s->max_error2 = fct_max(s->max_error2, candidate.error / candidate.area);
     return true;
 }
 

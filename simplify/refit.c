@@ -257,8 +257,8 @@ static void move_points(refit *r) {
         for (uint32_t i = 0; i < count; ++i) {
             uint32_t x = s->triangles[corner_next(s->ring_a[i])];
             uint32_t y = s->triangles[corner_previous(s->ring_a[i])];
-            shortest2 = fmin(shortest2, v3_norm2(v3_sub(point_position(s, x), from)));
-            shortest2 = fmin(shortest2, v3_norm2(v3_sub(point_position(s, y), from)));
+            shortest2 = fct_min(shortest2, v3_norm2(v3_sub(point_position(s, x), from)));
+            shortest2 = fct_min(shortest2, v3_norm2(v3_sub(point_position(s, y), from)));
         }
         double most2 = MAX_STEP * MAX_STEP * shortest2;
         if (length2 > most2) step = v3_scale(step, sqrt(most2 / length2));
@@ -279,7 +279,7 @@ static void move_attributes(refit *r) {
         for (uint32_t i = 0; i < n; ++i) {
             double *a = &s->attributes[(size_t)n * w + i];
             double moved = *a + r->sums[(size_t)n * w + i] / r->weights[w];
-            *a = fmin(fmax(moved, s->channels[i].lower), s->channels[i].upper);
+            *a = fct_min(fct_max(moved, s->channels[i].lower), s->channels[i].upper);
         }
     }
 }

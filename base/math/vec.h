@@ -4,6 +4,14 @@
 
 #include <math.h>
 
+/* The lesser and the greater number; b if either is NaN. Unlike fmin and fmax, each is one instruction. */
+static inline double fct_min(double a, double b) {
+    return a < b ? a : b;
+}
+static inline double fct_max(double a, double b) {
+    return a > b ? a : b;
+}
+
 typedef struct v3 {
     double x, y, z;
 } v3;

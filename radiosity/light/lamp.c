@@ -62,7 +62,7 @@ static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
         double d = world - q->origin[k];
         ray.origin[k] = q->origin[k], ray.direction[k] = (float)d;
         distance2 += d * d;
-        largest = fmax(largest, fmax(fabs(world), fabs(q->origin[k])));
+        largest = fct_max(largest, fct_max(fabs(world), fabs(q->origin[k])));
     }
     /* The ray ends before the lamp, by more than the rounding of a coordinate. */
     ray.t_max = (float)(1 - 1e-4 - 1e-6 * largest / sqrt(distance2));

@@ -118,19 +118,21 @@ static outlook estimate_cluster(const fct_lamp *lamp, const fct_receiver *rec, c
     if (side < 0 && !lamp->two_sided) return (outlook){0};
     double toward = -v3_dot(v3_load(c->area_vector), w), kernel = 1 / (FCT_PI * floor2);
     double cross =
-        sqrt((double)c->area * fmax(0, sym3_form((double[6]){c->moment[0], c->moment[1], c->moment[2],
+        sqrt((double)c->area * fct_max(sym3_form((double[6]){c->moment[0], c->moment[1], c->moment[2],
                                                              c->moment[3], c->moment[4], c->moment[5]},
-                                                 w, w)));
+                                                 w, w),
+                                       0));
     double upper = lamp->two_sided ? cross : .5 * (cross + toward);
-    double lower = lamp->two_sided ? fabs(toward) : fmax(0, toward);
+    double lower = lamp->two_sided ? fabs(toward) : fct_max(toward, 0);
     if (upper < lower) upper = lower;
-    double top = fmin(1, cosx + spread) * kernel, bottom = fmax(0, cosx - spread) * kernel;
+    double top = fct_min(cosx + spread, 1) * kernel, bottom = fct_max(cosx - spread, 0) * kernel;
     /* The direction to x turns by up to asin(spread) over the node, so x may see a face edge-on to w. */
-    double widest = fmin(c->area, upper + (side ? 0 : spread * (c->area - upper)));
+    double widest = fct_min(c->area, upper + (side ? 0 : spread * (c->area - upper)));
     if (side && cosx >= spread && spread < .5) {
-        double light = fabs(toward) * cosx * kernel, cosy = fmax(LEAST_COSINE, fabs(toward) / c->area);
-        double rms = sqrt(half2 / 3 + shift2) / r, bend = fmin(c->cone_angle, 1);
-        double error = rms * rms * (1 / fmax(LEAST_COSINE, cosx) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
+        double light = fabs(toward) * cosx * kernel, cosy = fct_max(fabs(toward) / c->area, LEAST_COSINE);
+        double rms = sqrt(half2 / 3 + shift2) / r, bend = fct_min(c->cone_angle, 1);
+        double error =
+            rms * rms * (1 / fct_max(cosx, LEAST_COSINE) + 1 / cosy) + BEND_ERROR * rms * bend / cosy;
         return (outlook){light, widest * top, light * error, true};
     }
     double light = (.5 * (lower + upper)) * average_above_zero(cosx, spread) * kernel;
@@ -170,7 +172,7 @@ static double light_triangle(const fct_lamp *lamp, const fct_receiver *rec, cons
     double size2 = v3_norm2(v3_sub(p[1], p[0])) + v3_norm2(v3_sub(p[2], p[0])) + v3_norm2(e),
            r2 = v3_norm2(d);
     double r = sqrt(r2), cosx = v3_dot(d, rec->n) / r, cosy = fabs(height) / (length * r);
-    double low = fmin(v3_dot(p[0], rec->n), fmin(v3_dot(p[1], rec->n), v3_dot(p[2], rec->n)));
+    double low = fct_min(v3_dot(p[0], rec->n), fct_min(v3_dot(p[1], rec->n), v3_dot(p[2], rec->n)));
     if (low > 0 && size2 / 36 * (cosx + cosy) < RELATIVE_ERROR * r2 * cosx * cosy) {
         v3 axes[3] = {v3_scale(v3_sub(p[1], p[0]), 1. / 6), v3_scale(v3_sub(p[2], p[0]), 1. / 6),
                       v3_scale(e, 1. / 6)};
@@ -233,7 +235,7 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
         if (o.upper <= 0) continue;
         bool full = depth + 2 > STACK_SIZE || cut->count + depth + 1 > FCT_CUT_SIZE;
         if (full || o.error <= share || o.error <= RELATIVE_ERROR * o.light) {
-            if (o.whole) o.light *= 1 + fmin(fmax(correct_cluster(rec, c), -.1), .1);
+            if (o.whole) o.light *= 1 + fct_min(fct_max(correct_cluster(rec, c), -.1), .1);
             fits = append_item(cut, node, 1, o.light) && !full && fits;
         } else {
             stack[depth++] = fct_node_child(lamp->tree, node, 1);
@@ -284,9 +286,9 @@ double fct_lamp_estimate(const fct_lamp *lamp, const fct_receiver *rec) {
     if (!lamp->table && !lamp->two_sided && toward <= -2e-3 * radius * lamp->area) return 0;
     if (r2 < .25 * radius * radius) return 1;
     /* A disk that faces the receiver gives A / (A + pi r^2) on its axis. */
-    double r = sqrt(r2), cosx = fmin(1, (height + radius) / r);
+    double r = sqrt(r2), cosx = fct_min((height + radius) / r, 1);
     double area = lamp->table ? look_up_area(lamp->table, v3_scale(d, -1 / r)) : fabs(toward) / r;
-    area += .1 * lamp->area * fmin(1, radius / r);
+    area += .1 * lamp->area * fct_min(radius / r, 1);
     return area * cosx / (area + FCT_PI * r2);
 }
 
@@ -318,8 +320,8 @@ static double weigh_cluster(const fct_lamp *lamp, const fct_receiver *rec, const
     double top = v3_dot(d, rec->n) + radius;
     if (top <= 0) return 0;
     double r = sqrt(r2), toward = -v3_dot(v3_load(c->area_vector), d);
-    double seen = lamp->two_sided ? fabs(toward) : fmax(toward, 0);
-    return (seen + .1 * c->area * r) * fmin(top, r) / (r2 * r2);
+    double seen = lamp->two_sided ? fabs(toward) : fct_max(toward, 0);
+    return (seen + .1 * c->area * r) * fct_min(top, r) / (r2 * r2);
 }
 
 /* Rough light of a node, for the choice between two children; positive unless the node sends nothing. */
@@ -336,7 +338,7 @@ static double weigh_node(const fct_lamp *lamp, const fct_receiver *rec, uint32_t
     if (length == 0 || (height <= 0 && !lamp->two_sided)) return 0;
     v3 d = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
     double size2 = .5 * length, r2 = v3_norm2(d) + size2, top = -INFINITY;
-    for (int k = 0; k < 3; ++k) top = fmax(top, v3_dot(p[k], rec->n));
+    for (int k = 0; k < 3; ++k) top = fct_max(top, v3_dot(p[k], rec->n));
     return top > 0 ? .5 * fabs(height) * (top + .1 * sqrt(size2)) / (FCT_PI * r2 * r2) : 0;
 }
 
@@ -401,7 +403,7 @@ fct_lamp_point fct_cut_point(const fct_lamp *lamp, const fct_receiver *rec, cons
 fct_receiver fct_lamp_receiver(const fct_lamp *lamp, const double point[3], const double normal[3]) {
     v3 x = v3_make(point[0], point[1], point[2]);
     fct_receiver rec = {.slack = lamp->rounding};
-    double largest = fmax(fabs(x.x), fmax(fabs(x.y), fabs(x.z)));
+    double largest = fct_max(fabs(x.x), fct_max(fabs(x.y), fabs(x.z)));
     rec.slack += 4e-7 * largest / lamp->scale;
     const double *m = lamp->to_model;
     rec.x = v3_add(transform_vector(m, x), v3_make(m[3], m[7], m[11]));
@@ -436,9 +438,10 @@ static void fill_table(void *user, size_t begin, size_t end, size_t chunk, uint3
         v3 w = v3_make(d[0], d[1], d[2]);
         for (uint32_t n = 0; n < work->count; ++n) {
             const facet *f = work->facets + n;
-            double toward = v3_dot(f->vector, w), cross = sqrt(fmax(0, sym3_form(f->moment, w, w)) * f->area);
-            double upper = work->lamp->two_sided ? cross : fmax(0, .5 * (cross + toward));
-            double lower = work->lamp->two_sided ? fabs(toward) : fmax(0, toward);
+            double toward = v3_dot(f->vector, w),
+                   cross = sqrt(fct_max(sym3_form(f->moment, w, w), 0) * f->area);
+            double upper = work->lamp->two_sided ? cross : fct_max(.5 * (cross + toward), 0);
+            double lower = work->lamp->two_sided ? fabs(toward) : fct_max(toward, 0);
             sum += .5 * (lower + upper);
         }
         work->lamp->table[k] = sum;
@@ -490,13 +493,13 @@ static void measure_lamp(fct_lamp *lamp) {
         const fct_cluster *c = fct_node_cluster(lamp->tree, lamp->view.roots[i], &room);
         v3 middle = v3_load(c->box_center);
         double half2 = v3_norm2(v3_load(c->box_half)), away2 = v3_norm2(v3_sub(middle, lamp->center));
-        lamp->radius = fmax(lamp->radius, sqrt(half2) + sqrt(away2));
+        lamp->radius = fct_max(lamp->radius, sqrt(half2) + sqrt(away2));
         lamp->rms2 += area > 0 ? c->area / area * (half2 / 3 + away2) : 0;
-        largest = fmax(largest, v3_norm(middle) + sqrt(half2));
+        largest = fct_max(largest, v3_norm(middle) + sqrt(half2));
     }
     lamp->rounding = 4e-7 * largest;
     const double *t = lamp->to_world;
-    lamp->rounding += 4e-7 * fmax(fabs(t[3]), fmax(fabs(t[7]), fabs(t[11]))) / lamp->scale;
+    lamp->rounding += 4e-7 * fct_max(fabs(t[3]), fct_max(fabs(t[7]), fabs(t[11]))) / lamp->scale;
 }
 
 /* Builds a tree of the lamp in world space. */

@@ -54,7 +54,7 @@ void fct_anchor_gather(const fct_elements *set, const float *stored, uint32_t ra
         v3_store(direction, d);
         fct_found found = fct_transport_look(set, stored, origin, direction);
         if (found.distance > 0) inverse += 1 / found.distance;
-        double weight = 1 / fmax(v3_dot(d, n), LEAST_COSINE);
+        double weight = 1 / fct_max(v3_dot(d, n), LEAST_COSINE);
         for (int c = 0; c < 3; ++c) {
             sum[c] += found.radiosity[c];
             vector[c] = v3_mad(vector[c], found.radiosity[c] * weight, d);
@@ -96,8 +96,8 @@ static bool group_is_too_wide(const grouping *g, const group *k, const fct_ancho
     for (uint32_t m = k->begin; m < k->end; ++m) {
         const size_t w = g->vertices[m];
         double apart = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p)) / a->reach;
-        double turn = sqrt(fmax(0, 1 - v3_dot(n, v3_load(s->normals + 3 * w))));
-        worst = fmax(worst, apart + turn);
+        double turn = sqrt(fct_max(1 - v3_dot(n, v3_load(s->normals + 3 * w)), 0));
+        worst = fct_max(worst, apart + turn);
     }
     return k->end - k->begin > 1 && worst > g->def->tolerance;
 }
@@ -115,7 +115,7 @@ static uint32_t gather_group(const grouping *g, group *k) {
     fct_anchor_gather(g->set, g->stored, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count),
                       a);
     double least = SHORTEST_REACH * sqrt(s->areas[v]);
-    a->reach = (float)fmin(fmax(a->reach, least), g->longest);
+    a->reach = (float)fct_min(fct_max(a->reach, least), g->longest);
     k->halve = group_is_too_wide(g, k, a, v);
     return count;
 }
@@ -154,7 +154,7 @@ static uint32_t halve_group(const grouping *g, const group *k) {
     for (uint32_t i = k->begin; i < k->end; ++i)
         for (int a = 0; a < 6; ++a) {
             double x = read_coordinate(g, g->vertices[i], a);
-            lower[a] = fmin(lower[a], x), upper[a] = fmax(upper[a], x);
+            lower[a] = fct_min(lower[a], x), upper[a] = fct_max(upper[a], x);
         }
     int axis = 0, turn = 3;
     for (int a = 1; a < 3; ++a) {

@@ -1,7 +1,7 @@
 /* radiosity/output/anchor_tree.c: see anchor_tree.h. */
 #include "radiosity/output/anchor_tree.h"
 
-#include <math.h>
+#include "base/math/vec.h"
 
 enum { STACK = 64 };
 /* |n - n'|^2 = 2 - 2 cos beyond which an anchor is not used: 37 degrees. The vertices of one group are nearer
@@ -94,9 +94,9 @@ void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3
         double side = (double)p[t->axes[mid]] - a->position[t->axes[mid]];
         struct visit low = {r.begin, mid, r.least2}, high = {mid + 1, r.end, r.least2};
         if (side < 0)
-            high.least2 = fmax(r.least2, side * side);
+            high.least2 = fct_max(r.least2, side * side);
         else
-            low.least2 = fmax(r.least2, side * side);
+            low.least2 = fct_max(r.least2, side * side);
         stack[top++] = side < 0 ? high : low;
         stack[top++] = side < 0 ? low : high;
     }

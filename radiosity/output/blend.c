@@ -57,10 +57,10 @@ static void weigh_anchors(const fct_anchors *t, v3 p, v3 n, blend *b) {
         v3 turn = v3_sub(n, v3_load(a->normal));
         x[i] =
             v3_norm(v3_sub(p, v3_load(a->position))) / a->reach + v3_norm(turn) * TURN_WEIGHT + LEAST_APART;
-        farthest = fmax(farthest, x[i]);
+        farthest = fct_max(farthest, x[i]);
         for (int c = 0; c < 3; ++c) {
             double e = a->irradiance[c], changed = e + v3_dot(v3_load(a->gradient[c]), turn);
-            b->values[i][c] = fmin(fmax(changed, LEAST_CHANGE * e), MOST_CHANGE * e);
+            b->values[i][c] = fct_min(fct_max(changed, LEAST_CHANGE * e), MOST_CHANGE * e);
         }
     }
     for (int i = 0; i < b->near.count; ++i) {

@@ -46,8 +46,8 @@ typedef struct lighting {
 } lighting;
 
 double fct_output_ray_factor(const fct_solution *s) {
-    double faces = fmax((double)s->elements.view.face_count, 1);
-    return fmin(fmax(sqrt(SMALL_SCENE / faces), 1), MOST_RAY_FACTOR);
+    double faces = fct_max((double)s->elements.view.face_count, 1);
+    return fct_min(fct_max(sqrt(SMALL_SCENE / faces), 1), MOST_RAY_FACTOR);
 }
 
 /* Barycentrics of a point's projection onto the face at `place`, clamped to the face. */
@@ -64,7 +64,7 @@ static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t p
     double scale = v3_norm2(n);
     double u = scale > 0 ? v3_dot(v3_cross(d, f), n) / scale : 1 / 3.,
            v = scale > 0 ? v3_dot(v3_cross(e, d), n) / scale : 1 / 3.;
-    u = fmin(fmax(u, 0), 1), v = fmin(fmax(v, 0), 1 - u);
+    u = fct_min(fct_max(u, 0), 1), v = fct_min(fct_max(v, 0), 1 - u);
     uv[0] = (float)u, uv[1] = (float)v;
 }
 
@@ -171,7 +171,7 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     uint32_t rays = (uint32_t)(ANCHOR_RAYS * s->fineness * fct_output_ray_factor(s));
     double tolerance = dense ? GATHER_TOLERANCE : DIRECT_TOLERANCE;
     fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : rays,
-                           .tolerance = tolerance / sqrt(fmax(s->fineness, .5)),
+                           .tolerance = tolerance / sqrt(fct_max(s->fineness, .5)),
                            .side = l->back ? -1 : 1,
                            .seed = fct_hash2(s->def.seed, l->instance)};
     return fct_anchors_create(s->env, &s->elements, s->transport.stored, l->surface, &def, anchors);

@@ -88,7 +88,7 @@ typedef struct probing {
 /* Direct light with many shadow rays plus a gather of its own. */
 static void gather_at_site(const fct_solution *s, const fct_site *site, const float normal[3], uint64_t seed,
                            double irradiance[3], uint64_t *rays) {
-    uint32_t gather_rays = (uint32_t)(GATHER_RAYS * fmax(s->fineness, 1));
+    uint32_t gather_rays = (uint32_t)(GATHER_RAYS * fct_max(s->fineness, 1));
     fct_solution_direct(s, site->point, normal, site->offset, seed, fct_solution_lamp_rays(s, LAMP_RAYS),
                         irradiance, rays);
     fct_anchor a = {.offset = site->offset};

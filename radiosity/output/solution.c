@@ -4,7 +4,7 @@
 enum { MOST_LAMP_RAYS = 64 };
 
 uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least) {
-    return (uint32_t)fmin(fmax(least * s->fineness, least), MOST_LAMP_RAYS);
+    return (uint32_t)fct_min(fct_max(least * s->fineness, least), MOST_LAMP_RAYS);
 }
 
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,

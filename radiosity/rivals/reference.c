@@ -73,12 +73,12 @@ static void world_triangle(const tracer *t, uint32_t instance, uint32_t place, v
 }
 
 static double largest_coordinate(v3 p) {
-    return fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z)));
+    return fct_max(fabs(p.x), fct_max(fabs(p.y), fabs(p.z)));
 }
 
 /* Offset of a ray's origin: the error of its rounded coordinates. */
 static double choose_offset(v3 p, double reach) {
-    return 8 * FLT_EPSILON * fmax(largest_coordinate(p), reach);
+    return 8 * FLT_EPSILON * fct_max(largest_coordinate(p), reach);
 }
 
 static fct_ray ray_from(const spot *from, v3 direction, double t_max) {
@@ -114,7 +114,7 @@ static const emitter *sample_emitter(const tracer *t, double u, double v, v3 *po
             first = middle + 1;
     }
     double below = first ? e->sums[first - 1] : 0, width = e->sums[first] - below, b[2];
-    double within = width > 0 ? fmin(fmax((target - below) / width, 0), 1) : 0;
+    double within = width > 0 ? fct_min(fct_max((target - below) / width, 0), 1) : 0;
     v3 c[3];
     world_triangle(t, e->instance, first, c);
     fct_triangle_point(within, v, b);
@@ -134,7 +134,7 @@ static void add_emitter(const tracer *t, const spot *at, const double through[3]
     if (e->two_sided) toward = fabs(toward);
     if (!(height > 0) || !(toward > 0)) return;
     double kernel = height * toward / (FCT_PI * r2 * r2), density = find_emitter_density(e);
-    double reach = fmax(largest_coordinate(from), largest_coordinate(y));
+    double reach = fct_max(largest_coordinate(from), largest_coordinate(y));
     double t_max = 1 - 1e-5 - 4 * FLT_EPSILON * reach / sqrt(r2);
     ++*rays;
     fct_ray ray = ray_from(at, d, t_max);
@@ -192,7 +192,7 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
         }
         for (int k = 0; k < 3; ++k) {
             through[k] *= material->reflectance[k];
-            survival = fmax(survival, material->reflectance[k]);
+            survival = fct_max(survival, material->reflectance[k]);
         }
         if (bounce >= SAFE_BOUNCES) {
             if (fct_random_next(random) >= survival) return;

@@ -56,7 +56,7 @@ static void set_triangle(fct_element *e, const v3 p[3], double sign) {
     e->kind = FCT_ELEMENT_TRIANGLE;
     e->center = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1 / 3.);
     e->radius = 0;
-    for (int k = 0; k < 3; ++k) e->radius = fmax(e->radius, v3_norm(v3_sub(p[k], e->center)));
+    for (int k = 0; k < 3; ++k) e->radius = fct_max(e->radius, v3_norm(v3_sub(p[k], e->center)));
     e->area = v3_norm(s);
     e->vector = s;
     memset(e->moment, 0, sizeof e->moment);
@@ -195,7 +195,7 @@ bool fct_elements_can_split(const fct_elements *set, uint32_t id) {
     v3 p[3];
     load_corners(set, e->triangle, p);
     double longest = 0;
-    for (int k = 0; k < 3; ++k) longest = fmax(longest, v3_norm(v3_sub(p[k], p[(k + 1) % 3])));
+    for (int k = 0; k < 3; ++k) longest = fct_max(longest, v3_norm(v3_sub(p[k], p[(k + 1) % 3])));
     return longest > set->min_edge && e->area > 0;
 }
 
@@ -272,7 +272,8 @@ static void sum_volume(fct_elements *set, uint32_t id) {
     else if (e->child_count)
         e->center = set->items[e->child].center;
     for (uint32_t c = e->child; c < e->child + e->child_count; ++c)
-        e->radius = fmax(e->radius, v3_norm(v3_sub(set->items[c].center, e->center)) + set->items[c].radius);
+        e->radius =
+            fct_max(e->radius, v3_norm(v3_sub(set->items[c].center, e->center)) + set->items[c].radius);
 }
 
 fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, double min_edge,
@@ -346,7 +347,7 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
         double share = area[0] + area[1] > 0 ? area[0] / (area[0] + area[1]) : .5;
         int k = *t < share ? 0 : 1;
         *t = k == 0 ? *t / share : (*t - share) / (1 - share);
-        *t = fmin(fmax(*t, 0), 1 - 1e-12);
+        *t = fct_min(fct_max(*t, 0), 1 - 1e-12);
         node = fct_node_child(tree, node, k);
     }
     return node - view.node_count;
@@ -361,7 +362,7 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         for (uint32_t i = c; i <= last; ++i) total += set->items[i].area;
         while (c < last && t * total >= before + set->items[c].area) before += set->items[c++].area;
         double area = set->items[c].area;
-        t = area > 0 ? fmin(fmax((t * total - before) / area, 0), 1 - 1e-12) : .5;
+        t = area > 0 ? fct_min(fct_max((t * total - before) / area, 0), 1 - 1e-12) : .5;
         e = &set->items[c];
     }
     const fct_instance *in = &set->view.instances[e->instance];
@@ -379,7 +380,7 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
     v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
     out->u = (float)u, out->v = (float)v;
     /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger. */
-    double size = sqrt(v3_norm(s)), reach = fmax(fmax(fabs(x.x), fabs(x.y)), fabs(x.z));
+    double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
     out->offset = (float)(1e-4 * size + 2e-7 * reach);
     v3_store(out->position, x);
     v3_store(out->normal, v3_unit(s));

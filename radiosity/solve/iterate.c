@@ -18,7 +18,7 @@ static void gather_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
 static double largest_reflectance(const fct_scene_view *view) {
     double most = 0;
     for (uint32_t k = 0; k < view->material_count; ++k)
-        for (int c = 0; c < 3; ++c) most = fmax(most, view->materials[k].reflectance[c]);
+        for (int c = 0; c < 3; ++c) most = fct_max(most, view->materials[k].reflectance[c]);
     return most;
 }
 

@@ -71,8 +71,8 @@ static double add_link(const fct_elements *set, const fct_link *link, const gath
     double r2 = v3_norm2(d);
     if (r2 <= 0) return 0;
     v3 u = v3_scale(d, 1 / sqrt(r2)), back = v3_scale(u, -1);
-    double cosine =
-        site->leaf ? fct_projected_area(site->leaf, u) / site->leaf->area : fmax(v3_dot(site->normal, u), 0);
+    double cosine = site->leaf ? fct_projected_area(site->leaf, u) / site->leaf->area
+                               : fct_max(v3_dot(site->normal, u), 0);
     if (cosine <= 0) return 0;
     double projected = fct_projected_area(j, back);
     double factor = link->weight * cosine * fct_distance_factor(r2, projected);

@@ -55,13 +55,13 @@ static inline double fct_pair_form_bound(const fct_element *i, const fct_element
         double spread = .5 * (pair->radii / pair->distance);
         double pj = fct_projected_bound(j, v3_scale(pair->toward, -1), spread);
         double pi = i->area > 0 ? fct_projected_bound(i, pair->toward, spread) / i->area : 0;
-        return fmin(1, pj * pi * fct_distance_factor(pair->distance * pair->distance, pj));
+        return fct_min(pj * pi * fct_distance_factor(pair->distance * pair->distance, pj), 1);
     }
     if (i->kind == FCT_ELEMENT_VOLUME || j->kind == FCT_ELEMENT_VOLUME) return 1;
     v3 s = i == j ? i->vector : v3_add(i->vector, j->vector);
     double area = i == j ? i->area : i->area + j->area;
-    double bend = fmax(area - v3_norm(s), 0);
-    return i->area > 0 ? fmin(1, fmin(bend, fmin(i->area, j->area)) / i->area) : 0;
+    double bend = fct_max(area - v3_norm(s), 0);
+    return i->area > 0 ? fct_min(fct_min(bend, fct_min(i->area, j->area)) / i->area, 1) : 0;
 }
 
 /* Largest power, summed over channels, that i reflects of what j sends if nothing blocks it: rho_i b_j F_ij
@@ -70,7 +70,7 @@ static inline double fct_pair_flow(const fct_element *i, const fct_element *j, c
     double form = fct_pair_form_bound(i, j, pair), flow = 0;
     for (int c = 0; c < 3; ++c) {
         double rho = i->kind == FCT_ELEMENT_VOLUME ? FCT_VOLUME_REFLECTANCE : i->reflectance[c];
-        flow += fmax(rho, FCT_LEAST_REFLECTANCE) * j->radiosity[c];
+        flow += fct_max(rho, FCT_LEAST_REFLECTANCE) * j->radiosity[c];
     }
     return flow * form * i->area;
 }
@@ -93,8 +93,8 @@ static inline double fct_direct_spread(const fct_element *e, int count, const do
     for (int c = 0; c < 3; ++c) {
         double least = irradiance[0][c], most = irradiance[0][c];
         for (int k = 1; k < count; ++k) {
-            least = fmin(least, irradiance[k][c]);
-            most = fmax(most, irradiance[k][c]);
+            least = fct_min(least, irradiance[k][c]);
+            most = fct_max(most, irradiance[k][c]);
         }
         spread += e->reflectance[c] * (most - least) * e->area;
         dark |= least <= 0 && most > 0;

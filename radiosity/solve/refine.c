@@ -94,7 +94,7 @@ static uint32_t sample_link(const fct_elements *set, fct_link *link, const fct_p
 /* True if every normal of one element turns away from the ball of the other. */
 static bool pair_faces_away(const fct_element *i, const fct_element *j, const fct_pair *pair) {
     if (pair->overlap) return false;
-    double angle = fct_asin(fmin((i->radius + j->radius) / pair->distance, 1));
+    double angle = fct_asin(fct_min((i->radius + j->radius) / pair->distance, 1));
     return fct_faces_away(i, pair->toward, angle) || fct_faces_away(j, v3_scale(pair->toward, -1), angle);
 }
 
@@ -115,7 +115,7 @@ static verdict judge_pair(const fct_elements *set, fct_link *link, double epsilo
     double source = 1, receiver = 1, error = 1;
     if (!pair.overlap) {
         source = fct_pair_source_error(j, &pair), receiver = fct_pair_receiver_error(i, &pair);
-        error = fmin(1, source + receiver);
+        error = fct_min(source + receiver, 1);
     }
     verdict larger = can_i && (!can_j || i->radius >= j->radius) ? SPLIT_RECEIVER : SPLIT_SOURCE;
     bool may_split = (can_i || can_j) && !(self && !can_i);

@@ -23,16 +23,16 @@ static inline double fct_projected_area(const fct_element *e, v3 u) {
     double sheet = v3_dot(e->vector, u);
     if (e->kind == FCT_ELEMENT_TRIANGLE) return sheet > 0 ? sheet : 0;
     double form = sym3_form(e->moment, u, u);
-    double mean = .5 * (FCT_TYPICAL_SPREAD * sqrt(fmax(e->area * form, 0)) + sheet);
-    return fmax(fmax(mean, sheet), 0);
+    double mean = .5 * (FCT_TYPICAL_SPREAD * sqrt(fct_max(e->area * form, 0)) + sheet);
+    return fct_max(fct_max(mean, sheet), 0);
 }
 
 /* Upper bound of the projected area in every direction whose sine to u is at most `spread`. */
 static inline double fct_projected_bound(const fct_element *e, v3 u, double spread) {
     double sheet = v3_dot(e->vector, u);
     double form = sym3_form(e->moment, u, u);
-    double bound = .5 * (sqrt(fmax(e->area * form, 0)) + sheet) + spread * e->area;
-    return fmin(fmax(bound, 0), e->area);
+    double bound = .5 * (sqrt(fct_max(e->area * form, 0)) + sheet) + spread * e->area;
+    return fct_min(fct_max(bound, 0), e->area);
 }
 
 /* True if every normal of the element turns away from every direction within `angle` of u. */
@@ -40,14 +40,14 @@ static inline bool fct_faces_away(const fct_element *e, v3 u, double angle) {
     double length = v3_norm(e->vector);
     if (e->cone >= FCT_ELEMENT_OPEN_CONE || length <= 0) return false;
     double cosine = v3_dot(e->vector, u) / length;
-    return fct_acos(fmin(fmax(cosine, -1), 1)) - e->cone - angle > FCT_ELEMENT_OPEN_CONE;
+    return fct_acos(fct_min(fct_max(cosine, -1), 1)) - e->cone - angle > FCT_ELEMENT_OPEN_CONE;
 }
 
 /* pi times the radiant intensity along u: P.u with P = sum b_k S_k, but at least the mean radiosity times the
  * projected area. P.u is right for a body that is lit on one side; it is zero for a closed body that emits
  * evenly, where the second term is right. */
 static inline double fct_sent_power(const fct_element *e, v3 u, double projected, int channel) {
-    return fmax(v3_dot(e->power[channel], u), e->radiosity[channel] * projected);
+    return fct_max(v3_dot(e->power[channel], u), e->radiosity[channel] * projected);
 }
 
 /* Irradiance of a receiver that faces the source, per fct_sent_power: 1 / (pi r^2 + projected area). The area

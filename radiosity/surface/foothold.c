@@ -108,7 +108,7 @@ fct_foothold fct_corner_foothold(const fct_corners *mesh, const uint32_t *corner
         edges += .5 * (v3_norm(a) + v3_norm(b));
         mean = v3_mad(mean, angle, v3_unit(v3_add(a, b)));
         if (v3_norm2(n) == 0) continue;
-        least = fmin(least, v3_dot(n, normal));
+        least = fct_min(least, v3_dot(n, normal));
         if (angle > widest) widest = angle, out.face = corners[i] / 3;
     }
     load_corner(mesh, corners[0], p);
@@ -118,8 +118,8 @@ fct_foothold fct_corner_foothold(const fct_corners *mesh, const uint32_t *corner
         out.sample = v3_mad(p[0], PULL, v3_sub(centroid, p[0]));
     }
     out.flat = out.flat && least >= FLAT_COSINE;
-    double largest = fmax(fabs(p[0].x), fmax(fabs(p[0].y), fabs(p[0].z)));
+    double largest = fct_max(fabs(p[0].x), fct_max(fabs(p[0].y), fabs(p[0].z)));
     out.offset = (EDGE_OFFSET * edges / (double)count + ROUNDING_OFFSET * FLT_EPSILON * largest) /
-                 fmax(least, LEAST_COSINE);
+                 fct_max(least, LEAST_COSINE);
     return out;
 }

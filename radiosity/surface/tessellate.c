@@ -81,7 +81,7 @@ static bool tree_is_near(const fct_tree *tree, v3 p, double distance) {
 static bool bounds_are_near(const fct_bounds *bounds, const double p[3], double distance) {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
-        double out = fmax(bounds->lower[k] - p[k], p[k] - bounds->upper[k]);
+        double out = fct_max(bounds->lower[k] - p[k], p[k] - bounds->upper[k]);
         if (out > 0) sum += out * out;
     }
     return sum <= distance * distance;

@@ -31,7 +31,7 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
         const float *values = find_channel_values(s->mesh, channel, &count, &stride);
         for (size_t k = 0; k < count; ++k) {
             double value = factor * values[stride * k + i];
-            channel->lower = fmin(channel->lower, value), channel->upper = fmax(channel->upper, value);
+            channel->lower = fct_min(channel->lower, value), channel->upper = fct_max(channel->upper, value);
         }
         if (count == 0) channel->lower = channel->upper = 0;
     }
@@ -39,7 +39,8 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
 
 static void find_full_range(const float *values, size_t count, double *lower, double *upper) {
     *lower = INFINITY, *upper = -INFINITY;
-    for (size_t i = 0; i < count; ++i) *lower = fmin(*lower, values[i]), *upper = fmax(*upper, values[i]);
+    for (size_t i = 0; i < count; ++i)
+        *lower = fct_min(*lower, values[i]), *upper = fct_max(*upper, values[i]);
     if (count == 0) *lower = *upper = 0;
 }
 
@@ -59,7 +60,7 @@ static double find_color_range(const float *values, size_t count) {
     while (first < CELLS && (below + cells[first]) * COLOR_TAIL <= count) below += cells[first++];
     size_t above = 0;
     while (last > first && (above + cells[last - 1]) * COLOR_TAIL <= count) above += cells[--last];
-    return range * fmax((double)(last - first) / CELLS, LEAST_RANGE);
+    return range * fct_max((double)(last - first) / CELLS, LEAST_RANGE);
 }
 
 /* The larger range of u and v, so that both keep one scale. */
@@ -68,8 +69,8 @@ static double find_texcoord_range(const float *values, size_t corners) {
     for (size_t k = 0; k < 2; ++k) {
         double lower = INFINITY, upper = -INFINITY;
         for (size_t c = 0; c < corners; ++c)
-            lower = fmin(lower, values[2 * c + k]), upper = fmax(upper, values[2 * c + k]);
-        if (corners) range = fmax(range, upper - lower);
+            lower = fct_min(lower, values[2 * c + k]), upper = fct_max(upper, values[2 * c + k]);
+        if (corners) range = fct_max(range, upper - lower);
     }
     return range;
 }

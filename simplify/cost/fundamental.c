@@ -69,7 +69,7 @@ static void find_strengths(const fct_simplifier *s, float *strength, uint32_t *f
         bool same_way = s->triangles[c] == s->triangles[d];
         uint32_t from = s->corner_wedges[d], to = s->corner_wedges[corner_next(d)];
         double gap =
-            fmax(squared_gap(s, here, same_way ? from : to), squared_gap(s, there, same_way ? to : from));
+            fct_max(squared_gap(s, here, same_way ? from : to), squared_gap(s, there, same_way ? to : from));
         if (gap > strength[e]) strength[e] = (float)gap;
     }
 }

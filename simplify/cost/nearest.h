@@ -31,15 +31,15 @@ static inline foot triangle_nearest(const triangle *t, v3 p) {
     if (t->det > 0 && u >= 0 && v >= 0 && u + v <= t->det)
         u /= t->det, v /= t->det;
     else {
-        double on_ab = aa > 0 ? fmin(fmax(d1 / aa, 0), 1) : 0;
-        double on_ac = cc > 0 ? fmin(fmax(d2 / cc, 0), 1) : 0;
+        double on_ab = aa > 0 ? fct_min(fct_max(d1 / aa, 0), 1) : 0;
+        double on_ac = cc > 0 ? fct_min(fct_max(d2 / cc, 0), 1) : 0;
         double bc2 = aa + cc - 2 * bb, along = d2 - d1 + aa - bb; /* (p - b).(c - b) */
-        double y = bc2 > 0 ? fmin(fmax(along / bc2, 0), 1) : 0, x = 1 - y;
+        double y = bc2 > 0 ? fct_min(fct_max(along / bc2, 0), 1) : 0, x = 1 - y;
         double e_ab = on_ab * (on_ab * aa - 2 * d1), e_ac = on_ac * (on_ac * cc - 2 * d2);
         double e_bc = x * x * aa + y * y * cc + 2 * x * y * bb - 2 * (x * d1 + y * d2);
         u = on_ab, v = 0;
         if (e_ac < e_ab) u = 0, v = on_ac;
-        if (e_bc < fmin(e_ab, e_ac)) u = x, v = y;
+        if (e_bc < fct_min(e_ab, e_ac)) u = x, v = y;
     }
     v3 rest = v3_sub(ap, v3_add(v3_scale(t->ab, u), v3_scale(t->ac, v)));
     return (foot){u, v, v3_norm2(rest)};

@@ -17,7 +17,7 @@
 
 /* A weight for the prior that keeps the attributes' matrix regular, relative to the quadric's size. */
 static double find_group_ridge(const fct_simplifier *s, const double *q) {
-    return fmax(s->def->regularization, LEAST_RIDGE) * (quadric_trace(q) + q[10]);
+    return fct_max(s->def->regularization, LEAST_RIDGE) * (quadric_trace(q) + q[10]);
 }
 
 void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uint32_t group,
@@ -30,7 +30,7 @@ void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uin
     v3 along = v3_sub(pb, pa);
     double length2 = v3_norm2(along);
     double t = length2 > 0 ? v3_dot(v3_sub(candidate->at, pa), along) / length2 : .5;
-    t = fmin(fmax(t, 0), 1);
+    t = fct_min(fct_max(t, 0), 1);
     for (uint32_t k = s->steering; k < s->channel_count; ++k)
         attributes[k] = first[k] + t * (second[k] - first[k]);
     if (!s->steering) return;
@@ -40,7 +40,7 @@ void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uin
     fct_quadric_eliminate(sum, s->steering, prior, find_group_ridge(s, sum), &e);
     fct_quadric_attributes(&e, s->steering, candidate->at, attributes);
     for (uint32_t k = 0; k < s->steering; ++k)
-        attributes[k] = fmin(fmax(attributes[k], s->channels[k].lower), s->channels[k].upper);
+        attributes[k] = fct_min(fct_max(attributes[k], s->channels[k].lower), s->channels[k].upper);
 }
 
 /* delta = -(A + ridge I)^-1 g by an L D L^T decomposition; false if a pivot is not positive. */
@@ -75,7 +75,7 @@ static void place_on_segment(const double *r, v3 a, v3 b, double ridge, fct_cand
     v3 along = v3_sub(b, a), middle = v3_scale(v3_add(a, b), .5);
     double curvature = sym3_form(r, along, along) + ridge * v3_norm2(along);
     double t = curvature > 0 ? -v3_dot(along, quadric_gradient(r, middle)) / curvature : 0;
-    t = fmin(fmax(t, -.5), .5);
+    t = fct_min(fct_max(t, -.5), .5);
     v3 at = t == -.5 ? a : t == .5 ? b : v3_mad(middle, t, along);
     *best = (fct_candidate){.at = at, .end = t == -.5 ? 0 : t == .5 ? 1 : 2, .error = quadric_at(r, at)};
 }

@@ -83,13 +83,13 @@ static void find_frame(fct_simplifier *s) {
     for (uint32_t v = 0; v < s->mesh->vertex_count; ++v) {
         if (s->point_of[v] == FCT_NONE) continue;
         v3 p = v3_load(s->mesh->positions + 3 * (size_t)v);
-        lower = (v3){fmin(lower.x, p.x), fmin(lower.y, p.y), fmin(lower.z, p.z)};
-        upper = (v3){fmax(upper.x, p.x), fmax(upper.y, p.y), fmax(upper.z, p.z)};
+        lower = (v3){fct_min(lower.x, p.x), fct_min(lower.y, p.y), fct_min(lower.z, p.z)};
+        upper = (v3){fct_max(upper.x, p.x), fct_max(upper.y, p.y), fct_max(upper.z, p.z)};
     }
     bool empty = s->point_count == 0;
     v3 size = v3_sub(upper, lower);
     s->center = empty ? (v3){0, 0, 0} : v3_scale(v3_add(lower, upper), .5);
-    s->extent = empty ? 1 : fmax(size.x, fmax(size.y, size.z));
+    s->extent = empty ? 1 : fct_max(size.x, fct_max(size.y, size.z));
     if (!(s->extent > 0)) s->extent = 1;
 }
 
