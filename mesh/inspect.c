@@ -131,7 +131,7 @@ static fct_result count_duplicates(const fct_env *env, sides *s, fct_mesh_report
     return result;
 }
 
-static void measure(const fct_mesh *mesh, fct_mesh_report *report) {
+static void measure_surface(const fct_mesh *mesh, fct_mesh_report *report) {
     for (int k = 0; k < 3; ++k) report->bounds.lower[k] = INFINITY, report->bounds.upper[k] = -INFINITY;
     for (size_t v = 0; v < mesh->vertex_count; ++v)
         for (int k = 0; k < 3; ++k) {
@@ -171,7 +171,7 @@ fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fct_mesh_r
                                 FCT_ARRAY(u.loops, vertices),  FCT_ARRAY_ZERO(u.on_boundary, vertices)};
     result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "an inspection");
     if (result != FCT_OK) goto done;
-    measure(mesh, &found);
+    measure_surface(mesh, &found);
     fct_sets_create(u.corners, corners);
     fct_sets_create(u.faces, mesh->face_count);
     fct_sets_create(u.loops, vertices);

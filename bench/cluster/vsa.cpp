@@ -60,7 +60,7 @@ Mesh convert(const fct_mesh &input, std::vector<uint32_t> &kept) {
     return mesh;
 }
 
-void measure(const char *path, uint32_t count, seeding::Seeding_method method) {
+void measure_approximation(const char *path, uint32_t count, seeding::Seeding_method method) {
     fct_env env = bench_env(2);
     fct_mesh input;
     bench_load(&env, path, &input);
@@ -94,7 +94,7 @@ void measure(const char *path, uint32_t count, seeding::Seeding_method method) {
 int main(int argc, char **argv) {
     if (argc != 4) bench_fail("usage: vsa MESH K random|hierarchical|incremental");
     try {
-        measure(argv[1], bench_count(argv[2], "K"), method_of(argv[3]));
+        measure_approximation(argv[1], bench_count(argv[2], "K"), method_of(argv[3]));
     } catch (const std::exception &e) {
         bench_fail("%s: %s", argv[1], e.what());
     }

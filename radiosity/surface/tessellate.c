@@ -228,7 +228,7 @@ done:
 }
 
 /* Translates face numbers to the mesh as it was added and to tree places, and makes the surface. */
-static fct_result make_surface(patch *c, fct_surface *out) {
+static fct_result store_surface(patch *c, fct_surface *out) {
     const fct_env *env = c->env;
     const fct_model *model = c->view.models + c->view.instances[c->instance].model;
     fct_tree_view tree = fct_tree_get(model->tree);
@@ -269,7 +269,7 @@ fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_
     *out = (fct_surface){0};
     fct_result result = place_model(&c);
     if (result == FCT_OK) result = split_long_edges(&c);
-    if (result == FCT_OK) result = make_surface(&c, out);
+    if (result == FCT_OK) result = store_surface(&c, out);
     fct_release(env, c.positions);
     fct_release(env, c.triangles);
     fct_release(env, c.faces);

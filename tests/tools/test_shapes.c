@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 static const double pi = 3.14159265358979323846;
 static tool test_tool;

@@ -4,7 +4,7 @@
  * so that the mean radiosity suits exposure 1. Each flat patch is cut into pieces, to reach the number of
  * triangles.
  */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 

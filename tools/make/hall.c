@@ -5,7 +5,7 @@
  * floor continues behind an object that touches it. Where parts meet, all lengths are multiples of 1/64,
  * which floats store exactly.
  */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 #include <string.h>

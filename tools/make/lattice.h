@@ -3,7 +3,7 @@
 #ifndef FCT_TOOLS_LATTICE_H
 #define FCT_TOOLS_LATTICE_H
 
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 enum {
     B = 8, /* cells along a block */

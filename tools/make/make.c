@@ -1,5 +1,5 @@
 /* tools/make/make.c: facetree make: example scenes and meshes. */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <limits.h>
 #include <math.h>

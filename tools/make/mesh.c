@@ -1,5 +1,5 @@
 /* tools/make/mesh.c: a mesh that grows, and the files of a scene. */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <limits.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* tools/make/museum.c: the museum: the hall, its columns, benches and lamps, and statues on plinths. The
  * statues share the requested triangles. The vase comes last, so that its exact count corrects the total.
  */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* tools/make/noise.c: seeded value noise without tables: a hash at each integer point, and smooth
  * interpolation. */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 

@@ -1,7 +1,7 @@
 /* tools/make/shapes.c: spheres, boxes, surfaces of revolution, sheets and crates. Every closed shape is a
  * manifold whose faces look outwards.
  */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 

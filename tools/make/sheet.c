@@ -1,6 +1,6 @@
 /* tools/make/sheet.c: writes a sheet to a PLY file row by row, so that the disk limits its size and not the
  * memory. The bytes are those that fct_mesh_save would write. */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
  * ellipsoids, a trefoil knot of rope, a ball of gyroid and a spiral shell. The vase is a surface of
  * revolution. All stand on y = 0, are about one unit high, and have fine seeded relief.
  */
-#include "tools/make/make.h"
+#include "tools/make/parts.h"
 
 #include <math.h>
 

@@ -1,4 +1,4 @@
-/* bench/cluster/boxquery.c: plain queries of a tree of boxes: rays, and contact with a copy.
+/* bench/cluster/boxes/boxquery.c: plain queries of a tree of boxes: rays, and contact with a copy.
  *
  * All arithmetic is in double. Boxes are enlarged by a millionth of their size, so that rounding never
  * excludes a point on a side of a box. So every tree finds the same hits. The program ends
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #include "bench/cluster/bench.h"
-#include "bench/cluster/boxtree.h"
+#include "bench/cluster/boxes/boxtree.h"
 
 static v3 corner(const fct_mesh *mesh, uint32_t face, uint32_t k) {
     return v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)face + k]);

@@ -1,5 +1,5 @@
 /* Stored solution: direct light, gathered light, power and noise against closed forms. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/solve/transport.h"
 
 static fct_env plain; /* outlives every scene */

@@ -1,6 +1,6 @@
 /* Formulas of transfer.h and oracle.h on elements made by hand, against sums over triangles, numerical
  * integration between patches, and closed forms. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/solve/oracle.h"
 
 static const double pi = 3.14159265358979323846;

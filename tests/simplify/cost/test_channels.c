@@ -1,5 +1,5 @@
 /* The scales of attributes: ranges, weights, order, and the values of wedges. */
-#include "oracle.h"
+#include "../oracle.h"
 
 static fct_env env;
 

@@ -1,5 +1,5 @@
 /* The initial quadric of every wedge against the direct sum over its faces and constraint planes. */
-#include "oracle.h"
+#include "../oracle.h"
 
 static fct_env env;
 

@@ -1,6 +1,6 @@
 /* The nearest point of a triangle by brute force; the loss of a contraction against its definition, evaluated
  * on the whole mesh. */
-#include "oracle.h"
+#include "../oracle.h"
 #include "simplify/cost/loss.h"
 #include "simplify/cost/nearest.h"
 #include "simplify/topology/ring.h"

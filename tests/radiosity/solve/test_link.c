@@ -1,6 +1,6 @@
 /* Links and iteration: form factors against integrals, visible fractions, and solutions against a dense
  * solve. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/solve/iterate.h"
 #include "radiosity/solve/refine.h"
 

@@ -1,6 +1,6 @@
 /* Anchors: gathers against closed forms, the search against all anchors, blends against the fields they
  * sample. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/blend.h"
 #include "radiosity/surface/tessellate.h"

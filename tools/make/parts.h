@@ -1,8 +1,8 @@
-/* tools/make/make.h: example scenes and meshes: a growing mesh, shapes, smooth surfaces, and scenes. Lengths
+/* tools/make/parts.h: example scenes and meshes: a growing mesh, shapes, smooth surfaces, and scenes. Lengths
  * are in metres, y is up. Every result depends only on the arguments and the seed.
  */
-#ifndef FCT_TOOLS_MAKE_H
-#define FCT_TOOLS_MAKE_H
+#ifndef FCT_TOOLS_PARTS_H
+#define FCT_TOOLS_PARTS_H
 
 #include "tools/kit/env.h"
 

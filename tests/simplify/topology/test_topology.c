@@ -1,6 +1,6 @@
 /* Points, wedges, classes, rings and edges of a mesh against comparisons of all pairs; welding against its
  * rules. */
-#include "oracle.h"
+#include "../oracle.h"
 
 static fct_env env;
 

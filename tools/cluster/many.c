@@ -1,7 +1,7 @@
-/* tools/cluster_many.c: facetree cluster with several files: one process per core, each with one file at a
+/* tools/cluster/many.c: facetree cluster with several files: one process per core, each with one file at a
  * time, so that small and large files keep all cores busy. */
 #define _GNU_SOURCE
-#include "tools/cluster.h"
+#include "tools/cluster/many.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,4 +1,4 @@
-/* bench/cluster/boxtop.c: our clusters below a new top.
+/* bench/cluster/boxes/boxtop.c: our clusters below a new top.
  *
  * A tree for rays alone keeps the clusters of a cut and everything below them. The tree above the cut is
  * split from the top by the surface area heuristic: sort the clusters along each axis of the node's surface
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #include "bench/cluster/bench.h"
-#include "bench/cluster/boxtree.h"
+#include "bench/cluster/boxes/boxtree.h"
 
 typedef struct item {
     uint32_t node, first, count; /* number of its box; its faces in the tree's order */

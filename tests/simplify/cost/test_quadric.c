@@ -1,5 +1,5 @@
 /* Quadrics against squared distances, and the elimination of attributes against dense solves. */
-#include "oracle.h"
+#include "../oracle.h"
 
 enum { MAX = 3 + QUADRIC_MAX_ATTRIBUTES };
 

@@ -1,6 +1,6 @@
 /* Direct light of lamps against closed forms and sums over triangles, with shadows and receivers in odd
  * places. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/light/lamp.h"
 #include "radiosity/light/lamp_cut.h"
 #include "radiosity/light/polygon.h"

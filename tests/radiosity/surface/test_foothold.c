@@ -1,5 +1,5 @@
 /* Footholds of single vertices: normals, sample points and offsets against closed forms. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/surface/foothold.h"
 
 static void assert_near(double value, double expected, double tolerance) {

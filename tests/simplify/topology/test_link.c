@@ -1,5 +1,5 @@
 /* The link condition and the fold-over test against their definitions. */
-#include "oracle.h"
+#include "../oracle.h"
 #include "simplify/topology/link.h"
 #include "simplify/topology/ring.h"
 

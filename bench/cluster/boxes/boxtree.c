@@ -1,5 +1,5 @@
-/* bench/cluster/boxtree.c: trees of boxes: ours, converted, and two that are built from the top. */
-#include "bench/cluster/boxtree.h"
+/* bench/cluster/boxes/boxtree.c: trees of boxes: ours, converted, and two that are built from the top. */
+#include "bench/cluster/boxes/boxtree.h"
 
 #include <float.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Outputs: the smoothing filter against a direct evaluation, borders, sides, sites of probes, radiosities. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/output/output.h"
 #include "radiosity/output/probe.h"
 #include "radiosity/output/smooth.h"

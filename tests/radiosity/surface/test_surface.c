@@ -1,5 +1,5 @@
 /* Surfaces: no T-junctions, sizes of edges, creases, refinement. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/split.h"
 #include "radiosity/surface/tessellate.h"

@@ -1,5 +1,5 @@
 /* Elements against direct sums over their triangles in plain double, and their points against the surface. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/solve/element.h"
 
 static fct_env plain; /* outlives every scene */

@@ -1,5 +1,5 @@
 /* The path tracer against closed forms. */
-#include "place.h"
+#include "../place.h"
 #include "radiosity/rivals/reference.h"
 
 static fct_env plain; /* outlives every scene */

@@ -1,5 +1,5 @@
-/* bench/cluster/boxes.c: compares our boxes with those of a top-down OBB tree and of an axis-aligned tree, by
- * surface area and by the boxes that queries visit.
+/* bench/cluster/boxes/boxes.c: compares our boxes with those of a top-down OBB tree and of an axis-aligned
+ * tree, by surface area and by the boxes that queries visit.
  *
  * usage: boxes MESH [REPEATS]
  * All trees have one triangle per leaf, and the same code walks them. Queries: a grid of parallel rays from
@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "bench/cluster/bench.h"
-#include "bench/cluster/boxtree.h"
+#include "bench/cluster/boxes/boxtree.h"
 
 enum { TREES = 5, CUT = 4096, QUERIES = 4, GRID = 160, RAYS = 20000, POSES = 150, MOST_REPEATS = 25 };
 

@@ -1,6 +1,6 @@
 /* Groups by brute force; positions, costs and attributes against one dense system over the position and the
  * attributes of all groups. */
-#include "oracle.h"
+#include "../oracle.h"
 #include "simplify/cost/placement.h"
 
 static fct_env env;

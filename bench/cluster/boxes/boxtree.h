@@ -1,5 +1,5 @@
-/* bench/cluster/boxtree.h: binary trees of boxes with one triangle per leaf, from several builders, and plain
- * queries that walk all of them with the same code.
+/* bench/cluster/boxes/boxes/boxtree.h: binary trees of boxes with one triangle per leaf, from several
+ * builders, and plain queries that walk all of them with the same code.
  *
  * Box i < face_count - 1 is inner node i. Box face_count - 1 + f is the leaf of face f. A child is the number
  * of a box. All boxes have the same form, so only the trees and their frames differ.
