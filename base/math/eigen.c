@@ -11,24 +11,9 @@
 
 #include "base/math/simd_d8.h"
 
-/* Eight vectors, one per lane. */
-typedef struct w3 {
-    d8 x, y, z;
-} w3;
+#define W3_LANES d8
+#include "base/math/w3.h"
 
-static inline d8 d8_mad(d8 a, d8 b, d8 c) {
-    return d8_add(a, d8_mul(b, c));
-}
-static inline d8 w3_dot(w3 a, w3 b) {
-    return d8_mad(d8_mad(d8_mul(a.x, b.x), a.y, b.y), a.z, b.z);
-}
-static inline w3 w3_cross(w3 a, w3 b) {
-    return (w3){d8_sub(d8_mul(a.y, b.z), d8_mul(a.z, b.y)), d8_sub(d8_mul(a.z, b.x), d8_mul(a.x, b.z)),
-                d8_sub(d8_mul(a.x, b.y), d8_mul(a.y, b.x))};
-}
-static inline w3 w3_scale(w3 a, d8 s) {
-    return (w3){d8_mul(a.x, s), d8_mul(a.y, s), d8_mul(a.z, s)};
-}
 /* s a + t b */
 static inline w3 w3_mix(w3 a, d8 s, w3 b, d8 t) {
     return (w3){d8_mad(d8_mul(a.x, s), b.x, t), d8_mad(d8_mul(a.y, s), b.y, t),
@@ -39,10 +24,7 @@ static inline w3 w3_if_lt(d8 p, d8 q, w3 a, w3 b) {
 }
 /* a^T M b */
 static inline d8 d8_form(const d8 m[6], w3 a, w3 b) {
-    w3 mb = {d8_mad(d8_mad(d8_mul(m[0], b.x), m[1], b.y), m[2], b.z),
-             d8_mad(d8_mad(d8_mul(m[1], b.x), m[3], b.y), m[4], b.z),
-             d8_mad(d8_mad(d8_mul(m[2], b.x), m[4], b.y), m[5], b.z)};
-    return w3_dot(a, mb);
+    return w3_dot(a, w3_apply(m, b));
 }
 
 static inline d8 largest_entry(const d8 m[6]) {

@@ -15,6 +15,9 @@
 
 #include "base/math/simd.h"
 
+#define W3_LANES f8
+#include "base/math/w3.h"
+
 /* The least divisor. */
 #define TINY 1e-30f
 
@@ -47,19 +50,12 @@ static inline void store_record(const lanes *from, uint32_t row, fct_record *rec
     memcpy((char *)record + sizeof *from->rows, &from->rows[row + 8], sizeof *from->rows);
 }
 
-static inline f8 f8_mad(f8 a, f8 b, f8 c) {
-    return f8_add(a, f8_mul(b, c));
-}
 static inline f8 f8_twice(f8 a) {
     return f8_add(a, a);
 }
 static inline f8 at_least(f8 a, float least) {
     return f8_max(a, f8_set(least));
 }
-static inline f8 dot3(const f8 a[3], const f8 b[3]) {
-    return f8_mad(f8_mad(f8_mul(a[0], b[0]), a[1], b[1]), a[2], b[2]);
-}
-
 /* The sums of four triangles. */
 typedef struct face_sums {
     d4 covariance[6], centroid[3], vector[3], area;
@@ -199,13 +195,6 @@ static inline void join(const fct_metric *metric, const lanes *a, const lanes *b
     u->perimeter = f8_max(f8_sub(f8_add(a->perimeter, b->perimeter), f8_twice(shared)), none);
 }
 
-/* M x for M = xx xy xz yy yz zz */
-static inline void apply(const f8 m[6], const f8 x[3], f8 out[3]) {
-    out[0] = f8_mad(f8_mad(f8_mul(m[0], x[0]), m[1], x[1]), m[2], x[2]);
-    out[1] = f8_mad(f8_mad(f8_mul(m[1], x[0]), m[3], x[1]), m[4], x[2]);
-    out[2] = f8_mad(f8_mad(f8_mul(m[2], x[0]), m[4], x[1]), m[5], x[2]);
-}
-
 /* The adjugate of m, in the same order. */
 static inline void adjugate(const f8 m[6], f8 out[6]) {
     out[0] = f8_sub(f8_mul(m[3], m[5]), f8_mul(m[4], m[4]));
@@ -270,19 +259,19 @@ static inline void find_apart(spread_search *s) {
 /* The least of the Rayleigh quotient of the eigenvector u that stands apart and of the lesser eigenvalue of
  * the 2x2 matrix (ee ef; ef ff) across u. */
 static inline f8 finish_search(const spread_search *s) {
-    f8 one = f8_set(1), length = invert_root(dot3(s->apart, s->apart)), u[3], cu[3], ce[3], cf[3];
-    for (int i = 0; i < 3; ++i) u[i] = f8_mul(s->apart[i], length);
+    f8 one = f8_set(1), minus = f8_set(-1);
+    w3 u = w3_load(s->apart);
+    u = w3_scale(u, invert_root(w3_dot(u, u)));
     /* unit vectors e, f across u (Duff et al. 2017) */
-    f8 sign = f8_copysign(one, u[2]), a = f8_div(f8_set(-1), f8_add(sign, u[2])),
-       xy = f8_mul(f8_mul(u[0], u[1]), a);
-    f8 e[3] = {f8_mad(one, f8_mul(sign, f8_mul(u[0], u[0])), a), f8_mul(sign, xy),
-               f8_mul(f8_set(-1), f8_mul(sign, u[0]))};
-    f8 f[3] = {xy, f8_mad(sign, f8_mul(u[1], u[1]), a), f8_mul(f8_set(-1), u[1])};
-    apply(s->c, u, cu), apply(s->c, e, ce), apply(s->c, f, cf);
-    f8 ee = dot3(e, ce), ef = dot3(f, ce), ff = dot3(f, cf), squared = f8_mul(ef, ef);
+    f8 sign = f8_copysign(one, u.z), a = f8_div(minus, f8_add(sign, u.z)), xy = f8_mul(f8_mul(u.x, u.y), a);
+    w3 e = {f8_mad(one, f8_mul(sign, f8_mul(u.x, u.x)), a), f8_mul(sign, xy),
+            f8_mul(minus, f8_mul(sign, u.x))};
+    w3 f = {xy, f8_mad(sign, f8_mul(u.y, u.y), a), f8_mul(minus, u.y)};
+    w3 cu = w3_apply(s->c, u), ce = w3_apply(s->c, e), cf = w3_apply(s->c, f);
+    f8 ee = w3_dot(e, ce), ef = w3_dot(f, ce), ff = w3_dot(f, cf), squared = f8_mul(ef, ef);
     f8 half = f8_mul(f8_set(0.5f), f8_abs(f8_sub(ee, ff))), root = f8_sqrt(f8_mad(squared, half, half));
     f8 lesser = f8_sub(f8_min(ee, ff), f8_div(squared, at_least(f8_add(half, root), TINY)));
-    return f8_mul(s->trace, at_least(f8_min(lesser, dot3(u, cu)), 0));
+    return f8_mul(s->trace, at_least(f8_min(lesser, w3_dot(u, cu)), 0));
 }
 
 /* Times the spread: the fit of the union. */
@@ -294,17 +283,11 @@ static inline f8 fit_factor(const fct_metric *metric, const lanes *u, f8 invert_
  * a.b > 0, because the plain difference loses its digits on fine meshes. *length: |a + b| / area. */
 static inline f8 direction_growth(const lanes *a, const lanes *b, const lanes *u, f8 invert_area,
                                   f8 *length) {
-    f8 p[3], q[3], s[3];
-    for (int i = 0; i < 3; ++i) {
-        p[i] = f8_mul(a->vector[i], invert_area), q[i] = f8_mul(b->vector[i], invert_area);
-        s[i] = f8_add(p[i], q[i]);
-    }
-    f8 cross[3] = {f8_sub(f8_mul(p[1], q[2]), f8_mul(p[2], q[1])),
-                   f8_sub(f8_mul(p[2], q[0]), f8_mul(p[0], q[2])),
-                   f8_sub(f8_mul(p[0], q[1]), f8_mul(p[1], q[0]))};
-    f8 lp = f8_sqrt(dot3(p, p)), lq = f8_sqrt(dot3(q, q)), ls = f8_sqrt(dot3(s, s)), dot = dot3(p, q);
+    w3 p = w3_scale(w3_load(a->vector), invert_area), q = w3_scale(w3_load(b->vector), invert_area);
+    w3 s = w3_add(p, q), cross = w3_cross(p, q);
+    f8 lp = f8_sqrt(w3_dot(p, p)), lq = f8_sqrt(w3_dot(q, q)), ls = f8_sqrt(w3_dot(s, s)), dot = w3_dot(p, q);
     f8 product = f8_mul(lp, lq), sum = f8_add(f8_add(lp, lq), ls), none = f8_set(0);
-    f8 over = f8_if_lt(none, dot, dot3(cross, cross), f8_sub(product, dot));
+    f8 over = f8_if_lt(none, dot, w3_dot(cross, cross), f8_sub(product, dot));
     f8 under = f8_if_lt(none, dot, f8_mul(f8_add(product, dot), sum), sum);
     *length = ls;
     return f8_mul(f8_mul(u->area, f8_set(4)), f8_div(over, at_least(under, TINY)));

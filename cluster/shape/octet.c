@@ -16,6 +16,9 @@
 #include "base/math/simd_d8.h"
 #include "cluster/shape/cone.h"
 
+#define W3_LANES d8
+#include "base/math/w3.h"
+
 enum {
     SAMPLES = 64,
     AREA = offsetof(fct_cluster, area) / sizeof(float),
@@ -29,12 +32,6 @@ enum {
     HALF = offsetof(fct_cluster, box_half) / sizeof(float)
 };
 
-static inline d8 dot(const d8 a[3], const d8 b[3]) {
-    return d8_add(d8_add(d8_mul(a[0], b[0]), d8_mul(a[1], b[1])), d8_mul(a[2], b[2]));
-}
-static inline d8 mad(d8 a, d8 s, d8 b) {
-    return d8_add(a, d8_mul(s, b));
-}
 static inline d8 negative(d8 a) {
     return d8_mul(a, d8_set(-1));
 }
@@ -70,7 +67,7 @@ void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
     radius = d8_if_lt(none, radius, d8_if_lt(radius, limit, radius, one), one);
     d8_store_floats(o->shrink, d8_div(one, radius));
     fct_eigen3_eight(covariance, NULL, axes);
-    d8 *n = axes[0], *u = axes[2], side = d8_if_lt(dot(n, vector), none, d8_set(-1), one);
+    d8 *n = axes[0], *u = axes[2], side = d8_if_lt(w3_dot_arrays(n, vector), none, d8_set(-1), one);
     for (int i = 0; i < 3; ++i) n[i] = d8_mul(n[i], side);
     d8 v[3] = {d8_sub(d8_mul(n[1], u[2]), d8_mul(n[2], u[1])), d8_sub(d8_mul(n[2], u[0]), d8_mul(n[0], u[2])),
                d8_sub(d8_mul(n[0], u[1]), d8_mul(n[1], u[0]))};
@@ -78,7 +75,7 @@ void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
         d8_store(o->frame[0][i], u[i]), d8_store(o->frame[1][i], v[i]), d8_store(o->frame[2][i], n[i]);
         d8_store_floats(o->words[PLANE + i], n[i]);
     }
-    d8 offset = negative(dot(n, center));
+    d8 offset = negative(w3_dot_arrays(n, center));
     d8_store_floats(o->words[PLANE + 3], d8_max(d8_min(offset, limit), negative(limit)));
 }
 
@@ -88,7 +85,7 @@ void fct_octet_sum(fct_octet *o, const fct_sums *const sums[8]) {
 static inline uint32_t find_axes(const fct_octet *o, float axis[3][8]) {
     d8 s[3];
     for (int i = 0; i < 3; ++i) s[i] = d8_load_floats(o->words[VECTOR + i]);
-    d8 squared = dot(s, s), invert = d8_div(d8_set(1), d8_sqrt(squared));
+    d8 squared = w3_dot_arrays(s, s), invert = d8_div(d8_set(1), d8_sqrt(squared));
     for (int i = 0; i < 3; ++i) d8_store_floats(axis[i], d8_mul(s[i], invert));
     return 255 & ~d8_lt(d8_set(0), squared);
 }
@@ -224,7 +221,7 @@ static void write_rotation(fct_octet *o, const d8 a[3][3]) {
         for (int k = 0; k < 4; ++k) q[k] = d8_if_lt(most, entry, rows[i][k], q[k]);
         most = d8_max(entry, most);
     }
-    for (int k = 0; k < 4; ++k) squared = mad(squared, q[k], q[k]);
+    for (int k = 0; k < 4; ++k) squared = d8_mad(squared, q[k], q[k]);
     d8 invert = d8_div(one, d8_sqrt(squared));
     for (int k = 0; k < 4; ++k) d8_store_floats(o->words[ROTATION + k], d8_mul(q[k], invert));
 }
@@ -281,12 +278,12 @@ static void fit_boxes(fct_octet *o, const fct_octet_row *points, uint32_t count)
     d8 a[3][3], low[3], high[3], first[3], along[3], center[3], size = d8_set(0);
     expand_axes(o, a);
     load_row(points, first);
-    for (int k = 0; k < 3; ++k) along[k] = low[k] = high[k] = dot(first, a[k]);
+    for (int k = 0; k < 3; ++k) along[k] = low[k] = high[k] = w3_dot_arrays(first, a[k]);
     for (uint32_t j = 1; j < count; ++j) {
         d8 p[3];
         load_row(points + j, p);
         for (int k = 0; k < 3; ++k) {
-            d8 x = dot(p, a[k]);
+            d8 x = w3_dot_arrays(p, a[k]);
             low[k] = d8_min(x, low[k]), high[k] = d8_max(x, high[k]);
         }
     }
@@ -295,7 +292,7 @@ static void fit_boxes(fct_octet *o, const fct_octet_row *points, uint32_t count)
     for (int i = 0; i < 3; ++i) center[i] = first[i];
     for (int k = 0; k < 3; ++k) {
         d8 way = d8_sub(d8_mul(d8_set(0.5), d8_add(low[k], high[k])), along[k]);
-        for (int i = 0; i < 3; ++i) center[i] = mad(center[i], way, a[k][i]);
+        for (int i = 0; i < 3; ++i) center[i] = d8_mad(center[i], way, a[k][i]);
         size = d8_max(size, d8_max(d8_abs(low[k]), d8_abs(high[k])));
     }
     for (int i = 0; i < 3; ++i) {
@@ -304,7 +301,8 @@ static void fit_boxes(fct_octet *o, const fct_octet_row *points, uint32_t count)
     }
     d8 slack = d8_mul(d8_set(16 * DBL_EPSILON), size); /* for any order of operations in a check */
     for (int k = 0; k < 3; ++k) {
-        d8 middle = dot(center, a[k]), half = d8_max(d8_sub(high[k], middle), d8_sub(middle, low[k]));
+        d8 middle = w3_dot_arrays(center, a[k]),
+           half = d8_max(d8_sub(high[k], middle), d8_sub(middle, low[k]));
         half = d8_add(half, slack);
         /* rounding to float does not make it smaller */
         half = d8_add(d8_mul(half, d8_set(1 + 0x1p-23)), d8_set(0x1p-149));

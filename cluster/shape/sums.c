@@ -14,29 +14,14 @@
 
 #include "base/math/simd.h"
 
-/* Four vectors, one per lane. */
-typedef struct w3 {
-    d4 x, y, z;
-} w3;
+#define W3_LANES d4
+#include "base/math/w3.h"
 
-static inline w3 w3_load(const float *const rows[4]) {
+static inline w3 load_corners(const float *const rows[4]) {
     d4 m[4];
     for (int i = 0; i < 4; ++i) m[i] = d4_load_floats(rows[i]);
     d4_transpose(m);
-    return (w3){m[0], m[1], m[2]};
-}
-static inline w3 w3_sub(w3 a, w3 b) {
-    return (w3){d4_sub(a.x, b.x), d4_sub(a.y, b.y), d4_sub(a.z, b.z)};
-}
-static inline w3 w3_scale(w3 a, d4 s) {
-    return (w3){d4_mul(a.x, s), d4_mul(a.y, s), d4_mul(a.z, s)};
-}
-static inline d4 w3_norm2(w3 a) {
-    return d4_add(d4_add(d4_mul(a.x, a.x), d4_mul(a.y, a.y)), d4_mul(a.z, a.z));
-}
-static inline w3 w3_cross(w3 a, w3 b) {
-    return (w3){d4_sub(d4_mul(a.y, b.z), d4_mul(a.z, b.y)), d4_sub(d4_mul(a.z, b.x), d4_mul(a.x, b.z)),
-                d4_sub(d4_mul(a.x, b.y), d4_mul(a.y, b.x))};
+    return w3_load(m);
 }
 static inline d4 third_add(d4 a, d4 b, d4 c) {
     return d4_add(a, d4_mul(d4_set(1.0 / 3), d4_add(b, c)));
@@ -48,9 +33,10 @@ static inline d4 sum3(d4 a, d4 b, d4 c) {
 void fct_sums_four(const float *const corners[3][4], fct_sums *out, float (*normals)[4]) {
     static_assert(sizeof(fct_sums) == 20 * sizeof(double), "rows of four");
     const d4 none = d4_set(0);
-    w3 p = w3_load(corners[0]), u = w3_sub(w3_load(corners[1]), p), v = w3_sub(w3_load(corners[2]), p);
+    w3 p = load_corners(corners[0]), u = w3_sub(load_corners(corners[1]), p),
+       v = w3_sub(load_corners(corners[2]), p);
     w3 e = w3_sub(v, u), s = w3_scale(w3_cross(u, v), d4_set(0.5));
-    d4 area = d4_sqrt(w3_norm2(s)), longest = d4_max(w3_norm2(u), d4_max(w3_norm2(v), w3_norm2(e)));
+    d4 area = d4_sqrt(w3_dot(s, s)), longest = d4_max(w3_dot(u, u), d4_max(w3_dot(v, v), w3_dot(e, e)));
     d4 weight = d4_if_lt(none, area, area, d4_mul(d4_set(1e-20), longest));
     d4 inverse = d4_div(d4_set(1), area), bounded = d4_if_lt(none, area, inverse, none);
     w3 n = w3_scale(s, inverse), m = w3_scale(s, bounded);
