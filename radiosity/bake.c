@@ -246,12 +246,11 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
                                fct_probe *out) {
     fct_solution *s = &bake->solution;
     const fct_scene_view *view = &s->elements.view;
-    float *irradiance = fct_allocate(s->env, 3 * count, sizeof *irradiance);
-    float *offsets = fct_allocate(s->env, count, sizeof *offsets);
-    float *units = fct_allocate(s->env, 3 * count, sizeof *units);
-    float *sites = fct_allocate(s->env, 3 * count, sizeof *sites);
-    fct_result result = FCT_ERROR_MEMORY;
-    if (!irradiance || !offsets || !units || !sites) goto done;
+    float *irradiance, *offsets, *units, *sites;
+    const fct_array arrays[] = {FCT_ARRAY(irradiance, 3 * count), FCT_ARRAY(offsets, count),
+                                FCT_ARRAY(units, 3 * count), FCT_ARRAY(sites, 3 * count)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the probes");
+    if (result != FCT_OK) return result;
     for (size_t i = 0; i < count; ++i) {
         v3_store(units + 3 * i, v3_unit(v3_load(normals + 3 * i)));
         fct_site site = fct_probe_site(s->scene, points + 3 * i, units + 3 * i);
@@ -269,12 +268,8 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
             out[i].radiosity[c] =
                 (s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * out[i].irradiance[c];
         }
-done:
-    fct_release(s->env, irradiance);
-    fct_release(s->env, offsets);
-    fct_release(s->env, units);
-    fct_release(s->env, sites);
-    return result == FCT_ERROR_MEMORY ? fct_fail_memory(s->env, "the probes") : result;
+    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
+    return result;
 }
 
 fct_result fct_bake_probe(fct_bake *bake, size_t count, const float *points, const float *normals,

@@ -258,25 +258,20 @@ static fct_result split_round(gathering *g, size_t from, double epsilon) {
     fct_elements *set = g->set;
     const fct_env *env = set->env;
     size_t most = set->count - from, chunks = fct_chunk_count(set->count, LEAF_GRAIN);
-    fct_result result = FCT_OK;
-    uint32_t *leaves = fct_allocate(env, most, sizeof *leaves);
-    g->spread = fct_allocate(env, most, sizeof *g->spread);
-    g->chunk_rays = fct_allocate_zero(env, chunks, sizeof *g->chunk_rays);
-    if (!leaves || !g->spread || !g->chunk_rays) {
-        result = fct_fail_memory(env, "direct light");
-    } else {
-        size_t count = list_leaves(set, from, leaves);
-        g->leaves = leaves;
-        fct_parallel_for(env, count, LEAF_GRAIN, direct_chunk, g);
-        for (size_t c = 0; c < chunks; ++c) g->out->rays += g->chunk_rays[c];
-        for (size_t l = 0; l < count && result == FCT_OK; ++l)
-            if (g->spread[l] > epsilon && fct_elements_can_split(set, leaves[l]))
-                result = fct_elements_split(set, leaves[l]);
-    }
-    fct_release(env, leaves);
-    fct_release(env, g->spread);
-    fct_release(env, g->chunk_rays);
-    g->leaves = NULL, g->spread = NULL, g->chunk_rays = NULL;
+    uint32_t *leaves;
+    const fct_array arrays[] = {FCT_ARRAY(leaves, most), FCT_ARRAY(g->spread, most),
+                                FCT_ARRAY_ZERO(g->chunk_rays, chunks)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "direct light");
+    if (result != FCT_OK) return result;
+    size_t count = list_leaves(set, from, leaves);
+    g->leaves = leaves;
+    fct_parallel_for(env, count, LEAF_GRAIN, direct_chunk, g);
+    for (size_t c = 0; c < chunks; ++c) g->out->rays += g->chunk_rays[c];
+    for (size_t l = 0; l < count && result == FCT_OK; ++l)
+        if (g->spread[l] > epsilon && fct_elements_can_split(set, leaves[l]))
+            result = fct_elements_split(set, leaves[l]);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    g->leaves = NULL;
     return result;
 }
 
@@ -325,18 +320,16 @@ fct_result fct_transport_solve(fct_elements *set, const fct_lamps *lamps, const 
     fct_result result = split_bent_leaves(set);
     if (result == FCT_OK) result = split_by_direct(&g, def->epsilon);
     if (result != FCT_OK) return result;
-    out->stored = fct_allocate_zero(env, 3 * set->count, sizeof *out->stored);
-    out->direct = fct_allocate_zero(env, 3 * set->count, sizeof *out->direct);
-    uint32_t *leaves = fct_allocate(env, set->count, sizeof *leaves);
-    if (out->stored && out->direct && leaves) {
-        g.leaves = leaves;
-        g.leaf_count = list_leaves(set, 0, leaves);
-        g.rays = (uint32_t)(def->fineness * rays_per_leaf(g.leaf_count));
-        result = gather_and_solve(&g, def->tolerance);
-        if (result == FCT_OK) fct_elements_pull(set);
-    } else {
-        result = fct_fail_memory(env, "the solution");
-    }
+    uint32_t *leaves;
+    const fct_array arrays[] = {FCT_ARRAY_ZERO(out->stored, 3 * set->count),
+                                FCT_ARRAY_ZERO(out->direct, 3 * set->count), FCT_ARRAY(leaves, set->count)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the solution");
+    if (result != FCT_OK) return result;
+    g.leaves = leaves;
+    g.leaf_count = list_leaves(set, 0, leaves);
+    g.rays = (uint32_t)(def->fineness * rays_per_leaf(g.leaf_count));
+    result = gather_and_solve(&g, def->tolerance);
+    if (result == FCT_OK) fct_elements_pull(set);
     fct_release(env, leaves);
     if (result != FCT_OK) fct_transport_release(env, out);
     return result;

@@ -111,13 +111,10 @@ fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const floa
         return fct_fail(env, FCT_ERROR_MEMORY, "splitting %u triangles makes more than 2^31", face_count);
     fct_result result = fct_edge_table_init(env, marked, &table);
     if (result != FCT_OK) return result;
-    out->triangles = fct_allocate(env, faces, 3 * sizeof *out->triangles);
-    out->parents = fct_allocate(env, faces, sizeof *out->parents);
-    out->ends = fct_allocate(env, marked, 2 * sizeof *out->ends);
-    if (!out->triangles || !out->parents || !out->ends) {
-        result = fct_fail_memory(env, "split triangles");
-        goto done;
-    }
+    const fct_array arrays[] = {FCT_ARRAY(out->triangles, 3 * faces), FCT_ARRAY(out->parents, faces),
+                                FCT_ARRAY(out->ends, 2 * marked)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "split triangles");
+    if (result != FCT_OK) goto done;
     for (uint32_t f = 0; f < face_count; ++f) {
         const uint32_t *t = triangles + 3 * (size_t)f;
         uint32_t m[3] = {0, 0, 0};

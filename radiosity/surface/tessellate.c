@@ -152,16 +152,15 @@ static fct_result add_midpoints(const fct_env *env, const float *old, uint32_t o
 static fct_result apply_split(patch *c, fct_split *split) {
     const fct_env *env = c->env;
     float *positions = NULL;
-    uint32_t *faces = fct_allocate(env, split->face_count, sizeof *faces);
-    uint8_t *marks = fct_allocate(env, split->face_count, sizeof *marks);
-    uint8_t *settled = fct_allocate(env, split->face_count, sizeof *settled);
-    fct_result result = FCT_ERROR_MEMORY;
-    if (faces && marks && settled)
-        result = add_midpoints(env, c->positions, c->vertex_count, split, &positions);
-    else
-        fct_fail_memory(env, "split triangles");
+    uint32_t *faces;
+    uint8_t *marks, *settled;
+    const size_t count = split->face_count;
+    const fct_array arrays[] = {FCT_ARRAY(faces, count), FCT_ARRAY(marks, count), FCT_ARRAY(settled, count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "split triangles");
+    if (result != FCT_OK) return result;
+    result = add_midpoints(env, c->positions, c->vertex_count, split, &positions);
     if (result != FCT_OK) {
-        fct_release(env, faces), fct_release(env, marks), fct_release(env, settled);
+        fct_release_all(env, arrays, FCT_LENGTH(arrays));
         return result;
     }
     for (size_t f = 0; f < split->face_count; ++f) {
@@ -201,16 +200,14 @@ static fct_result place_model(patch *c) {
     fct_result result = fct_tree_mesh(c->env, c->view.models[placed->model].tree, &mesh);
     if (result != FCT_OK) return result;
     size_t vertices = mesh.vertex_count, faces = mesh.face_count;
-    c->positions = fct_allocate(c->env, vertices, 3 * sizeof *c->positions);
-    c->triangles = fct_allocate(c->env, faces, 3 * sizeof *c->triangles);
-    c->faces = fct_allocate(c->env, faces, sizeof *c->faces);
-    c->marks = fct_allocate(c->env, faces, sizeof *c->marks);
-    c->settled = fct_allocate_zero(c->env, faces, sizeof *c->settled);
-    c->shrinks = fct_allocate(c->env, c->view.instance_count, sizeof *c->shrinks);
-    if (!c->positions || !c->triangles || !c->faces || !c->marks || !c->settled || !c->shrinks) {
-        result = fct_fail_memory(c->env, "a surface");
-        goto done;
-    }
+    const fct_array arrays[] = {FCT_ARRAY(c->positions, 3 * vertices),
+                                FCT_ARRAY(c->triangles, 3 * faces),
+                                FCT_ARRAY(c->faces, faces),
+                                FCT_ARRAY(c->marks, faces),
+                                FCT_ARRAY_ZERO(c->settled, faces),
+                                FCT_ARRAY(c->shrinks, c->view.instance_count)};
+    result = fct_allocate_all(c->env, arrays, FCT_LENGTH(arrays), "a surface");
+    if (result != FCT_OK) goto done;
     c->vertex_count = mesh.vertex_count, c->face_count = mesh.face_count;
     for (size_t v = 0; v < 3 * vertices; v += 3)
         v3_store(c->positions + v, fct_transform_point(placed->to_world, v3_load(mesh.positions + v)));
