@@ -87,11 +87,10 @@ static void bound_cone(const patch *p, fct_meshlet_bounds *out) {
     for (int i = 0; i < 3; ++i) out->cone_apex[i] = out->center[i], out->cone_axis[i] = 0;
     out->cone_cutoff = 1;
     if (p->normal_count == 0) return;
-    v3 middle, mean = v3_unit(p->vector);
+    v3 middle;
     double radius;
     fct_smallest_ball(p->normals, p->normal_count, &middle, &radius);
     middle = v3_unit(middle);
-    if (find_least_dot(p, mean) > find_least_dot(p, middle)) middle = mean;
     if (!(find_least_dot(p, middle) > least_cosine)) return;
     middle = v3_round(middle);
     double length = v3_norm(middle), cosine = fmin(find_least_dot(p, middle) / length, 1);

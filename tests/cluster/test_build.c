@@ -2,6 +2,8 @@
  * count, and a failure of each allocation. */
 #include "check_tree.h"
 
+#include "cluster/merge/work.h"
+
 static fct_tree *build(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def) {
     fct_tree *tree = NULL;
     assert_int_equal(fct_tree_build(env, mesh, def, NULL, &tree), FCT_OK);
@@ -156,6 +158,17 @@ static void materials_come_first(void **state) {
     }
 }
 
+/* The tallest tree over n faces: 2 log2 n + 8 levels, on small trees 3 log2 n - 1. */
+static void heights_are_limited(void **state) {
+    (void)state;
+    for (uint32_t k = 1; k < 32; ++k) {
+        assert_int_equal(fct_height_limit(1u << k, false), 3 * k - 1);
+        assert_int_equal(fct_height_limit(1u << k, true), k <= 9 ? 3 * k - 1 : 2 * k + 8);
+    }
+    assert_int_equal(fct_height_limit(1, false), 0);
+    assert_int_equal(fct_height_limit(1, true), 0);
+}
+
 static void same_for_every_thread_count(void **state) {
     (void)state;
     for (int method = 0; method < 2; ++method)
@@ -247,6 +260,7 @@ int main(void) {
                                        cmocka_unit_test(quality_of_a_folded_sheet),
                                        cmocka_unit_test(roots_and_costs),
                                        cmocka_unit_test(materials_come_first),
+                                       cmocka_unit_test(heights_are_limited),
                                        cmocka_unit_test(same_for_every_thread_count),
                                        cmocka_unit_test(survives_no_memory),
                                        cmocka_unit_test(can_be_cancelled_anywhere)};

@@ -84,6 +84,36 @@ static void comes_back(void **state) {
     unlink(path);
 }
 
+static void sections_have_their_documented_sizes(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh;
+    fct_tree *tree = build_small(&env, 8, &mesh);
+    fct_tree_view view = fct_tree_get(tree);
+    assert_int_equal(fct_tree_save(&env, tree, path), FCT_OK);
+    fct_file file;
+    assert_int_equal(fct_file_open(&env, path, &file), FCT_OK);
+    fct_format_header header;
+    memcpy(&header, file.data, sizeof header);
+    const uint64_t faces = view.face_count, vertices = view.vertex_count;
+    const uint64_t sizes[FCT_SECTION_COUNT] = {[FCT_SECTION_ROOTS] = 4 * (uint64_t)view.root_count,
+                                               [FCT_SECTION_CUT_IDS] = 4 * (uint64_t)header.cut_count,
+                                               [FCT_SECTION_CUT] = 132 * (uint64_t)header.cut_count,
+                                               [FCT_SECTION_NODES] = 132 * (uint64_t)view.node_count,
+                                               [FCT_SECTION_FACE_IDS] = 4 * faces,
+                                               [FCT_SECTION_VERTEX_IDS] = 4 * vertices,
+                                               [FCT_SECTION_TRIANGLES] = 12 * faces,
+                                               [FCT_SECTION_POSITIONS] = 12 * vertices,
+                                               [FCT_SECTION_COLORS] = 12 * vertices,
+                                               [FCT_SECTION_MATERIALS] = 4 * faces};
+    for (int i = 0; i < FCT_SECTION_COUNT; ++i) assert_int_equal(header.sections[i].size, sizes[i]);
+    assert_int_equal(header.file_size, file.size);
+    fct_file_close(&env, &file);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+    unlink(path);
+}
+
 static void one_face_comes_back(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -454,6 +484,7 @@ static void survives_no_memory(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(comes_back),
+                                       cmocka_unit_test(sections_have_their_documented_sizes),
                                        cmocka_unit_test(one_face_comes_back),
                                        cmocka_unit_test(every_cut_is_refused),
                                        cmocka_unit_test(every_flipped_byte_is_found),

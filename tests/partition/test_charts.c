@@ -275,6 +275,28 @@ static void materials_and_areas_are_kept_apart(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* The limits of faces and of area are exact. */
+static void limits_are_kept(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_grid(&env, 8);
+    fct_tree *tree = tree_of(&env, &mesh, 1);
+    uint32_t *labels = malloc(4 * (size_t)mesh.face_count);
+    for (uint32_t most = 1; most <= 128; ++most) {
+        fct_chart_def def = fct_chart_def_default();
+        fct_chart_stats stats;
+        uint32_t counts[128] = {0}, largest = 0;
+        def.max_faces = most, def.keep_cuts = most % 2;
+        assert_int_equal(fct_tree_charts(&env, tree, &def, labels, &stats), FCT_OK);
+        for (uint32_t f = 0; f < mesh.face_count; ++f) ++counts[labels[f]];
+        for (uint32_t c = 0; c < stats.charts; ++c) largest = counts[c] > largest ? counts[c] : largest;
+        assert_in_range(largest, (most + 3) / 4, most);
+    }
+    free(labels);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* Thousands of sheets on one edge, and sheets on the rims of others: no chart has such an edge twice inside.
  */
 static void crowded_edges(void **state) {
@@ -369,6 +391,7 @@ int main(void) {
                                        cmocka_unit_test(the_angle_decides),
                                        cmocka_unit_test(merging_leaves_fewer_charts_and_shorter_seams),
                                        cmocka_unit_test(materials_and_areas_are_kept_apart),
+                                       cmocka_unit_test(limits_are_kept),
                                        cmocka_unit_test(crowded_edges),
                                        cmocka_unit_test(bad_options_are_refused),
                                        cmocka_unit_test(same_for_every_thread_count),

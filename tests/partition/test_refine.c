@@ -575,6 +575,21 @@ static void quality_is_that_of_the_cut(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Two triangles of a strip of four make a cluster in one piece only if they are neighbours. */
+static void a_torn_cluster_is_not_connected(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    float positions[18] = {0, 0, 0, 1, 1, 0, 2, 0, 0, 3, 1, 0, 4, 0, 0, 5, 1, 0};
+    uint32_t triangles[12] = {0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5},
+             labels[3][4] = {{0, 0, 1, 1}, {0, 1, 1, 0}, {0, 1, 0, 1}};
+    fct_mesh mesh = {.vertex_count = 6, .face_count = 4, .positions = positions, .triangles = triangles};
+    for (int i = 0; i < 3; ++i) {
+        fct_partition_quality quality;
+        assert_int_equal(fct_labels_quality(&env, &mesh, labels[i], 2, &quality), FCT_OK);
+        assert_int_equal(quality.connected, i == 0);
+    }
+}
+
 static void real_meshes(void **state) {
     (void)state;
     const struct {
@@ -613,6 +628,7 @@ int main(void) {
                                        cmocka_unit_test(bad_options_and_labels),
                                        cmocka_unit_test(failures_leave_the_labels),
                                        cmocka_unit_test(quality_is_that_of_the_cut),
+                                       cmocka_unit_test(a_torn_cluster_is_not_connected),
                                        cmocka_unit_test(real_meshes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
