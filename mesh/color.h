@@ -1,4 +1,5 @@
 /* mesh/color.h: sRGB and linear light (IEC 61966-2-1). Converting a byte to linear and back returns the byte.
+ * The formulas also serve for values over 1.
  */
 #ifndef FCT_MESH_COLOR_H
 #define FCT_MESH_COLOR_H
@@ -14,12 +15,16 @@ static inline float fct_linear_from_srgb(double s) {
     return (float)(x * x * (root * root)); /* x^2.4 */
 }
 
+static inline double fct_srgb_from_linear(double x) {
+    if (x <= .0031308) return 12.92 * x;
+    double power = sqrt(sqrt(fct_root(x * x * x * (x * x), 3))); /* x^(1/2.4) = x^(5/12) */
+    return 1.055 * power - .055;
+}
+
 /* The nearest sRGB byte of a linear value, which is clamped to [0, 1]. */
 static inline uint8_t fct_srgb_byte(double linear) {
     double x = linear < 0 ? 0 : linear < 1 ? linear : 1;
-    if (x <= .0031308) return (uint8_t)(255 * 12.92 * x + .5);
-    double power = sqrt(sqrt(fct_root(x * x * x * (x * x), 3))); /* x^(1/2.4) = x^(5/12) */
-    return (uint8_t)(255 * (1.055 * power - .055) + .5);
+    return (uint8_t)(255 * fct_srgb_from_linear(x) + .5);
 }
 
 #endif

@@ -6,10 +6,10 @@
 
 #include "base/io/file.h"
 #include "mesh/glb/read.h"
+#include "mesh/obj/read.h"
 #include "mesh/om/read.h"
 #include "mesh/ply/read.h"
 #include "mesh/soup.h"
-#include "mesh/text/obj_read.h"
 #include "mesh/text/off_read.h"
 #include "mesh/text/stl_read.h"
 

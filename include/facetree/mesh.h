@@ -84,9 +84,10 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
 /* Reads OBJ, PLY (text, both byte orders, strips), OFF, STL (corners with equal coordinates become one
  * vertex), OM and GLB (meshes placed by their nodes; colours from _RADIOSITY, else COLOR_0). The ending of
  * the name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB and become
- * linear. Float colours are linear. radiosity_r/g/b of a PLY replace its other colours. A mesh without faces
- * is valid. Messages name the data that a mesh cannot store (lines, normals that differ by corner, ...).
- * docs/mesh.md lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY, CANCELLED. */
+ * linear. Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other colours. A
+ * mesh without faces is valid. Messages name the data that a mesh cannot store (lines, normals that differ by
+ * corner, ...). docs/mesh.md lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY,
+ * CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
 
 /* The counts of a file that can be clustered without loading it (a binary PLY of triangles), from its header.

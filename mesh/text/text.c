@@ -6,15 +6,25 @@
 #include <stdio.h>
 #include <string.h>
 
+fct_text fct_text_begin(const fct_env *env, const char *name, const void *data, size_t size) {
+    const char *begin = data;
+    size_t mark = size >= 3 && !memcmp(begin, "\xef\xbb\xbf", 3) ? 3 : 0;
+    return (fct_text){begin + mark, begin + size, env, name, 1};
+}
+
 void fct_text_next_line(fct_text *t) {
-    const char *end = memchr(t->p, '\n', (size_t)(t->end - t->p));
-    t->line += end != NULL;
-    t->p = end ? end + 1 : t->end;
+    const char *p = t->p;
+    while (p < t->end && !fct_text_is_line_end(*p)) ++p;
+    if (p < t->end) {
+        p += *p == '\r' && p + 1 < t->end && p[1] == '\n' ? 2 : 1;
+        ++t->line;
+    }
+    t->p = p;
 }
 
 bool fct_text_skip_lines(fct_text *t, char comment) {
     while (t->p < t->end) {
-        if (*t->p == '\n' || (comment && *t->p == comment))
+        if (fct_text_is_line_end(*t->p) || (comment && *t->p == comment))
             fct_text_next_line(t);
         else if (fct_text_is_blank(*t->p))
             ++t->p;
@@ -24,16 +34,43 @@ bool fct_text_skip_lines(fct_text *t, char comment) {
     return false;
 }
 
+static bool ends_word(const char *p, const char *end) {
+    return p == end || fct_text_is_line_end(*p) || fct_text_is_blank(*p);
+}
+
 const char *fct_text_word(fct_text *t, size_t *length) {
     fct_text_skip_blanks(t);
     const char *word = t->p;
-    while (t->p < t->end && *t->p != '\n' && !fct_text_is_blank(*t->p)) ++t->p;
+    while (!ends_word(t->p, t->end)) ++t->p;
     *length = (size_t)(t->p - word);
     return word;
 }
 
 bool fct_text_word_is(const char *word, size_t length, const char *expected) {
     return strlen(expected) == length && !memcmp(word, expected, length);
+}
+
+static char lower_letter(char c) {
+    return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
+}
+
+static bool begins_any_case(const char *word, size_t length, const char *expected) {
+    size_t i = 0;
+    while (expected[i] && i < length && lower_letter(word[i]) == expected[i]) ++i;
+    return !expected[i];
+}
+
+bool fct_text_word_is_any_case(const char *word, size_t length, const char *expected) {
+    return strlen(expected) == length && begins_any_case(word, length, expected);
+}
+
+const char *fct_text_rest(fct_text *t, size_t *length) {
+    fct_text_skip_blanks(t);
+    const char *begin = t->p, *end;
+    while (t->p < t->end && !fct_text_is_line_end(*t->p)) ++t->p;
+    for (end = t->p; end > begin && fct_text_is_blank(end[-1]);) --end;
+    *length = (size_t)(end - begin);
+    return begin;
 }
 
 /* 10^0 .. 10^27 are exact in a long double of 64 bits, 10^0 .. 10^22 in a double. */
@@ -70,10 +107,6 @@ static const char *read_exponent(const char *p, const char *end, int *exponent) 
         if (value < 100000) value = 10 * value + (*q - '0');
     *exponent += negative ? -value : value;
     return q;
-}
-
-static bool ends_word(const char *p, const char *end) {
-    return p == end || *p == '\n' || fct_text_is_blank(*p);
 }
 
 bool fct_text_double(fct_text *t, double *value) {
@@ -130,6 +163,21 @@ fct_result fct_text_float(fct_text *t, const char *what, float *value) {
     return fct_text_expected(t, "a number that fits a float");
 }
 
+fct_result fct_text_any_double(fct_text *t, const char *what, double *value) {
+    if (fct_text_double(t, value)) return FCT_OK;
+    const char *begin = t->p;
+    size_t length;
+    const char *word = fct_text_word(t, &length);
+    bool sign = length && (*word == '-' || *word == '+');
+    word += sign, length -= sign;
+    *value = NAN;
+    if (begins_any_case(word, length, "nan") || begins_any_case(word, length, "inf") ||
+        begins_any_case(word, length, "1.#"))
+        return FCT_OK;
+    t->p = begin;
+    return fct_text_expected(t, what);
+}
+
 fct_result fct_text_fail(const fct_text *t, const char *format, ...) {
     char text[512];
     va_list arguments;
@@ -139,18 +187,19 @@ fct_result fct_text_fail(const fct_text *t, const char *format, ...) {
     return fct_fail(t->env, FCT_ERROR_DATA, "%s:%llu: %s", t->name, (unsigned long long)t->line, text);
 }
 
+const char *fct_text_show(const char *word, size_t length, char shown[FCT_TEXT_SHOWN]) {
+    size_t count = length < 40 ? length : 40;
+    for (size_t i = 0; i < count; ++i) shown[i] = word[i] < ' ' || word[i] > '~' ? '?' : word[i];
+    strcpy(shown + count, length > count ? "..." : "");
+    return shown;
+}
+
 fct_result fct_text_expected(fct_text *t, const char *what) {
     size_t length;
     const char *word = fct_text_word(t, &length);
     if (!length)
         return fct_text_fail(t, "expected %s, found the end of the %s", what,
                              t->p == t->end ? "file" : "line");
-    char shown[48];
-    size_t count = length < 40 ? length : 40;
-    for (size_t i = 0; i < count; ++i)
-        shown[i] = word[i] < ' ' || word[i] > '~'
-                       ? '?'
-                       : word[i]; /* because a message is one line of printable text */
-    strcpy(shown + count, length > count ? "..." : "");
-    return fct_text_fail(t, "expected %s, found '%s'", what, shown);
+    char shown[FCT_TEXT_SHOWN];
+    return fct_text_fail(t, "expected %s, found '%s'", what, fct_text_show(word, length, shown));
 }

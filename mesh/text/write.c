@@ -6,9 +6,16 @@
 
 #include "base/env.h"
 #include "base/math/vec.h"
+#include "mesh/color.h"
 
 static void print_floats(FILE *stream, const float *values, int count) {
     for (int i = 0; i < count; ++i) fprintf(stream, " %.9g", (double)values[i]);
+}
+
+/* OBJ readers take colours for sRGB. Nine digits of sRGB return the same linear float, except for 31 floats
+ * at the joint of the two formulas, which change by a millionth. */
+static void print_srgb(FILE *stream, const float *linear) {
+    for (int k = 0; k < 3; ++k) fprintf(stream, " %.9g", fct_srgb_from_linear((double)linear[k]));
 }
 
 /* OBJ: v x y z [r g b], vt per corner, vn per vertex, usemtl where the material changes. */
@@ -50,7 +57,7 @@ fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
     for (size_t v = 0; v < m->vertex_count; ++v) {
         fputc('v', stream);
         print_floats(stream, m->positions + 3 * v, 3);
-        if (m->colors) print_floats(stream, m->colors + 3 * v, 3);
+        if (m->colors) print_srgb(stream, m->colors + 3 * v);
         fputc('\n', stream);
     }
     for (size_t i = 0; m->texcoords && i < 3 * (size_t)m->face_count; ++i)

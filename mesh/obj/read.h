@@ -1,6 +1,6 @@
-/* mesh/text/obj_read.h: the reader of Wavefront OBJ. */
-#ifndef FCT_MESH_TEXT_OBJ_READ_H
-#define FCT_MESH_TEXT_OBJ_READ_H
+/* mesh/obj/read.h: the reader of Wavefront OBJ. */
+#ifndef FCT_MESH_OBJ_READ_H
+#define FCT_MESH_OBJ_READ_H
 
 #include "mesh/soup.h"
 
