@@ -54,14 +54,14 @@ static char lower_letter(char c) {
     return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
 }
 
-static bool begins_any_case(const char *word, size_t length, const char *expected) {
+bool fct_text_begins_any_case(const char *word, size_t length, const char *expected) {
     size_t i = 0;
     while (expected[i] && i < length && lower_letter(word[i]) == expected[i]) ++i;
     return !expected[i];
 }
 
 bool fct_text_word_is_any_case(const char *word, size_t length, const char *expected) {
-    return strlen(expected) == length && begins_any_case(word, length, expected);
+    return strlen(expected) == length && fct_text_begins_any_case(word, length, expected);
 }
 
 const char *fct_text_rest(fct_text *t, size_t *length) {
@@ -171,8 +171,8 @@ fct_result fct_text_any_double(fct_text *t, const char *what, double *value) {
     bool sign = length && (*word == '-' || *word == '+');
     word += sign, length -= sign;
     *value = NAN;
-    if (begins_any_case(word, length, "nan") || begins_any_case(word, length, "inf") ||
-        begins_any_case(word, length, "1.#"))
+    if (fct_text_begins_any_case(word, length, "nan") || fct_text_begins_any_case(word, length, "inf") ||
+        fct_text_begins_any_case(word, length, "1.#"))
         return FCT_OK;
     t->p = begin;
     return fct_text_expected(t, what);

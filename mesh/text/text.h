@@ -48,7 +48,8 @@ bool fct_text_skip_lines(fct_text *t, char comment);
 /* Returns the next word of the line and moves p behind it. The length is 0 at the end of the line. */
 const char *fct_text_word(fct_text *t, size_t *length);
 bool fct_text_word_is(const char *word, size_t length, const char *expected);
-/* Ignores the case of ASCII letters. `expected` is in lower case. */
+/* These ignore the case of ASCII letters. `expected` is in lower case. */
+bool fct_text_begins_any_case(const char *word, size_t length, const char *expected);
 bool fct_text_word_is_any_case(const char *word, size_t length, const char *expected);
 
 /* Returns the rest of the line without blanks at its ends, and moves p to the line end. */

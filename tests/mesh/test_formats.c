@@ -1,4 +1,4 @@
-/* tests/mesh/test_formats.c: OFF, STL, GLB, OM: writing and reading back; refused files. */
+/* tests/mesh/test_formats.c: OFF, GLB, OM: writing and reading back; refused files. */
 #include "mesh/color.h"
 #include "mesh_support.h"
 
@@ -45,64 +45,6 @@ static void refuses_off(void **state) {
         {"OFF\n2 0 0\n0 0 0\n#######\n", "expected another vertex, found the end of the file"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) refuse("off", cases[i][0], cases[i][1]);
-}
-
-static void reads_text_stl(void **state) {
-    (void)state;
-    recorder r = {0};
-    fct_mesh m;
-    static const char text[] = "solid a b c\nfacet normal nan 0 0\n outer loop\n vertex 0 0 0\n vertex 1 0 "
-                               "0\n vertex 0 1 0\n endloop\n"
-                               "endfacet\nendsolid a\nsolid b\nfacet normal 0 0 1 outer loop vertex 1 -0 0 "
-                               "vertex 0 1 0 vertex 1 1 0\n"
-                               "endloop endfacet\nendsolid\n";
-    assert_int_equal(parse_text(&r, "stl", text, &m), FCT_OK);
-    const uint32_t expected[] = {0, 1, 2, 1, 2, 3};
-    assert_int_equal(m.vertex_count, 4);
-    assert_int_equal(m.face_count, 2);
-    assert_memory_equal(m.triangles, expected, sizeof expected);
-    release(&r, &m);
-    starve("stl", text, sizeof text - 1);
-    const char *whole = strstr(text, "solid b"); /* behind the first solid a file may end */
-    for (size_t size = 0; text + size < strstr(text, "endsolid"); ++size)
-        refuse_bytes("stl", text, size, "name");
-    for (size_t size = (size_t)(whole - text) + 1; text + size + 9 < text + sizeof text - 1; ++size)
-        refuse_bytes("stl", text, size, "name");
-}
-
-static bytes binary_stl(uint32_t declared, uint32_t there, float odd) {
-    bytes b = {.size = 0};
-    char head[80] = "solid but binary";
-    put(&b, head, sizeof head);
-    put_scalar(&b, &declared, 4, false);
-    for (uint32_t f = 0; f < there; ++f) {
-        for (int k = 0; k < 12; ++k)
-            put_f32(&b, k < 3 ? 0 : k == 11 ? odd : (float)((f + (uint32_t)k * k) % 5), false);
-        put_u8(&b, 0), put_u8(&b, 0);
-    }
-    return b;
-}
-
-static void reads_binary_stl(void **state) {
-    (void)state;
-    recorder r = {0};
-    fct_mesh m;
-    bytes b = binary_stl(3, 3, 2);
-    assert_int_equal(parse_bytes(&r, "stl", b.data, b.size, &m), FCT_OK);
-    assert_int_equal(m.face_count, 3);
-    release(&r, &m);
-    starve("stl", b.data, b.size);
-    b = binary_stl(2000000000, 3, 2);
-    memcpy(b.data, "xxxxx", 5);
-    refuse_bytes("stl", b.data, b.size, "2000000000 triangles take 100000000084 bytes, but the file has 234");
-    b = binary_stl(2, 2, NAN);
-    refuse_bytes("stl", b.data, b.size, "triangle 0: a coordinate is not finite (nan)");
-    refuse("stl", "hello", "neither text that begins with 'solid' nor");
-    refuse("stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 zero\n",
-           "name:4: expected a coordinate, found 'zero'");
-    refuse("stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nendloop\n",
-           "expected 'vertex'");
-    refuse("stl", "solid x\n", "expected 'facet' or 'endsolid', found the end of the file");
 }
 
 /* One triangle at (0,0,0) (1,0,0) (0,1,0), indices as bytes, placed by two nodes, one of which mirrors. */
@@ -263,22 +205,6 @@ static void glb_keeps_corners(void **state) {
     release(&r, &m);
 }
 
-static void stl_keeps_triangles(void **state) {
-    (void)state;
-    recorder r = {0};
-    fct_env env = recorder_env(&r);
-    fct_mesh m = make_sphere(&env, 5);
-    for (int ascii = 0; ascii < 2; ++ascii) {
-        fct_mesh back = there_and_back(&env, &m, "facetree_test.stl", ascii);
-        assert_int_equal(back.vertex_count, m.vertex_count);
-        for (size_t i = 0; i < 3 * (size_t)m.face_count; ++i)
-            assert_memory_equal(m.positions + 3 * (size_t)m.triangles[i],
-                                back.positions + 3 * (size_t)back.triangles[i], 12);
-        fct_mesh_release(&env, &back);
-    }
-    release(&r, &m);
-}
-
 /* An edge of four faces, a doubled face, a face with a repeated index: a mesh of OpenMesh would drop or
  * detach them, its half-edges in the file keep them. */
 static void om_keeps_non_manifold_faces(void **state) {
@@ -344,14 +270,11 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(reads_off),
         cmocka_unit_test(refuses_off),
-        cmocka_unit_test(reads_text_stl),
-        cmocka_unit_test(reads_binary_stl),
         cmocka_unit_test(reads_glb),
         cmocka_unit_test(refuses_glb),
         cmocka_unit_test(everything_round_trips_through_ply),
         cmocka_unit_test(obj_and_off_keep_what_they_can),
         cmocka_unit_test(glb_keeps_corners),
-        cmocka_unit_test(stl_keeps_triangles),
         cmocka_unit_test(om_keeps_non_manifold_faces),
         cmocka_unit_test(om_survives_damage),
     };
