@@ -8,6 +8,9 @@
  * below 3 log2 F < 96. */
 enum { FCT_SCENE_TREE_DEPTH = 254 };
 
+/* Readers of files clamp reflectances to this. With a reflectance of 1, light would never be absorbed. */
+#define FCT_SCENE_MOST_REFLECTANCE .9f
+
 /* The fields of an instance that a ray needs, close together in memory. */
 typedef struct fct_scene_frame {
     double to_model[12];

@@ -112,6 +112,10 @@ FCT_API fct_result fct_scene_commit(fct_scene *scene);
  * formats name file and line. Errors: INPUT, DATA, MEMORY, CANCELLED, INTERNAL. */
 FCT_API fct_result fct_scene_load(const fct_env *env, const char *path, fct_backend backend, fct_scene **out);
 
+/* Whether the OBJ file names a material library that exists. If it names libraries and none exists, a warning
+ * says so. Errors: INPUT, MEMORY. */
+FCT_API fct_result fct_scene_obj_has_library(const fct_env *env, const char *path, bool *found);
+
 FCT_API fct_scene_view fct_scene_get(const fct_scene *scene);
 
 typedef struct fct_scene_hit {

@@ -16,9 +16,6 @@
 #include "scene/read/gltf_pack.h"
 #include "scene/transform.h"
 
-/* With a reflectance of 1, light would never be absorbed. */
-#define MOST_REFLECTANCE .9f
-
 typedef struct visit {
     int64_t node;
     double to_world[12]; /* of the parent node */
@@ -94,8 +91,8 @@ static fct_result read_materials(reader *r) {
                 return fail_item(r, "materials", (int64_t)k, "expected a base colour in [0, 1]");
             if (!(light[c] >= 0 && strength >= 0))
                 return fail_item(r, "materials", (int64_t)k, "expected an emission >= 0");
-            white |= color[c] > MOST_REFLECTANCE;
-            material.reflectance[c] = fminf((float)color[c], MOST_REFLECTANCE);
+            white |= color[c] > FCT_SCENE_MOST_REFLECTANCE;
+            material.reflectance[c] = fminf((float)color[c], FCT_SCENE_MOST_REFLECTANCE);
             material.emission[c] = (float)(light[c] * strength);
         }
         uint32_t id;
@@ -106,7 +103,7 @@ static fct_result read_materials(reader *r) {
     if (r->whitened)
         fct_note(r->env, FCT_MESSAGE_NOTE,
                  "%s: %zu materials reflect more than %g; their reflectance is reduced to %g", r->name,
-                 r->whitened, (double)MOST_REFLECTANCE, (double)MOST_REFLECTANCE);
+                 r->whitened, (double)FCT_SCENE_MOST_REFLECTANCE, (double)FCT_SCENE_MOST_REFLECTANCE);
     return FCT_OK;
 }
 

@@ -1,10 +1,8 @@
 /* scene/read/obj.c: reads Wavefront OBJ with MTL.
  *
- * The mesh reader reads the mesh. This file reads the objects and the material libraries. Statements `o` and
- * `g` begin an object; objects of one name are one. Kd is the reflectance and Ke the emission; other
- * statements of a library are ignored. A material without emission is two-sided, because the winding of such
- * files is often wrong. A material with emission is one-sided, by the winding. Errors: a library that cannot
- * be read, a material that is used but not defined, a polygon before the first usemtl.
+ * The mesh reader reads the mesh. This file reads the objects and puts the materials together. Statements `o`
+ * and `g` begin an object; objects of one name are one. A face whose material is in no library, or that has
+ * no material, becomes grey, with a message.
  */
 #include "scene/read/obj.h"
 
@@ -14,7 +12,9 @@
 #include "base/io/file.h"
 #include "mesh/load.h"
 #include "mesh/mesh.h"
-#include "mesh/text/text.h"
+#include "mesh/obj/text.h"
+#include "scene/read/libraries.h"
+#include "scene/read/mtl.h"
 #include "scene/read/path.h"
 
 typedef struct span {
@@ -27,137 +27,131 @@ typedef struct reader {
     const fct_env *env;
     const char *name, *base;
     fct_mesh mesh;
-    char **objects;     /* their names */
-    json_t *object_ids; /* by name */
+    fct_mtl mtl;
+    fct_libraries libraries;
+    char **objects;     /* their names in the scene */
+    json_t *object_ids; /* by the names of the file */
+    json_t *used_names; /* in the scene */
     span *spans;        /* in the order of the file */
     size_t object_count, object_capacity, span_count, span_capacity;
-    char **libraries;
-    size_t library_count, library_capacity;
     uint32_t polygons;
+    fct_mtl_tally undefined; /* materials */
+    size_t bare_faces;       /* without a material */
 } reader;
 
-/* ---- Material libraries ---- */
+/* ---- Materials ---- */
 
-static fct_result read_color(fct_text *t, const char *what, float out[3]) {
-    for (int c = 0; c < 3; ++c) {
-        fct_result result = fct_text_float(t, what, out + c);
-        if (result != FCT_OK) return result;
-        if (c == 0 && (fct_text_at_line_end(t) || *t->p == '#')) {
-            out[1] = out[2] = out[0]; /* a single number is grey */
-            return FCT_OK;
-        }
-    }
-    if (!fct_text_at_line_end(t) && *t->p != '#') return fct_text_expected(t, "the end of the line");
-    return FCT_OK;
-}
-
-static const char *read_rest_of_line(fct_text *t, size_t *length) {
-    fct_text_skip_blanks(t);
-    const char *begin = t->p, *end = begin;
-    while (end < t->end && *end != '\n') ++end;
-    t->p = end;
-    while (end > begin && fct_text_is_blank(end[-1])) --end;
-    *length = (size_t)(end - begin);
-    return begin;
-}
-
-static uint32_t find_material(const fct_scene *scene, const char *name) {
-    for (uint32_t m = 0; m < scene->material_count; ++m)
-        if (strcmp(scene->materials[m].name, name) == 0) return m;
-    return FCT_NONE;
-}
-
-static fct_result begin_material(reader *r, fct_text *t, fct_material *material) {
-    size_t length;
-    const char *name = read_rest_of_line(t, &length);
-    *material = (fct_material){.reflectance = {.7f, .7f, .7f}};
-    if (length == 0 || length >= sizeof material->name)
-        return fct_text_fail(t, "a material's name has %zu bytes, expected 1 to %zu", length,
-                             sizeof material->name - 1);
-    memcpy(material->name, name, length);
-    if (strlen(material->name) != length) return fct_text_fail(t, "a material's name has a zero byte");
-    if (find_material(r->scene, material->name) != FCT_NONE)
-        return fct_text_fail(t, "material \"%s\" is defined twice", material->name);
-    return FCT_OK;
-}
-
-static fct_result end_material(reader *r, const fct_text *t, fct_material *material) {
-    uint32_t id;
-    if (!material->name[0]) return FCT_OK;
-    for (int c = 0; c < 3; ++c) {
-        if (!(material->reflectance[c] >= 0 && material->reflectance[c] < 1))
-            return fct_text_fail(t, "material \"%s\" ends here: expected Kd in [0, 1), found %g",
-                                 material->name, (double)material->reflectance[c]);
-        if (!(material->emission[c] >= 0))
-            return fct_text_fail(t, "material \"%s\" ends here: expected Ke >= 0, found %g", material->name,
-                                 (double)material->emission[c]);
-    }
-    const float *e = material->emission;
-    material->two_sided = !(e[0] > 0 || e[1] > 0 || e[2] > 0);
-    return fct_scene_add_material(r->scene, material, &id);
-}
-
-static fct_result read_library_text(reader *r, fct_text *t) {
-    fct_material material = {0};
-    fct_result result = FCT_OK;
-    while (result == FCT_OK && fct_text_skip_lines(t, '#')) {
-        size_t length;
-        const char *word = fct_text_word(t, &length);
-        if (fct_text_word_is(word, length, "newmtl")) {
-            result = end_material(r, t, &material);
-            if (result == FCT_OK) result = begin_material(r, t, &material);
-        } else if (fct_text_word_is(word, length, "Kd") || fct_text_word_is(word, length, "Ke")) {
-            if (!material.name[0]) return fct_text_fail(t, "expected newmtl before %.2s", word);
-            result = read_color(t, word[1] == 'd' ? "a reflectance" : "an emission",
-                                word[1] == 'd' ? material.reflectance : material.emission);
-        }
-        if (result == FCT_OK) fct_text_next_line(t);
-    }
-    return result == FCT_OK ? end_material(r, t, &material) : result;
-}
-
-static fct_result read_library(reader *r, const char *library) {
+/* A library that cannot be read is missing. */
+static fct_result read_library(reader *r, const char *path) {
     fct_file file = {0};
-    char *path = fct_path_join(r->env, r->base, library);
-    if (!path) return FCT_ERROR_MEMORY;
-    fct_result result = fct_file_open(r->env, path, &file);
+    fct_env quiet = *r->env;
+    quiet.message = NULL;
+    fct_result result = fct_file_open(&quiet, path, &file);
     if (result == FCT_OK) {
-        fct_text t = {(const char *)file.data, (const char *)file.data + file.size, r->env, path, 1};
-        result = read_library_text(r, &t);
+        fct_text t = fct_text_begin(r->env, path, file.data, file.size);
+        result = fct_mtl_read(&r->mtl, &t);
     } else if (result == FCT_ERROR_INPUT) {
-        fct_fail(r->env, result, "%s: its material library \"%s\" cannot be read", r->name, path);
+        fct_libraries_add_missing(&r->libraries, path, strlen(path));
+        result = FCT_OK;
+    } else if (result == FCT_ERROR_MEMORY) {
+        fct_fail_memory(r->env, "a material library");
     }
-    fct_file_close(r->env, &file);
-    fct_release(r->env, path);
+    fct_file_close(&quiet, &file);
     return result;
+}
+
+static fct_result read_libraries(reader *r) {
+    fct_result result = fct_mtl_create(r->scene, &r->mtl);
+    for (size_t k = 0; result == FCT_OK && k < r->libraries.count; ++k)
+        result = read_library(r, r->libraries.paths[k]);
+    return result;
+}
+
+/* Finds a material by the name of a usemtl line, which may end in a comment, or adds a grey one. */
+static fct_result resolve_name(reader *r, const char *name, uint32_t *id) {
+    *id = fct_mtl_find(&r->mtl, name);
+    const char *comment = strstr(name, " #");
+    if (*id != FCT_NONE) return FCT_OK;
+    if (comment) {
+        while (comment > name && fct_text_is_blank(comment[-1])) --comment;
+        char *part = fct_copy_text(r->env, name, (size_t)(comment - name));
+        if (!part) return fct_fail_memory(r->env, "names");
+        *id = fct_mtl_find(&r->mtl, part);
+        fct_release(r->env, part);
+        if (*id != FCT_NONE) return FCT_OK;
+    }
+    if (name[0] && !r->undefined.count++) fct_text_show(name, strlen(name), r->undefined.first);
+    return fct_mtl_add_grey(&r->mtl, name, id);
+}
+
+/* Replaces the file's material ids of faces by those of the scene. */
+static fct_result resolve_materials(reader *r) {
+    fct_mesh *mesh = &r->mesh;
+    uint32_t none = FCT_NONE, count = mesh->materials ? mesh->material_count : 0;
+    uint32_t *ids = fct_allocate(r->env, count, sizeof *ids);
+    fct_result result = ids ? FCT_OK : fct_fail_memory(r->env, "materials");
+    for (uint32_t m = 0; ids && m < count; ++m) ids[m] = FCT_NONE;
+    if (ids && !mesh->materials) {
+        mesh->materials = fct_allocate(r->env, mesh->face_count, sizeof *mesh->materials);
+        if (!mesh->materials) result = fct_fail_memory(r->env, "materials");
+    }
+    for (uint32_t f = 0; f < mesh->face_count && result == FCT_OK; ++f) {
+        const char *name = count ? mesh->material_names[mesh->materials[f]] : "";
+        uint32_t *id = count ? ids + mesh->materials[f] : &none;
+        if (*id == FCT_NONE) result = resolve_name(r, name, id);
+        r->bare_faces += !name[0];
+        mesh->materials[f] = *id;
+    }
+    fct_release(r->env, ids);
+    return result;
+}
+
+static void note_missing(const fct_env *env, const char *name, const fct_libraries *l) {
+    if (l->missing)
+        fct_note(env, FCT_MESSAGE_WARNING, "%s: %zu material libraries cannot be read (\"%s\" first)", name,
+                 l->missing, l->first_missing);
+}
+
+static void send_notes(const reader *r) {
+    const fct_libraries *l = &r->libraries;
+    note_missing(r->env, r->name, l);
+    if (l->repeated)
+        fct_note(r->env, FCT_MESSAGE_NOTE, "%s: material libraries are named again %zu times and read once",
+                 r->name, l->repeated);
+    fct_mtl_send_notes(&r->mtl, r->name);
+    if (r->undefined.count)
+        fct_note(r->env, FCT_MESSAGE_WARNING,
+                 "%s: %zu materials are in no library and become grey (\"%s\" first)", r->name,
+                 r->undefined.count, r->undefined.first);
+    if (r->bare_faces)
+        fct_note(r->env, FCT_MESSAGE_NOTE, "%s: %zu faces have no material and become grey", r->name,
+                 r->bare_faces);
 }
 
 /* ---- Objects ---- */
 
-static fct_result add_name(reader *r, char ***names, size_t *count, size_t *capacity, const char *text,
-                           size_t length) {
-    fct_result result = fct_grow(r->env, (void **)names, capacity, *count + 1, sizeof **names);
+static fct_result add_object_name(reader *r, const char *name) {
+    char shorter[101]; /* the scene adds a number to names of models */
+    fct_result result =
+        fct_grow(r->env, (void **)&r->objects, &r->object_capacity, r->object_count + 1, sizeof *r->objects);
+    if (result == FCT_OK) result = fct_mtl_choose_name(r->env, r->used_names, name, shorter, sizeof shorter);
+    if (result == FCT_OK &&
+        json_object_set_new_nocheck(r->object_ids, name, json_integer((json_int_t)r->object_count)))
+        result = fct_fail_memory(r->env, "names");
     if (result != FCT_OK) return result;
-    char *copy = fct_copy_text(r->env, text, length);
+    char *copy = fct_copy_text(r->env, shorter, strlen(shorter));
     if (!copy) return fct_fail_memory(r->env, "names");
-    (*names)[(*count)++] = copy;
+    r->objects[r->object_count++] = copy;
     return FCT_OK;
 }
 
-static fct_result begin_object(reader *r, const char *name, size_t length) {
-    char key[101];
-    if (length == 0) name = "object", length = 6;
-    if (length >= sizeof key) length = sizeof key - 1;
-    memcpy(key, name, length);
-    key[length] = 0;
-    json_t *known = json_object_get(r->object_ids, key);
+static fct_result begin_object(reader *r, const char *text, size_t length) {
+    char *name = length ? fct_copy_text(r->env, text, length) : fct_copy_text(r->env, "object", 6);
+    if (!name) return fct_fail_memory(r->env, "names");
+    json_t *known = json_object_get(r->object_ids, name);
     size_t k = known ? (size_t)json_integer_value(known) : r->object_count;
-    fct_result result = FCT_OK;
-    if (!known) {
-        result = add_name(r, &r->objects, &r->object_count, &r->object_capacity, key, length);
-        if (result == FCT_OK && json_object_set_new_nocheck(r->object_ids, key, json_integer((json_int_t)k)))
-            result = fct_fail_memory(r->env, "names");
-    }
+    fct_result result = known ? FCT_OK : add_object_name(r, name);
+    fct_release(r->env, name);
     if (result == FCT_OK)
         result = fct_grow(r->env, (void **)&r->spans, &r->span_capacity, r->span_count + 1, sizeof *r->spans);
     if (result == FCT_OK) r->spans[r->span_count++] = (span){r->polygons, (uint32_t)k};
@@ -166,47 +160,21 @@ static fct_result begin_object(reader *r, const char *name, size_t length) {
 
 /* Lists where objects begin, and the material libraries. The mesh reader has already checked the syntax. */
 static fct_result scan_objects(reader *r, const char *text, size_t size) {
-    fct_text t = {text, text + size, r->env, r->name, 1};
+    fct_text t = fct_text_begin(r->env, r->name, text, size);
     fct_result result = begin_object(r, "", 0);
     while (result == FCT_OK && fct_text_skip_lines(&t, '#')) {
-        size_t length;
-        const char *word = fct_text_word(&t, &length);
-        if (fct_text_word_is(word, length, "f")) {
-            ++r->polygons;
-        } else if (fct_text_word_is(word, length, "o") || fct_text_word_is(word, length, "g")) {
-            const char *name = read_rest_of_line(&t, &length);
-            result = begin_object(r, name, length);
-        } else if (fct_text_word_is(word, length, "mtllib")) {
-            const char *name = read_rest_of_line(&t, &length);
-            result = add_name(r, &r->libraries, &r->library_count, &r->library_capacity, name, length);
-        }
-        if (result == FCT_OK) fct_text_next_line(&t);
+        size_t length, rest = 0;
+        const char *word = fct_obj_statement(&t, &length), *name = word;
+        if (fct_obj_takes_name(word, length))
+            name = fct_text_rest(&t, &rest);
+        else if (fct_obj_count_words(&t) >= 3)
+            r->polygons += fct_obj_is_face(word, length); /* the mesh reader leaves out shorter ones */
+        if (length == 1 && (*word == 'o' || *word == 'g'))
+            result = begin_object(r, name, rest);
+        else if (fct_text_word_is(word, length, "mtllib"))
+            result = fct_libraries_add(r->env, r->base, name, rest, &r->libraries);
+        fct_text_next_line(&t);
     }
-    return result;
-}
-
-/* Replaces the file's material ids of faces by those of the scene. */
-static fct_result resolve_materials(reader *r) {
-    fct_mesh *mesh = &r->mesh;
-    if (!mesh->materials)
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: expected usemtl before the first face", r->name);
-    uint32_t *ids = fct_allocate(r->env, mesh->material_count, sizeof *ids);
-    if (!ids) return fct_fail_memory(r->env, "materials");
-    fct_result result = FCT_OK;
-    for (uint32_t m = 0; m < mesh->material_count; ++m)
-        ids[m] = find_material(r->scene, mesh->material_names[m]);
-    for (uint32_t f = 0; f < mesh->face_count && result == FCT_OK; ++f) {
-        uint32_t m = mesh->materials[f];
-        const char *name = mesh->material_names[m];
-        if (ids[m] != FCT_NONE)
-            mesh->materials[f] = ids[m];
-        else if (name[0])
-            result = fct_fail(r->env, FCT_ERROR_DATA,
-                              "%s: material \"%s\" is used, but no library defines it", r->name, name);
-        else
-            result = fct_fail(r->env, FCT_ERROR_DATA, "%s: expected usemtl before the first face", r->name);
-    }
-    fct_release(r->env, ids);
     return result;
 }
 
@@ -251,15 +219,60 @@ done:
     return result;
 }
 
+/* Adds the libraries of an OBJ up to the first that exists. */
+static fct_result find_library(const fct_env *env, const char *base, fct_text t, fct_libraries *l) {
+    fct_result result = FCT_OK;
+    for (; result == FCT_OK && !l->count && fct_text_skip_lines(&t, '#'); fct_text_next_line(&t)) {
+        size_t length, rest;
+        const char *word = fct_obj_statement(&t, &length);
+        if (!fct_obj_takes_name(word, length)) {
+            fct_obj_count_words(&t);
+        } else if (fct_text_word_is(word, length, "mtllib")) {
+            const char *names = fct_text_rest(&t, &rest);
+            result = fct_libraries_add(env, base, names, rest, l);
+        }
+    }
+    return result;
+}
+
+fct_result fct_scene_obj_has_library(const fct_env *env, const char *path, bool *found) {
+    fct_file file;
+    fct_libraries libraries = {0};
+    *found = false;
+    fct_result result = fct_file_open(env, path, &file);
+    if (result != FCT_OK) return result;
+    char *base = fct_path_folder(env, path);
+    result = base ? FCT_OK : FCT_ERROR_MEMORY;
+    if (base) result = find_library(env, base, fct_text_begin(env, path, file.data, file.size), &libraries);
+    *found = result == FCT_OK && libraries.count;
+    if (result == FCT_OK && !*found) note_missing(env, path, &libraries);
+    fct_libraries_release(env, &libraries);
+    fct_release(env, base);
+    fct_file_close(env, &file);
+    return result;
+}
+
 bool fct_scene_obj_names_materials(const char *text, size_t size) {
     fct_env env = fct_env_default();
-    fct_text t = {text, text + size, &env, "", 1};
+    fct_text t = fct_text_begin(&env, "", text, size);
     for (; fct_text_skip_lines(&t, '#'); fct_text_next_line(&t)) {
         size_t length;
-        const char *word = fct_text_word(&t, &length);
+        const char *word = fct_obj_statement(&t, &length);
         if (fct_text_word_is(word, length, "usemtl") || fct_text_word_is(word, length, "mtllib")) return true;
+        if (!fct_obj_takes_name(word, length)) fct_obj_count_words(&t);
     }
     return false;
+}
+
+static void release_reader(reader *r) {
+    for (size_t k = 0; k < r->object_count; ++k) fct_release(r->env, r->objects[k]);
+    json_decref(r->object_ids);
+    json_decref(r->used_names);
+    fct_release(r->env, r->objects);
+    fct_release(r->env, r->spans);
+    fct_libraries_release(r->env, &r->libraries);
+    fct_mtl_release(&r->mtl);
+    fct_mesh_release(r->env, &r->mesh);
 }
 
 fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *text, size_t size,
@@ -268,23 +281,15 @@ fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *te
     fct_result result = fct_mesh_parse(r.env, name, text, size, "obj", &r.mesh);
     if (result != FCT_OK) return result;
     r.object_ids = json_object();
-    if (!r.object_ids) result = fct_fail_memory(r.env, "names");
+    r.used_names = json_object();
+    if (!r.object_ids || !r.used_names) result = fct_fail_memory(r.env, "names");
     if (result == FCT_OK && r.mesh.face_count == 0)
         result = fct_fail(r.env, FCT_ERROR_DATA, "%s: a scene needs at least one face, found none", name);
     if (result == FCT_OK) result = scan_objects(&r, text, size);
-    uint32_t last = r.mesh.face_count ? r.mesh.face_count - 1 : 0;
-    if (result == FCT_OK && r.polygons != (r.mesh.source_faces ? r.mesh.source_faces[last] : last) + 1)
-        result = fct_fail(r.env, FCT_ERROR_DATA, "%s: a statement other than f continues after a \\", name);
-    for (size_t k = 0; result == FCT_OK && k < r.library_count; ++k)
-        result = read_library(&r, r.libraries[k]);
+    if (result == FCT_OK) result = read_libraries(&r);
     if (result == FCT_OK) result = resolve_materials(&r);
     if (result == FCT_OK) result = add_objects(&r);
-    for (size_t k = 0; k < r.object_count; ++k) fct_release(r.env, r.objects[k]);
-    for (size_t k = 0; k < r.library_count; ++k) fct_release(r.env, r.libraries[k]);
-    json_decref(r.object_ids);
-    fct_release(r.env, r.objects);
-    fct_release(r.env, r.libraries);
-    fct_release(r.env, r.spans);
-    fct_mesh_release(r.env, &r.mesh);
+    if (result == FCT_OK) send_notes(&r);
+    release_reader(&r);
     return result;
 }

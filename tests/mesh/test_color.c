@@ -131,6 +131,13 @@ static void obj_vertices_of_seven_numbers(void **state) {
     expect_obj_colors("v 0 0 0 1 255 255 0\nv 1 0 0 1 0 1 255\nv 0 1 0 1 0 0 0\n", f, "");
 }
 
+/* Only the seventh numbers show that these are bytes. */
+static void obj_weights_before_bytes(void **state) {
+    (void)state;
+    static const double c[9] = {0, 1 / 255., 0, 1 / 255., 0, 128 / 255., 0, 0, 0};
+    expect_obj_colors("v 0 0 0 1 0 1 0\nv 1 0 0 1 1 0 128\nv 0 1 0 1 0 0 0\n", c, "");
+}
+
 static void obj_drops_colors_that_are_not_finite(void **state) {
     (void)state;
     recorder r = {0};
@@ -172,6 +179,7 @@ int main(void) {
                                        cmocka_unit_test(obj_colors_are_srgb),
                                        cmocka_unit_test(obj_colors_may_be_bytes),
                                        cmocka_unit_test(obj_vertices_of_seven_numbers),
+                                       cmocka_unit_test(obj_weights_before_bytes),
                                        cmocka_unit_test(obj_drops_colors_that_are_not_finite),
                                        cmocka_unit_test(obj_is_written_as_srgb)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -130,6 +130,8 @@ static void the_size_decides_about_binary_files(void **state) {
     }
     b = binary_stl(2, 3, 2);
     expect_triangles(b.data, b.size, 3, "the head counts 2 triangles, but the size of the file gives 3");
+    put(&b, junk, 6);
+    expect_triangles(b.data, b.size, 2, "56 bytes behind the last triangle are left out");
     b = binary_stl(0, 3, 2);
     expect_triangles(b.data, b.size, 3, "the head counts 0 triangles, but the size of the file gives 3");
     b = binary_stl(0xffffffff, 3, 2);

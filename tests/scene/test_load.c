@@ -1,4 +1,4 @@
-/* tests/scene/test_load.c: scene.json and OBJ + MTL: what is read, what is refused and how it is told, shared
+/* tests/scene/test_load.c: scene.json: what is read, what is refused and how it is told, shared
  * models, hierarchies beside meshes, and running out of memory at every allocation. */
 #include "support.h"
 
@@ -341,99 +341,6 @@ static void opens_the_hierarchy_beside_a_mesh(void **unused) {
     assert_int_equal(r.alive, 0);
 }
 
-#define QUAD "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
-
-static void reads_obj_with_materials(void **unused) {
-    (void)unused;
-    fct_env env = fct_env_default();
-    fct_scene *scene;
-    write_text("box.mtl",
-               "# two\nnewmtl white wall\n Kd 0.5 0.25 .125\n Ns 10\n\nnewmtl lamp\nKd 0.1\nKe 5 4 3 # on\n");
-    write_text("box.obj",
-               "mtllib box.mtl\n" QUAD "usemtl white wall\no one\nf 1 2 3\ng two\nusemtl lamp\nf 1 3 4\n"
-               "o one\nf 1 2 4\n");
-    assert_int_equal(load(&env, "box.obj", &scene), FCT_OK);
-    fct_scene_view v = fct_scene_get(scene);
-    assert_int_equal(v.material_count, 2);
-    assert_true(v.materials[0].reflectance[2] == .125f && v.materials[0].two_sided);
-    assert_true(v.materials[1].reflectance[2] == .1f && v.materials[1].emission[0] == 5 &&
-                !v.materials[1].two_sided);
-    assert_int_equal(v.object_count, 2);
-    assert_int_equal(v.instance_count, 3);
-    assert_string_equal(v.instances[0].name, "one");
-    assert_string_equal(v.instances[1].name, "one");
-    assert_string_equal(v.instances[2].name, "two");
-    assert_true(v.instances[0].material == 0 && v.instances[1].material == 1 && v.instances[2].material == 1);
-    fct_scene_destroy(scene);
-
-    write_text("unused.obj", "mtllib box.mtl\n" QUAD "usemtl lamp\nf 1 2 3\n"); /* as many libraries are */
-    assert_int_equal(load(&env, "unused.obj", &scene), FCT_OK);
-    v = fct_scene_get(scene);
-    assert_int_equal(v.instance_count, 1);
-    assert_string_equal(v.materials[v.instances[0].material].name, "lamp");
-    fct_scene_destroy(scene);
-
-    write_text("plain.obj", QUAD "o one\nf 1 2 3\no two\nf 1 3 4\n"); /* no materials: a grey mesh */
-    assert_int_equal(load(&env, "plain.obj", &scene), FCT_OK);
-    assert_int_equal(fct_scene_get(scene).instance_count, 1);
-    fct_scene_destroy(scene);
-}
-
-static void refuses_bad_obj_scenes(void **unused) {
-    (void)unused;
-    static const struct {
-        const char *obj, *mtl, *message;
-        fct_result result;
-    } cases[] = {
-        {"mtllib none.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "", "none.mtl", FCT_ERROR_INPUT},
-        {"mtllib bad.mtl\n" QUAD "usemtl b\nf 1 2 3\n", "newmtl a\n", "\"b\" is used, but no library",
-         FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "f 1 2 3\n", "newmtl a\n", "usemtl before the first face", FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "f 1 2 3\nusemtl a\nf 1 2 3\n", "newmtl a\n", "usemtl before the first face",
-         FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd red\n", "bad.mtl:2", FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd 1 1 1\n",
-         "expected Kd in [0, 1), found 1", FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKd nan\n", "bad.mtl:2", FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nKe -1\n", "expected Ke >= 0, found -1",
-         FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "Kd 1 1 1\n", "bad.mtl:1: expected newmtl",
-         FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 3\n", "newmtl a\nnewmtl a\n", "defined twice",
-         FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\nf 1 2 9\n", "newmtl a\n", "bad.obj:7", FCT_ERROR_DATA},
-        {"mtllib bad.mtl\n" QUAD "usemtl a\n", "newmtl a\n", "at least one face", FCT_ERROR_DATA},
-    };
-    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        recorder r = {0};
-        fct_env env = recorder_env(&r);
-        fct_scene *scene;
-        write_text("bad.obj", cases[k].obj);
-        write_text("bad.mtl", cases[k].mtl);
-        fct_result result = load(&env, "bad.obj", &scene);
-        if (result != cases[k].result || !strstr(r.text, cases[k].message))
-            fail_msg("case %zu: result %d, message: %s\nexpected: %s", k, result, r.text, cases[k].message);
-        assert_null(scene);
-        assert_int_equal(r.alive, 0);
-    }
-}
-
-static void obj_fails_cleanly_at_every_allocation(void **unused) {
-    (void)unused;
-    write_text("memory.mtl", "newmtl a\nnewmtl b\nKe 1 1 1\n");
-    write_text("memory.obj", "mtllib memory.mtl\n" QUAD "usemtl a\nf 1 2 3\no x\nusemtl b\nf 1 3 4\n");
-    for (long n = 1;; ++n) {
-        recorder r = {.fail_at = n};
-        fct_env env = recorder_env(&r);
-        fct_scene *scene;
-        fct_result result = load(&env, "memory.obj", &scene);
-        if (result == FCT_OK) fct_scene_destroy(scene);
-        assert_int_equal(r.alive, 0);
-        assert_int_equal(result, r.allocations < n ? FCT_OK : FCT_ERROR_MEMORY);
-        if (result == FCT_OK) break;
-    }
-}
-
 static void missing_files_are_told(void **unused) {
     (void)unused;
     static const char *const names[] = {"gone.json", "gone.obj", "gone.ply", "gone.fct"};
@@ -494,9 +401,6 @@ int main(void) {
         cmocka_unit_test(refuses_bad_scenes_and_says_where),
         cmocka_unit_test(fails_cleanly_at_every_allocation),
         cmocka_unit_test(opens_the_hierarchy_beside_a_mesh),
-        cmocka_unit_test(reads_obj_with_materials),
-        cmocka_unit_test(refuses_bad_obj_scenes),
-        cmocka_unit_test(obj_fails_cleanly_at_every_allocation),
         cmocka_unit_test(missing_files_are_told),
         cmocka_unit_test(scenes_made_by_calls_are_checked),
     };

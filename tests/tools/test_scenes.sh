@@ -113,7 +113,8 @@ scene "$grey" '' broken.off >broken.json
 expect 65 bake broken.json -o bad.glb
 says "broken.off"
 printf 'mtllib nowhere.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n' >no-mtl.obj
-expect 66 bake no-mtl.obj -o bad.glb
+expect 0 render no-mtl.obj -o grey.png --size 16x16
+says '1 material libraries cannot be read ("nowhere.mtl" first)'
 printf 'newmtl a\nKd .5 .5 .5\nKe 1 1 1\n' >nowhere.mtl
 expect 0 bake no-mtl.obj -o good.glb
 check "no output" test ! -e bad.glb

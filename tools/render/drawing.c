@@ -8,7 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -39,26 +38,10 @@ typedef struct loader {
 
 /* --- Kinds of files --- */
 
-/* Whether the file that the first mtllib line of an OBJ names is readable. */
-static bool has_materials(const char *path) {
-    FILE *file = fopen(path, "rb");
-    if (!file) return false;
-    char line[1024], name[2048];
-    bool found = false;
-    for (int i = 0; i < 1000 && !found && fgets(line, sizeof line, file); ++i) {
-        if (strncmp(line, "mtllib", 6) != 0) continue;
-        char *word = line + 6 + strspn(line + 6, " \t");
-        word[strcspn(word, "\r\n")] = 0;
-        const char *slash = strrchr(path, '/');
-        snprintf(name, sizeof name, "%.*s%s", slash ? (int)(slash - path + 1) : 0, path, word);
-        found = access(name, R_OK) == 0;
-    }
-    fclose(file);
-    return found;
-}
-
-static bool is_scene_file(const char *path) {
-    return tool_is_scene_name(path) || (tool_ends(path, "obj") && has_materials(path));
+static int find_scene_file(tool *t, const char *path, bool *scene) {
+    *scene = tool_is_scene_name(path);
+    if (!tool_ends(path, "obj")) return TOOL_DONE;
+    return tool_result(t, fct_scene_obj_has_library(&t->env, path, scene));
 }
 
 /* --- Parts --- */
@@ -323,8 +306,9 @@ static int draw_parts(tool *t, const drawing_source *source, loader *l, drawing 
 
 int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     loader l = {0};
-    bool surface = source->subject == DRAWING_SURFACE, scene = is_scene_file(source->path);
-    int code = TOOL_DONE;
+    bool surface = source->subject == DRAWING_SURFACE, scene;
+    int code = find_scene_file(t, source->path, &scene);
+    if (code != TOOL_DONE) return code;
     if (surface && !scene && !tool_ends(source->path, "fct")) {
         code = tool_load_mesh(t, source->path, &out->mesh);
         /* A glTF file without a bake is a scene with materials. */
