@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/io/file.h"
+#include "base/io/output.h"
 #include "mesh/glb/write.h"
 #include "mesh/mesh.h"
 #include "mesh/om/write.h"
@@ -45,8 +45,9 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
     if (def->size != sizeof *def || !(def->exposure >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "%s: a save def of another version, or a negative exposure",
                         path);
-    const char *dot = strrchr(path, '.'), *ending = !strcmp(path, "-") ? "ply" : dot ? dot + 1 : "";
-    job j = {{env, path, mesh, def}, find_writer(ending)};
+    const char *dot = strrchr(path, '.');
+    job j = {{env, path, mesh, def}, find_writer(dot ? dot + 1 : "")};
+    if (!j.write && (!strcmp(path, "-") || fct_output_is_device(path))) j.write = fct_write_ply;
     if (!j.write)
         return fct_fail(env, FCT_ERROR_DATA,
                         "%s: unknown kind of file; .ply, .obj, .off, .stl, .om and .glb are known", path);

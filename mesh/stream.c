@@ -169,6 +169,7 @@ static fct_result open_ply(fct_stream *s, bool *done) {
     s->descriptor = open(s->name, O_RDONLY | O_CLOEXEC);
     if (s->descriptor < 0) return fail_read(s);
     if (fstat(s->descriptor, &status) || !S_ISREG(status.st_mode)) return FCT_OK;
+    if (s->env->opened) s->env->opened(s->env->opened_user, s->name, (uint64_t)status.st_size);
     fct_result result = read_header(s, &end);
     if (result != FCT_OK || !end) return result;
     fct_text t = {s->header_text, end + 1, s->env, s->name, 1};

@@ -62,7 +62,8 @@ static int write_boxes_json(tool *t, json_t *object) {
     int code = tool_writer_open(t, t->output ? t->output : "-", &writer);
     if (code == TOOL_DONE) {
         if (json_dumpf(object, writer.stream, JSON_INDENT(1) | JSON_REAL_PRECISION(9)))
-            code = tool_fail(t, TOOL_OUTPUT, "%s: cannot be written", writer.path);
+            code =
+                tool_fail(t, TOOL_OUTPUT, "%s: cannot be written", t->output ? t->output : "standard output");
         fputc('\n', writer.stream);
         code = tool_writer_close(t, &writer, code);
     }
@@ -164,7 +165,9 @@ int tool_boxes(int argc, char **argv) {
         .run = run_boxes,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_OPTIONAL};
+        .output = TOOL_OUTPUT_OPTIONAL,
+        .endings = "json " TOOL_MESHES,
+        .other = ""};
     box_options options = {.max_distance = {.value = -1}};
     return tool_main(&command, argc, argv, &options);
 }

@@ -130,7 +130,9 @@ int tool_closest(int argc, char **argv) {
         .run = run_closest,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_OPTIONAL};
+        .output = TOOL_OUTPUT_OPTIONAL,
+        .endings = "txt csv",
+        .other = ""};
     closest_options options = {.max_distance = INFINITY};
     return tool_main(&command, argc, argv, &options);
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "tools/commands.h"
+#include "tools/guard/signals.h"
 #include "tools/kit/command.h"
 #include "tools/kit/options.h"
 
@@ -43,9 +44,9 @@ static int reject_command(const char *name) {
     for (int i = 0; i < COMMANDS; ++i) names[i + 1] = commands[i].name;
     const char *nearest = tool_nearest(name, names);
     if (nearest)
-        fprintf(stderr, "facetree: unknown command '%s'; did you mean '%s'?\n", name, nearest);
+        tool_complain("facetree: unknown command '%s'; did you mean '%s'?", name, nearest);
     else
-        fprintf(stderr, "facetree: unknown command '%s'; 'facetree help' lists them\n", name);
+        tool_complain("facetree: unknown command '%s'; 'facetree help' lists them", name);
     return TOOL_USAGE;
 }
 
@@ -78,7 +79,7 @@ static int run_help(int argc, char **argv) {
     bool man = argc > 1 && !strcmp(argv[1], "--man");
     const char *name = argc > 1 + man ? argv[1 + man] : NULL;
     if (argc > 2 + man) {
-        fprintf(stderr, "facetree help: expected one command, found %d\n", argc - 1 - man);
+        tool_complain("facetree help: expected one command, found %d", argc - 1 - man);
         return TOOL_USAGE;
     }
     if (!name) return man ? print_overview_page() : print_overview();
@@ -118,7 +119,7 @@ static error_t parse_word(int key, char *text, struct argp_state *state) {
         break;
     case ARGP_KEY_NO_ARGS:
         t->code = TOOL_USAGE;
-        fputs("facetree: expected a command; 'facetree help' lists them\n", stderr);
+        tool_complain("facetree: expected a command; 'facetree help' lists them");
         break;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -128,10 +129,11 @@ static error_t parse_word(int key, char *text, struct argp_state *state) {
 
 static void print_message(void *user, fct_severity severity, const char *text) {
     (void)user, (void)severity;
-    fprintf(stderr, "facetree: %s\n", text);
+    tool_complain("facetree: %s", text);
 }
 
 int main(int argc, char **argv) {
+    guard_open_streams();
     fct_env env = fct_env_default();
     env.message = print_message;
     if (fct_simd_check(&env) != FCT_OK) return TOOL_USAGE;
@@ -142,6 +144,6 @@ int main(int argc, char **argv) {
     error_t error =
         argp_parse(&argp, argc, argv, ARGP_IN_ORDER | ARGP_NO_ERRS | ARGP_NO_HELP | ARGP_NO_EXIT, NULL, &t);
     if (error != ECANCELED)
-        fputs("facetree: unknown option; 'facetree help' lists commands and options\n", stderr);
+        tool_complain("facetree: unknown option; 'facetree help' lists commands and options");
     return t.code;
 }

@@ -166,13 +166,7 @@ static int report_meshlets(tool *t, const fct_tree *tree, const fct_meshlet_def 
 
 static int run_meshlets(tool *t, void *options) {
     const fct_meshlet_def *def = options;
-    bool json = tool_ends(t->output, "json") || !strcmp(t->output, "-"), binary = tool_ends(t->output, "bin");
-    if (!json && !binary && !tool_is_mesh_name(t->output))
-        return tool_fail(t, TOOL_USAGE,
-                         "%s: expected a name that ends in .json or .bin, or the name of a mesh", t->output);
-    if (tool_ends(t->output, "stl"))
-        return tool_fail(t, TOOL_USAGE,
-                         "%s: STL cannot store colours; expected .ply, .off, .obj, .glb or .om", t->output);
+    bool binary = tool_ends(t->output, "bin"), json = !binary && !tool_is_mesh_name(t->output);
     fct_tree *tree;
     fct_meshlets meshlets = {0};
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
@@ -219,7 +213,8 @@ int tool_meshlets(int argc, char **argv) {
         .run = run_meshlets,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_REQUIRED};
+        .output = TOOL_OUTPUT_REQUIRED,
+        .endings = "json bin " TOOL_COLOR_MESHES};
     fct_meshlet_def def = fct_meshlet_def_default();
     return tool_main(&command, argc, argv, &def);
 }

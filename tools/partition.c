@@ -297,12 +297,11 @@ static int check_partition_options(tool *t, const partition_options *o) {
         return tool_fail(t, TOOL_USAGE, "--perimeter and --irregularity need --refine");
     if (o->refine.sweep_count > 0 && (o->chart_angle >= 0 || o->max_distance.value >= 0))
         return tool_fail(t, TOOL_USAGE, "--refine would break the limits of --charts and --max-distance");
-    if (tool_ends(t->output, "stl"))
-        return tool_fail(t, TOOL_USAGE,
-                         "%s: STL cannot store colours; expected .ply, .off, .obj, .glb or .om", t->output);
-    if (o->adjacency && !strcmp(o->adjacency, t->output))
+    if (!o->adjacency) return TOOL_DONE;
+    if (tool_same_output(o->adjacency, t->output))
         return tool_fail(t, TOOL_USAGE, "--adjacency: expected a file other than that of -o");
-    return o->adjacency ? tool_check_output(t, o->adjacency) : TOOL_DONE;
+    int code = tool_check_kind(t, o->adjacency, "txt csv", "");
+    return code == TOOL_DONE ? tool_check_output(t, o->adjacency) : code;
 }
 
 static int run_partition(tool *t, void *options) {
@@ -372,7 +371,9 @@ int tool_partition(int argc, char **argv) {
         .run = run_partition,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_REQUIRED};
+        .output = TOOL_OUTPUT_REQUIRED,
+        .endings = TOOL_COLOR_MESHES,
+        .other = "another name for labels as text"};
     partition_options options = {.max_cost = -1,
                                  .max_distance = {.value = -1},
                                  .chart_angle = -1,

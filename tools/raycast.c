@@ -284,7 +284,9 @@ int tool_raycast(int argc, char **argv) {
                                          .run = run_raycast,
                                          .inputs_min = 1,
                                          .inputs_max = 1,
-                                         .output = TOOL_OUTPUT_OPTIONAL};
+                                         .output = TOOL_OUTPUT_OPTIONAL,
+                                         .endings = "txt csv",
+                                         .other = ""};
     ray_options options = {.backend = FCT_BACKEND_OBB};
     return tool_main(&command, argc, argv, &options);
 }

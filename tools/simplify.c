@@ -163,9 +163,6 @@ static int run_simplify(tool *t, void *options) {
     simplify_options *o = options;
     if (!o->faces_given && !(o->ratio > 0) && !o->error_given)
         return tool_fail(t, TOOL_USAGE, "expected --faces N, --ratio R or --max-error E");
-    if (strcmp(t->output, "-") != 0 && !tool_is_mesh_name(t->output))
-        return tool_fail(t, TOOL_USAGE,
-                         "%s: expected a name that ends in .ply, .obj, .off, .stl, .om or .glb", t->output);
     fct_mesh mesh, simple = {0};
     fct_simplify_stats stats;
     int code = tool_load_mesh(t, t->inputs[0], &mesh);
@@ -203,7 +200,8 @@ int tool_simplify(int argc, char **argv) {
         .run = run_simplify,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_REQUIRED};
+        .output = TOOL_OUTPUT_REQUIRED,
+        .endings = TOOL_MESHES};
     simplify_options options = {.def = fct_simplify_def_default()};
     return tool_main(&command, argc, argv, &options);
 }

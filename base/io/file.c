@@ -1,7 +1,6 @@
 /* base/io/file.c: see file.h. */
 #define _GNU_SOURCE
 #include "base/io/file.h"
-#include "base/io/output.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -63,6 +62,7 @@ fct_result fct_file_open(const fct_env *env, const char *path, fct_file *out) {
             *out = (fct_file){.data = data, .size = size, .mapped = true};
     }
     close(descriptor);
+    if (result == FCT_OK && env->opened) env->opened(env->opened_user, path, out->mapped ? out->size : 0);
     return result;
 }
 
@@ -72,48 +72,6 @@ void fct_file_close(const fct_env *env, fct_file *file) {
     else if (file->data != empty)
         munmap((void *)file->data, file->size);
     *file = (fct_file){0};
-}
-
-/* Flushes the stream after produce. Returns the first error of both. */
-static fct_result flush_stream(const fct_env *env, const char *path, FILE *stream, fct_result result) {
-    if (result != FCT_OK) return result;
-    errno = 0;
-    if (fflush(stream) || ferror(stream)) return fct_output_fail(env, path, errno);
-    return FCT_OK;
-}
-
-static fct_result write_directly(const fct_env *env, const char *path,
-                                 fct_result (*produce)(void *user, FILE *stream), void *user) {
-    FILE *stream = fopen(path, "wbe");
-    if (!stream) return fct_output_fail(env, path, errno);
-    fct_result result = flush_stream(env, path, stream, produce(user, stream));
-    if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
-    return result;
-}
-
-fct_result fct_file_write_atomic(const fct_env *env, const char *path,
-                                 fct_result (*produce)(void *user, FILE *stream), void *user) {
-    if (!strcmp(path, "-")) return flush_stream(env, "standard output", stdout, produce(user, stdout));
-    struct stat status;
-    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
-        return write_directly(env, path, produce, user);
-    fct_output output;
-    fct_result result = fct_output_open(env, path, 0, &output);
-    if (result != FCT_OK) return result;
-    int descriptor = dup(output.descriptor);
-    FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "wb");
-    if (!stream) {
-        result = fct_output_fail(env, path, errno);
-        if (descriptor >= 0) close(descriptor);
-        fct_output_abandon(&output);
-        return result;
-    }
-    setvbuf(stream, NULL, _IOFBF, 1 << 18);
-    result = flush_stream(env, path, stream, produce(user, stream));
-    if (fclose(stream) && result == FCT_OK) result = fct_output_fail(env, path, errno);
-    if (result == FCT_OK) return fct_output_finish(&output);
-    fct_output_abandon(&output);
-    return result;
 }
 
 void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use) {

@@ -1,13 +1,7 @@
-/* base/io/file.h: reads and writes whole files.
- *
- * Reading maps a regular file, and copies a pipe or standard input into memory. Writing creates a temporary
- * file beside the target and renames it when it is complete and on the disk. No reader sees half a file, and
- * a failure leaves the old file unchanged.
- */
+/* base/io/file.h: reads whole files. A regular file is mapped; a pipe or standard input is copied into
+ * memory. */
 #ifndef FCT_BASE_FILE_H
 #define FCT_BASE_FILE_H
-
-#include <stdio.h>
 
 #include "base/env.h"
 
@@ -27,12 +21,5 @@ void fct_file_close(const fct_env *env, fct_file *file);
  * Reading a whole file from the disk with SPARSE takes 20 times as long as with WHOLE. */
 typedef enum fct_file_use { FCT_FILE_SPARSE, FCT_FILE_WHOLE, FCT_FILE_USUAL } fct_file_use;
 void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use);
-
-/* Writes the output of produce(user, stream) to `path`. "-" is standard output. produce may ignore the
- * results of fwrite, because the caller checks the stream afterwards. If produce fails, the target stays
- * unchanged. Symbolic links are followed. A device or a pipe is written directly. Errors: OUTPUT, MEMORY and
- * those of produce. */
-fct_result fct_file_write_atomic(const fct_env *env, const char *path,
-                                 fct_result (*produce)(void *user, FILE *stream), void *user);
 
 #endif

@@ -1,6 +1,7 @@
 /* base/io/output.c: see output.h. */
 #define _GNU_SOURCE
 #include "base/io/output.h"
+#include "base/io/temporary.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -18,69 +19,82 @@ fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
                     error ? strerror(error) : "the stream failed");
 }
 
-/* Creates a new file beside `target` and stores its name in `temporary`. The name has the process id and a
- * count. O_EXCL fails if another process has created it. */
-static int create_beside(const char *target, char *temporary, size_t size) {
-    for (int i = 0; i < 1000; ++i) {
-        if ((size_t)snprintf(temporary, size, "%s.%ld-%d.tmp", target, (long)getpid(), i) >= size) {
-            errno = ENAMETOOLONG;
-            return -1;
-        }
-        int descriptor = open(temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (descriptor >= 0 || errno != EEXIST) return descriptor;
-    }
-    return -1;
-}
-
 /* A nameless file, for a target that is a pipe or a device. */
 static int create_spool(void) {
     const char *folder = getenv("TMPDIR");
     char name[PATH_MAX];
-    if ((size_t)snprintf(name, sizeof name, "%s/facetree.XXXXXX", folder && *folder ? folder : "/tmp") >=
-        sizeof name) {
-        errno = ENAMETOOLONG;
-        return -1;
-    }
-    int descriptor = mkostemp(name, O_CLOEXEC);
-    if (descriptor >= 0) unlink(name);
+    int descriptor = fct_temporary_open(folder && *folder ? folder : "/tmp", name, sizeof name);
+    if (descriptor >= 0 && *name) unlink(name);
     return descriptor;
+}
+
+/* Follows symbolic links to the file that `path` means, which need not exist. Returns 0 or an errno. */
+static int follow_links(const char *path, char target[PATH_MAX]) {
+    enum { MOST_LINKS = 40 };
+    char link[PATH_MAX], folder[PATH_MAX];
+    if ((size_t)snprintf(target, PATH_MAX, "%s", path) >= PATH_MAX) return ENAMETOOLONG;
+    for (int i = 0; i < MOST_LINKS; ++i) {
+        ssize_t length = readlink(target, link, sizeof link - 1);
+        if (length < 0) return errno == EINVAL || errno == ENOENT ? 0 : errno;
+        link[length] = 0;
+        if (*link == '/')
+            *folder = 0;
+        else if (!fct_folder_of(target, folder, sizeof folder))
+            return ENAMETOOLONG;
+        if ((size_t)snprintf(target, PATH_MAX, "%s%s%s", folder, *folder ? "/" : "", link) >= PATH_MAX)
+            return ENAMETOOLONG;
+    }
+    return ELOOP;
 }
 
 /* Writes the folder to the disk, because a rename is permanent only then. Some network file systems cannot
  * synchronise folders, so failures are ignored. */
-static void synchronise_folder(const char *target) {
-    char folder[PATH_MAX];
-    snprintf(folder, sizeof folder, "%s", target);
-    char *slash = strrchr(folder, '/');
-    if (!slash)
-        strcpy(folder, ".");
-    else
-        slash[slash == folder] = 0;
+static void synchronise_folder(const char *folder) {
     int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0) return;
     (void)!fsync(descriptor);
     close(descriptor);
 }
 
-/* Opens a file beside `path`, or a nameless one. */
-static fct_result create_output(const fct_env *env, const char *path, fct_output *out) {
+/* Finds the target of `path`. Returns 0 or an errno. */
+static int find_target(const char *path, fct_output *out) {
     struct stat status;
     bool standard = !strcmp(path, "-"), exists = !standard && stat(path, &status) == 0;
+    int error = exists || standard ? 0 : errno;
+    if ((size_t)snprintf(out->path, sizeof out->path, "%s", path) >= sizeof out->path) return ENAMETOOLONG;
+    if (error && error != ENOENT) return error;
+    if (exists && S_ISDIR(status.st_mode)) return EISDIR;
+    if (exists && access(path, W_OK)) return errno;
+    out->spooled = standard || (exists && !S_ISREG(status.st_mode));
+    out->replaces = exists;
+    out->mode = exists ? status.st_mode & 07777 : 0;
+    if (out->spooled) return 0;
+    error = follow_links(path, out->target);
+    if (error) return error;
+    const char *slash = strrchr(out->target, '/');
+    if (slash && !slash[1]) return EISDIR;
+    return fct_folder_of(out->target, out->folder, sizeof out->folder) ? 0 : ENAMETOOLONG;
+}
+
+/* Opens a file in the folder of the target, or a nameless one. */
+static fct_result create_output(const fct_env *env, const char *path, fct_output *out) {
     *out = (fct_output){.env = env, .descriptor = -1};
-    if ((size_t)snprintf(out->path, sizeof out->path, "%s", path) >= sizeof out->path)
-        return fct_output_fail(env, path, ENAMETOOLONG);
-    if (exists && S_ISDIR(status.st_mode)) return fct_output_fail(env, path, EISDIR);
-    if (exists && access(path, W_OK)) return fct_output_fail(env, path, errno);
-    if (standard || (exists && !S_ISREG(status.st_mode))) {
-        out->spooled = true;
-        out->descriptor = create_spool();
-    } else {
-        if (!exists || !realpath(path, out->target)) strcpy(out->target, out->path);
-        out->descriptor = create_beside(out->target, out->temporary, sizeof out->temporary);
-    }
-    if (out->descriptor < 0) return fct_output_fail(env, path, errno);
-    if (exists && !out->spooled) (void)!fchmod(out->descriptor, status.st_mode & 07777);
-    return FCT_OK;
+    int error = find_target(path, out);
+    if (error) return fct_output_fail(env, path, error);
+    out->descriptor = out->spooled ? create_spool()
+                                   : fct_temporary_open(out->folder, out->temporary, sizeof out->temporary);
+    return out->descriptor < 0 ? fct_output_fail(env, path, errno) : FCT_OK;
+}
+
+fct_result fct_output_check(const fct_env *env, const char *path) {
+    fct_output output = {.env = env, .descriptor = -1};
+    int error = find_target(path, &output);
+    if (error) return fct_output_fail(env, path, error);
+    if (output.spooled) return FCT_OK;
+    fct_temporary_sweep(output.folder);
+    fct_result result = create_output(env, path, &output);
+    if (result == FCT_OK) fct_output_abandon(&output);
+    return result;
 }
 
 fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, fct_output *out) {
@@ -142,15 +156,28 @@ static fct_result copy_spool(fct_output *output) {
     return result;
 }
 
-static fct_result take_name(const fct_output *output) {
-    if (fsync(output->descriptor) || rename(output->temporary, output->target))
+/* A nameless file takes a free target directly. It replaces an older file by a rename, which needs a name. */
+static bool take_name(fct_output *output) {
+    if (!*output->temporary) {
+        if (!output->replaces && fct_temporary_link(output->descriptor, output->target) == 0) return true;
+        if (!output->replaces && errno != EEXIST) return false;
+        if (fct_temporary_link_any(output->descriptor, output->folder, output->temporary,
+                                   sizeof output->temporary))
+            return false;
+    }
+    return rename(output->temporary, output->target) == 0;
+}
+
+static fct_result store_output(fct_output *output) {
+    if (output->replaces) (void)!fchmod(output->descriptor, output->mode);
+    if (fsync(output->descriptor) || !take_name(output))
         return fct_output_fail(output->env, output->path, errno);
-    synchronise_folder(output->target);
+    synchronise_folder(output->folder);
     return FCT_OK;
 }
 
 fct_result fct_output_finish(fct_output *output) {
-    fct_result result = output->spooled ? copy_spool(output) : take_name(output);
+    fct_result result = output->spooled ? copy_spool(output) : store_output(output);
     if (result != FCT_OK) {
         fct_output_abandon(output);
         return result;
@@ -163,6 +190,6 @@ fct_result fct_output_finish(fct_output *output) {
 void fct_output_abandon(fct_output *output) {
     if (output->descriptor < 0) return;
     close(output->descriptor);
-    if (!output->spooled) unlink(output->temporary);
+    if (*output->temporary) unlink(output->temporary);
     output->descriptor = -1;
 }

@@ -1,12 +1,13 @@
 /* base/io/output.h: a file that the program writes in any order.
  *
  * The file gets its name when it is complete and on the disk. A failure, or fct_output_abandon, leaves the
- * old file unchanged and no temporary file.
+ * old file unchanged and no temporary file (base/io/temporary.h).
  */
 #ifndef FCT_BASE_OUTPUT_H
 #define FCT_BASE_OUTPUT_H
 
 #include <limits.h>
+#include <stdio.h>
 
 #include "base/env.h"
 
@@ -15,15 +16,18 @@ typedef struct fct_output {
     int descriptor;   /* readable and writable */
     uint64_t pending; /* bytes written since the last request to write to the disk */
     bool spooled;     /* the target is no regular file; fct_output_finish copies the bytes to it */
-    char path[PATH_MAX], target[PATH_MAX], temporary[PATH_MAX];
+    bool replaces;    /* an older file, whose permissions stay */
+    unsigned mode;    /* permissions of the older file */
+    char path[PATH_MAX], target[PATH_MAX], folder[PATH_MAX];
+    char temporary[PATH_MAX]; /* empty: the file has no name yet */
 } fct_output;
 
 /* Fails with "PATH: cannot be written: ..." and OUTPUT. error: an errno, or 0 for a stream's error flag. */
 fct_result fct_output_fail(const fct_env *env, const char *path, int error);
 
 /* Opens a new file of `size` zero bytes, and reserves its space if the file system can. "-" is standard
- * output. Symbolic links are followed. A target that is no regular file is written by fct_output_finish, from
- * a temporary file. Errors: OUTPUT. */
+ * output. Symbolic links are followed, also to a file that does not exist. A target that is no regular file
+ * is written by fct_output_finish, from a temporary file. Errors: OUTPUT. */
 fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, fct_output *out);
 /* Errors: OUTPUT. */
 fct_result fct_output_write(fct_output *output, uint64_t offset, const void *data, size_t size);
@@ -32,5 +36,13 @@ fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data
 /* Writes everything to the disk, renames the file and closes it, also on failure. Errors: OUTPUT. */
 fct_result fct_output_finish(fct_output *output);
 void fct_output_abandon(fct_output *output);
+
+/* Whether the path is a pipe, a device or another thing that is neither a file nor a folder. */
+bool fct_output_is_device(const char *path);
+
+/* Writes the output of produce(user, stream) to `path` with an fct_writer. If produce fails, the target stays
+ * unchanged. Errors: OUTPUT, MEMORY and those of produce. */
+fct_result fct_file_write_atomic(const fct_env *env, const char *path,
+                                 fct_result (*produce)(void *user, FILE *stream), void *user);
 
 #endif

@@ -1,6 +1,7 @@
 /* base/io/spool.c: see spool.h. */
 #define _GNU_SOURCE
 #include "base/io/spool.h"
+#include "base/io/temporary.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -18,23 +19,10 @@ static fct_result fail_spool(const fct_spool *spool, const char *what, int error
                     what, strerror(error));
 }
 
-static void folder_of(const char *path, char *folder, size_t size) {
-    const char *slash = strrchr(path, '/');
-    int length = slash == path ? 1 : slash ? (int)(slash - path) : 0;
-    snprintf(folder, size, "%.*s", length ? length : 1, length ? path : ".");
-}
-
-/* Some file systems cannot create a nameless file. The file then has a name until unlink. */
 static int open_nameless(const char *folder) {
-    int descriptor = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    if (descriptor >= 0) return descriptor;
-    char path[PATH_MAX];
-    if ((size_t)snprintf(path, sizeof path, "%s/facetree-XXXXXX", folder) >= sizeof path) {
-        errno = ENAMETOOLONG;
-        return -1;
-    }
-    descriptor = mkostemp(path, O_CLOEXEC);
-    if (descriptor >= 0) unlink(path);
+    char name[PATH_MAX];
+    int descriptor = fct_temporary_open(folder, name, sizeof name);
+    if (descriptor >= 0 && *name) unlink(name);
     return descriptor;
 }
 
@@ -44,7 +32,7 @@ fct_result fct_spool_open(const fct_env *env, const char *folder, const char *be
     if (folder)
         snprintf(path, sizeof path, "%s", folder);
     else
-        folder_of(beside, path, sizeof path);
+        fct_folder_of(beside, path, sizeof path);
     snprintf(out->folder, sizeof out->folder, "%.*s", (int)sizeof out->folder - 1, path);
     out->descriptor = open_nameless(path);
     if (out->descriptor >= 0) return FCT_OK;

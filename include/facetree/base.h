@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #if defined(__GNUC__)
 #define FCT_API __attribute__((visibility("default")))
@@ -59,6 +60,11 @@ typedef struct fct_env {
     /* text is one line without a line end. Runs in the calling thread only. */
     void (*message)(void *user, fct_severity severity, const char *text);
     void *message_user;
+
+    /* Receives the path of each file that the library opens for reading, also of files that other files name.
+     * size: its bytes, 0 for a pipe or a device. Runs in the calling thread only. */
+    void (*opened)(void *user, const char *path, uint64_t size);
+    void *opened_user;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);
@@ -73,6 +79,22 @@ FCT_API const char *fct_simd_variant(void);
 /* Checks FACETREE_SIMD. Errors: DATA for an unknown value or for a variant that the processor does not
  * support; the library then uses the best variant that the processor supports. */
 FCT_API fct_result fct_simd_check(const fct_env *env);
+
+/* A file that appears at its path when it is complete and on the disk. Until then an older file stays. "-" is
+ * standard output. A device or a pipe is written directly. Symbolic links are followed. */
+typedef struct fct_writer fct_writer;
+/* Errors: OUTPUT, MEMORY. */
+FCT_API fct_result fct_writer_open(const fct_env *env, const char *path, fct_writer **out);
+/* The stream to write to; the caller may ignore the results of fwrite and fprintf. */
+FCT_API FILE *fct_writer_stream(fct_writer *writer);
+/* Closes the file. If `keep`, it takes its name, else it vanishes. NULL is allowed. Errors: OUTPUT. */
+FCT_API fct_result fct_writer_close(fct_writer *writer, bool keep);
+/* Whether a file can be written to `path`. Also removes from its folder the temporary files of programs that
+ * were killed. Errors: OUTPUT. */
+FCT_API fct_result fct_output_check(const fct_env *env, const char *path);
+/* Removes the temporary files of this process from a folder. Call it before the process ends by a signal; it
+ * may be called in a signal handler. */
+FCT_API void fct_temporary_remove(const char *folder);
 
 /* An axis-aligned box. It is empty if lower > upper in any coordinate. */
 typedef struct fct_bounds {

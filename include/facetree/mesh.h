@@ -105,10 +105,11 @@ FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
 
 /* Writes .ply (binary little endian; colours as sRGB bytes and float radiosity_r/g/b), .obj, .off, .stl, .om
  * or .glb (unlit; COLOR_0 exposed, clamped and linear, and float _RADIOSITY). "-" writes a PLY to standard
- * output. Replaces the target as a whole: temporary file, fsync, rename. PLY keeps every array except
- * source_faces, bit for bit. A note names the arrays that the format cannot store. GLB groups faces by
- * material and splits vertices whose texture coordinates differ. OM keeps colours as bytes. def may be NULL.
- * Errors: OUTPUT, DATA (unknown ending, invalid mesh), MEMORY, CANCELLED. */
+ * output, and a pipe or a device without such an ending receives a PLY. Replaces the target as a whole:
+ * temporary file, fsync, rename. PLY keeps every array except source_faces, bit for bit. A note names the
+ * arrays that the format cannot store. GLB groups faces by material and splits vertices whose texture
+ * coordinates differ. OM keeps colours as bytes. def may be NULL. Errors: OUTPUT, DATA (unknown ending,
+ * invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
                                  const fct_mesh_save_def *def);
 

@@ -12,6 +12,8 @@
 #include <unistd.h>
 
 #include "base/io/file.h"
+#include "base/io/output.h"
+#include "base/io/temporary.h"
 
 static char folder[64];
 

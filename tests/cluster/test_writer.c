@@ -120,7 +120,7 @@ static void an_abandoned_file_was_never_there(void **state) {
     fct_tree_writer *writer;
     int before = count_files();
     assert_int_equal(fct_tree_writer_open(&env, path, &view, 0, &writer), FCT_OK);
-    assert_int_equal(count_files(), before + 1);
+    assert_true(count_files() <= before + 1); /* a temporary file may have no name */
     assert_int_equal(fct_tree_writer_put(writer, FCT_SECTION_NODES, tree->nodes, 1000), FCT_OK);
     fct_tree_writer_abandon(writer);
     assert_int_equal(count_files(), before);

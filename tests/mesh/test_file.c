@@ -3,6 +3,7 @@
 #include <dirent.h>
 
 #include "base/io/file.h"
+#include "base/io/output.h"
 #include "mesh_support.h"
 
 static const char folder[] = "facetree_test_folder";

@@ -86,7 +86,8 @@ static error_t parse_cluster(int key, char *text, struct argp_state *state) {
 
 static int cluster_one(tool *t, const cluster_options *options) {
     json_t *r = NULL;
-    int code = tool_check_output(t, t->output);
+    int code = tool_check_kind(t, t->output, "fct", "");
+    if (code == TOOL_DONE) code = tool_check_output(t, t->output);
     if (code == TOOL_DONE) code = tool_cluster_file(t, options, t->inputs[0], t->output, &r);
     if (code != TOOL_DONE) return code;
     tool_cluster_say(t, t->inputs[0], r);

@@ -11,6 +11,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -49,8 +50,8 @@ static int add_job(tool *t, job_list *all, const char *folder, const char *name)
     cluster_job *j = all->list + all->count;
     *j = (cluster_job){.input = strdup(path), .output = strdup(output), .pipe = -1};
     ++all->count;
-    return j->input && j->output ? TOOL_DONE
-                                 : tool_fail(t, TOOL_MEMORY, "out of memory for the list of files");
+    if (!j->input || !j->output) return tool_fail(t, TOOL_MEMORY, "out of memory for the list of files");
+    return tool_note_input(t, path);
 }
 
 static int is_mesh_entry(const struct dirent *entry) {
@@ -87,8 +88,11 @@ static int start_job(tool *t, const cluster_options *options, cluster_job *j, ui
     int ends[2];
     if (pipe2(ends, O_CLOEXEC))
         return tool_fail(t, TOOL_INTERNAL, "a pipe cannot be created: %s", strerror(errno));
+    pid_t parent = getpid();
     j->process = fork();
     if (j->process == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGTERM);
+        if (getppid() != parent) _exit(TOOL_CANCELLED);
         close(ends[0]);
         work_on_job(t, options, j, ends[1], processes);
     }
@@ -171,7 +175,10 @@ int tool_cluster_many(tool *t, const cluster_options *options) {
     for (int i = 0; i < t->input_count && code == TOOL_DONE; ++i)
         code = tool_is_folder(t->inputs[i]) ? add_folder(t, &all, t->inputs[i])
                                             : add_job(t, &all, NULL, t->inputs[i]);
+    if (code == TOOL_DONE && !tool_is_folder(t->output) && !tool_is_unknown_kind(t->output))
+        code = tool_fail(t, TOOL_USAGE, "%s: expected a folder for several meshes", t->output);
     if (code == TOOL_DONE) code = tool_check_folder(t, t->output);
+    for (int i = 0; i < all.count && code == TOOL_DONE; ++i) code = tool_refuse_input(t, all.list[i].output);
     if (code != TOOL_DONE) goto done;
     if (!t->threads) t->threads = (uint32_t)sysconf(_SC_NPROCESSORS_ONLN);
     code = run_jobs(t, options, &all, t->threads < (uint32_t)all.count ? t->threads : (uint32_t)all.count);

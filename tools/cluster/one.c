@@ -61,7 +61,9 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     }
     if (tool_context(t, code, input) != TOOL_DONE) goto done;
     double built = tool_seconds();
-    code = tool_result(t, fct_tree_save(&t->env, tree, output));
+    code = tool_refuse_input(t, output);
+    if (code == TOOL_DONE) code = tool_check_inputs(t);
+    if (code == TOOL_DONE) code = tool_result(t, fct_tree_save(&t->env, tree, output));
     fct_tree_view view = fct_tree_get(tree);
     *s = (fct_large_stats){view.face_count,     view.vertex_count,
                            view.root_count,     view.depth,
@@ -103,7 +105,9 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
         limits.temporary_folder = options->temporary;
         t->items = faces;
         t->unit = "faces";
-        code = tool_result(t, fct_tree_build_file(&t->env, input, output, &def, &limits, &stats));
+        code = tool_refuse_input(t, output);
+        if (code == TOOL_DONE)
+            code = tool_result(t, fct_tree_build_file(&t->env, input, output, &def, &limits, &stats));
         tool_context(t, code, input);
     }
     stats.seconds_read += hashed;

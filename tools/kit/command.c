@@ -11,10 +11,20 @@
 #include "tools/kit/file.h"
 #include "tools/kit/options.h"
 
-enum { KEY_JSON = 256, KEY_PROGRESS, KEY_THREADS, KEY_SEED, KEY_MAX_MEMORY, KEY_USAGE, KEY_MAN };
+enum {
+    KEY_JSON = 256,
+    KEY_PROGRESS,
+    KEY_THREADS,
+    KEY_SEED,
+    KEY_MAX_MEMORY,
+    KEY_IN_PLACE,
+    KEY_USAGE,
+    KEY_MAN
+};
 
 static const struct argp_option common_options[] = {
     {"output", 'o', "FILE", 0, "Write to FILE; - is standard output", 0},
+    {"in-place", KEY_IN_PLACE, NULL, 0, "Allow an output that replaces an input", 0},
     {NULL, 0, NULL, 0, "Common to all commands:", -2},
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on standard output and nothing else there", -2},
     {"progress", KEY_PROGRESS, NULL, 0, "Show progress on standard error, even if it is not a terminal", -2},
@@ -28,6 +38,8 @@ static const struct argp_option common_options[] = {
     {"usage", KEY_USAGE, NULL, OPTION_HIDDEN, NULL, -1},
     {"man", KEY_MAN, NULL, OPTION_HIDDEN, NULL, -1},
     {0}};
+
+enum { OUTPUT_OPTIONS = 2 }; /* the first common options are about -o */
 
 typedef struct arguments {
     tool *tool;
@@ -56,7 +68,7 @@ static error_t check_arguments(const arguments *a, struct argp_state *state) {
                           a->command->synopsis, t->input_count, t->input_count == 1 ? "" : "s");
     if (a->command->output == TOOL_OUTPUT_REQUIRED && !t->output)
         return tool_usage(state, "expected -o FILE, found none");
-    if (t->json && t->output && !strcmp(t->output, "-"))
+    if (t->json && t->output && tool_is_standard_output(t->output))
         return tool_usage(state, "--json and -o - cannot both write to standard output");
     return 0;
 }
@@ -75,6 +87,9 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
         return 0;
     case 'q':
         t->quiet = true;
+        return 0;
+    case KEY_IN_PLACE:
+        t->in_place = true;
         return 0;
     case KEY_JSON:
         t->json = true;
@@ -143,21 +158,21 @@ static void say_bad_long(const tool_command *command, const char *token) {
     look_up_option(&found, common_options, name, length);
     const struct argp_option *option = found.exact ? found.exact : found.prefixes == 1 ? found.prefix : NULL;
     if (option && equals) {
-        fprintf(stderr, "facetree %s: --%s takes no value\n", command->name, option->name);
+        tool_complain("facetree %s: --%s takes no value", command->name, option->name);
     } else if (option) {
-        fprintf(stderr, "facetree %s: --%s: expected a value (%s), found none\n", command->name, option->name,
-                option->arg ? option->arg : "");
+        tool_complain("facetree %s: --%s: expected a value (%s), found none", command->name, option->name,
+                      option->arg ? option->arg : "");
     } else if (found.prefixes > 1) {
-        fprintf(stderr, "facetree %s: '%.*s' is the beginning of several options\n", command->name,
-                (int)length + 2, token);
+        tool_complain("facetree %s: '%.*s' is the beginning of several options", command->name,
+                      (int)length + 2, token);
     } else {
         const char *names[64];
         char word[64];
         snprintf(word, sizeof word, "%.*s", (int)length, name);
         add_long_names(common_options, names, add_long_names(command->options, names, 0, 64), 64);
         const char *nearest = tool_nearest(word, names);
-        fprintf(stderr, "facetree %s: unknown option '%.*s'%s%s%s\n", command->name, (int)length + 2, token,
-                nearest ? "; did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "");
+        tool_complain("facetree %s: unknown option '%.*s'%s%s%s", command->name, (int)length + 2, token,
+                      nearest ? "; did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "");
     }
 }
 
@@ -177,11 +192,11 @@ static void say_bad_option(const tool_command *command, int next, int argc, char
     if (token[0] != '-' && next < argc) token = argv[next];
     for (const char *c = token + (*token == '-'); *c; ++c) {
         if (!has_letter(command->options, *c) && !has_letter(common_options, *c)) {
-            fprintf(stderr, "facetree %s: unknown option '-%c'\n", command->name, *c);
+            tool_complain("facetree %s: unknown option '-%c'", command->name, *c);
             return;
         }
     }
-    fprintf(stderr, "facetree %s: %s: expected a value, found none\n", command->name, token);
+    tool_complain("facetree %s: %s: expected a value, found none", command->name, token);
 }
 
 /* --- Help --- */
@@ -266,11 +281,11 @@ static void print_man_page(const tool_command *command) {
     print_roff_paragraphs(command->text ? command->text : command->summary);
     puts(".SH OPTIONS");
     print_roff_options(command->options);
-    print_roff_options(common_options + (command->output == TOOL_OUTPUT_UNUSED));
+    print_roff_options(common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS));
     puts(
         ".SH EXIT STATUS\n0 done; 1 the answer is no; 64 usage; 65 bad data; 66 input missing or unreadable; "
-        "70 internal error; 73 output cannot be written; 75 out of memory or over --max-memory; 130 "
-        "interrupted.\n"
+        "70 internal error; 73 output cannot be written; 75 out of memory or over --max-memory; "
+        "128 + N ended by the signal N.\n"
         ".SH SEE ALSO\n.BR facetree (1)");
 }
 
@@ -293,7 +308,11 @@ static int print_answer(const tool_command *command, const struct argp *argp, in
 static int run_command(tool *t, const tool_command *command, void *options) {
     tool_env_open(t);
     int code = TOOL_DONE;
-    if (t->output && !command->output_folder) code = tool_check_output(t, t->output);
+    if (t->output && tool_is_standard_output(t->output)) t->output = "-";
+    for (int i = 0; i < t->input_count && code == TOOL_DONE; ++i) code = tool_note_input(t, t->inputs[i]);
+    if (t->output && code == TOOL_DONE && command->endings)
+        code = tool_check_kind(t, t->output, command->endings, command->other);
+    if (t->output && code == TOOL_DONE && !command->output_folder) code = tool_check_output(t, t->output);
     if (code == TOOL_DONE) code = command->run(t, options);
     if (fflush(stdout) || ferror(stdout))
         code = tool_fail(t, TOOL_OUTPUT, "standard output cannot be written");
@@ -309,11 +328,11 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
     t.inputs = malloc(((size_t)argc + 1) * sizeof *t.inputs);
     int code = TOOL_MEMORY;
     if (!doc || !t.inputs) {
-        fprintf(stderr, "facetree %s: out of memory\n", command->name);
+        tool_complain("facetree %s: out of memory", command->name);
         goto done;
     }
-    /* The first common option is -o: hide it if the command has no output. */
-    const struct argp argp = {.options = takes_output(command) ? common_options : common_options + 1,
+    /* A command without output has no options about it. */
+    const struct argp argp = {.options = common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS),
                               .parser = parse_common,
                               .args_doc = command->synopsis,
                               .doc = doc,

@@ -33,7 +33,9 @@ typedef struct tool_command {
     int (*run)(tool *t, void *options); /* returns an exit code */
     int inputs_min, inputs_max;
     tool_output_use output;
-    bool output_folder; /* -o may name a folder: the command checks it itself */
+    const char *endings; /* of -o, for tool_check_kind of tools/kit/file.h; NULL: the command checks them */
+    const char *other;   /* likewise */
+    bool output_folder;  /* -o may name a folder: the command checks it itself */
 } tool_command;
 
 /* The first key of options without a letter. Every command has the letters -o, -q and -h. */

@@ -6,9 +6,10 @@
 #define _GNU_SOURCE
 #include "tools/kit/env.h"
 
+#include "tools/guard/signals.h"
+
 #include <malloc.h>
 #include <math.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,8 +19,6 @@
 
 /* Bytes beside the counted memory: data of the code, buffers of C and C++, and stack and heap per thread. */
 enum { DATA_SLACK = 64 << 20, DATA_SLACK_THREAD = 16 << 20 };
-
-static volatile sig_atomic_t interrupted;
 
 double tool_seconds(void) {
     struct timespec now;
@@ -141,7 +140,7 @@ static void draw_bar(tool *t, double done, double now, bool terminal) {
  * phase. False cancels the library call. */
 static bool show_progress(void *user, const char *phase, double done) {
     tool *t = user;
-    if (interrupted) return false;
+    if (guard_signal() || t->refused) return false;
     bool terminal = isatty(STDERR_FILENO);
     if (t->quiet || t->bar_off || !(terminal || t->progress)) return true;
     double now = tool_seconds();
@@ -155,18 +154,36 @@ static bool show_progress(void *user, const char *phase, double done) {
     return true;
 }
 
-static void note_signal(int signal_number) {
-    interrupted = signal_number;
-}
-
 /* --- Messages --- */
 
-/* Appends to the recorded error. Control characters become ?, so that the error stays one line. */
+void tool_clean_text(char *text) {
+    for (unsigned char *c = (unsigned char *)text; *c; ++c) {
+        bool pair = c[0] == 0xC2 && c[1] >= 0x80 && c[1] < 0xA0; /* a control character in UTF-8 */
+        if (*c < 32 || *c == 127 || pair) *c = '?';
+        if (pair) *++c = '?';
+    }
+}
+
+/* Prints a line without control characters. */
+static void print_line(FILE *stream, const char *before, const char *format, va_list values) {
+    char text[2048];
+    vsnprintf(text, sizeof text, format, values);
+    tool_clean_text(text);
+    fprintf(stream, "%s%s\n", before, text);
+}
+
+void tool_complain(const char *format, ...) {
+    va_list values;
+    va_start(values, format);
+    print_line(stderr, "", format, values);
+    va_end(values);
+}
+
+/* Appends to the recorded error. The error stays one line. */
 static void record_error(tool *t, const char *format, va_list values) {
     char text[1024];
     vsnprintf(text, sizeof text, format, values);
-    for (char *c = text; *c; ++c)
-        if ((unsigned char)*c < 32 || *c == 127) *c = '?';
+    tool_clean_text(text);
     size_t used = strlen(t->error);
     if (used && strstr(t->error, text)) return;
     snprintf(t->error + used, sizeof t->error - used, "%s%s", used ? "; " : "", text);
@@ -188,38 +205,55 @@ int tool_context(tool *t, int code, const char *path) {
     return tool_fail(t, code, "%s: %s", path, text);
 }
 
+static void tool_note(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 /* The message hook. Errors are kept until the end, because the library may recover, and because a failed call
  * may send two messages. */
 static void take_message(void *user, fct_severity severity, const char *text) {
     tool *t = user;
     if (severity == FCT_MESSAGE_ERROR) {
         tool_fail(t, TOOL_INTERNAL, "%s", text);
-    } else if (!t->quiet) {
-        clear_bar(t);
-        fprintf(stderr, "facetree: %s%s\n", severity == FCT_MESSAGE_WARNING ? "warning: " : "", text);
+    } else if (severity == FCT_MESSAGE_WARNING) {
+        tool_warn(t, "%s", text);
+    } else {
+        tool_note(t, "%s", text);
     }
 }
 
-void tool_warn(tool *t, const char *format, ...) {
+static void tell_person(tool *t, const char *before, const char *format, va_list values) {
     if (t->quiet) return;
     clear_bar(t);
+    print_line(stderr, before, format, values);
+}
+
+void tool_warn(tool *t, const char *format, ...) {
     va_list values;
     va_start(values, format);
-    fputs("facetree: warning: ", stderr);
-    vfprintf(stderr, format, values);
-    fputc('\n', stderr);
+    tell_person(t, "facetree: warning: ", format, values);
+    va_end(values);
+}
+
+static void tool_note(tool *t, const char *format, ...) {
+    va_list values;
+    va_start(values, format);
+    tell_person(t, "facetree: ", format, values);
     va_end(values);
 }
 
 void tool_say(tool *t, const char *format, ...) {
-    if (t->quiet || t->json) return;
+    if (t->quiet || t->json || guard_stdout_was_closed()) return;
     clear_bar(t);
-    FILE *stream = t->output && !strcmp(t->output, "-") ? stderr : stdout;
     va_list values;
     va_start(values, format);
-    vfprintf(stream, format, values);
-    fputc('\n', stream);
+    print_line(t->output && !strcmp(t->output, "-") ? stderr : stdout, "", format, values);
     va_end(values);
+}
+
+int tool_check_inputs(tool *t) {
+    const char *path = guard_find_shortened(&t->read);
+    if (!path) return TOOL_DONE;
+    t->error[0] = 0;
+    return tool_fail(t, TOOL_INPUT, "%s: was shortened while it was read", path);
 }
 
 int tool_result(tool *t, fct_result result) {
@@ -230,7 +264,9 @@ int tool_result(tool *t, fct_result result) {
                                 [FCT_ERROR_MEMORY] = TOOL_MEMORY,
                                 [FCT_ERROR_CANCELLED] = TOOL_CANCELLED,
                                 [FCT_ERROR_INTERNAL] = TOOL_INTERNAL};
-    if (result == FCT_OK) t->error[0] = 0;
+    if (result == FCT_ERROR_CANCELLED && t->refused) return TOOL_USAGE;
+    if (result == FCT_OK && !t->refused) t->error[0] = 0;
+    if (result != FCT_OK && tool_check_inputs(t) != TOOL_DONE) return TOOL_INPUT;
     if (result != FCT_OK && !t->error[0]) tool_fail(t, 0, "%s", fct_result_text(result));
     return codes[result];
 }
@@ -252,7 +288,10 @@ int tool_json(tool *t, json_t *object) {
 
 static void print_value(const json_t *value) {
     if (json_is_string(value)) {
-        fputs(json_string_value(value), stdout);
+        char text[1024];
+        snprintf(text, sizeof text, "%s", json_string_value(value));
+        tool_clean_text(text);
+        fputs(text, stdout);
     } else if (json_is_boolean(value)) {
         fputs(json_is_true(value) ? "yes" : "no", stdout);
     } else if (json_is_integer(value)) {
@@ -294,10 +333,49 @@ int tool_print(tool *t, json_t *object) {
     return tool_json(t, object);
 }
 
+json_t *tool_json_text(const char *text) {
+    json_t *string = json_string(text);
+    char *copy = string ? NULL : strdup(text);
+    for (char *c = copy; c && *c; ++c)
+        if ((unsigned char)*c > 127) *c = '?';
+    if (copy) string = json_string(copy);
+    free(copy);
+    return string;
+}
+
 json_t *tool_json_floats(const float *values, int count) {
     json_t *array = json_array();
     for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));
     return array;
+}
+
+/* --- Inputs and outputs --- */
+
+static int refuse(tool *t, const char *path, const char *input) {
+    if (t->refused) return TOOL_USAGE;
+    t->refused = true;
+    t->error[0] = 0;
+    return tool_fail(t, TOOL_USAGE,
+                     "%s: the output is the input %s; choose another name, or replace it with --in-place",
+                     path, input);
+}
+
+int tool_refuse_input(tool *t, const char *path) {
+    const char *input = t->in_place || !strcmp(path, "-") ? NULL : guard_find_input(&t->read, path);
+    return input ? refuse(t, path, input) : TOOL_DONE;
+}
+
+int tool_note_input(tool *t, const char *path) {
+    if (!strcmp(path, "-")) return TOOL_DONE;
+    if (!guard_add_input(&t->read, path))
+        return tool_fail(t, TOOL_MEMORY, "out of memory for the names of inputs");
+    return t->output ? tool_refuse_input(t, t->output) : TOOL_DONE;
+}
+
+/* The hook for opened files. A refusal cancels the library call. */
+static void note_opened(void *user, const char *path, uint64_t size) {
+    (void)size;
+    tool_note_input(user, path);
 }
 
 /* --- Open and close --- */
@@ -314,17 +392,21 @@ void tool_env_open(tool *t) {
         t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */
         limit_data(t);
     }
-    /* The first signal lets the command clean up, the second one ends it. */
-    struct sigaction action = {.sa_handler = note_signal, .sa_flags = SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    signal(SIGPIPE, SIG_IGN);
+    t->env.opened = note_opened;
+    t->env.opened_user = t;
+    snprintf(t->label, sizeof t->label, "facetree %s", t->name);
+    guard_install_signals(t->label, &t->read, TOOL_INPUT);
 }
 
 int tool_env_close(tool *t, int code) {
     clear_bar(t);
+    guard_release_inputs(&t->read);
     if (code == TOOL_DONE || code == TOOL_NO || t->error_told) return code;
-    if (interrupted) code = TOOL_CANCELLED;
+    if (guard_signal()) {
+        fprintf(stderr, "%s: ended by signal %d (%s)\n", t->label, guard_signal(), strsignal(guard_signal()));
+        fflush(NULL);
+        guard_die(guard_signal());
+    }
     fprintf(stderr, "facetree %s: %s", t->name, t->error[0] ? t->error : "failed");
     if (code == TOOL_MEMORY && t->max_memory && t->memory_refused)
         fprintf(stderr, " (--max-memory %zu bytes)", t->max_memory);

@@ -10,6 +10,7 @@
 #include <stdio.h>
 
 #include "facetree/facetree.h"
+#include "tools/guard/inputs.h"
 
 typedef enum tool_exit {
     TOOL_DONE = 0,
@@ -20,7 +21,7 @@ typedef enum tool_exit {
     TOOL_INTERNAL = 70,
     TOOL_OUTPUT = 73,
     TOOL_MEMORY = 75,
-    TOOL_CANCELLED = 130
+    TOOL_CANCELLED = 130 /* a process that a signal cancels dies of that signal */
 } tool_exit;
 
 typedef struct tool {
@@ -29,6 +30,7 @@ typedef struct tool {
     int input_count;
     const char *output; /* the value of -o, or NULL */
     bool json, quiet, progress;
+    bool in_place;    /* an output may replace an input */
     uint32_t threads; /* 0: all cores */
     uint64_t seed;
     size_t max_memory; /* bytes; 0: no limit */
@@ -38,6 +40,9 @@ typedef struct tool {
     const char *unit; /* of items */
 
     /* Private to env.c. */
+    char label[64];    /* "facetree NAME" */
+    guard_inputs read; /* the files that the command has opened */
+    bool refused;      /* an output is an input: the error is recorded */
     size_t memory_now, memory_peak;
     bool memory_refused, cancelled;
     char error[1536];
@@ -64,6 +69,21 @@ int tool_result(tool *t, fct_result result);
 void tool_say(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void tool_warn(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Prints a line on stderr, with '?' for control characters. */
+void tool_complain(const char *format, ...) __attribute__((format(printf, 1, 2)));
+/* Replaces control characters by '?'. */
+void tool_clean_text(char *text);
+
+/* Notes a file that the command reads. The library's inputs are noted by a hook. Returns an exit code:
+ * TOOL_USAGE if -o names the same file and --in-place is absent. */
+int tool_note_input(tool *t, const char *path);
+/* TOOL_USAGE if `path` is a file that the command reads, by device and inode, and --in-place is absent. */
+int tool_refuse_input(tool *t, const char *path);
+
+/* TOOL_INPUT if a file that the command reads has become shorter: its bytes are not those that were opened.
+ */
+int tool_check_inputs(tool *t);
+
 /* Seconds of a monotonic clock. */
 double tool_seconds(void);
 /* The largest resident memory of the process so far, in bytes. */
@@ -73,6 +93,8 @@ size_t tool_peak_bytes(void);
 int tool_json(tool *t, json_t *object);
 /* For commands whose answer is the object: like tool_json, but without --json prints lines "key value". */
 int tool_print(tool *t, json_t *object);
+/* A string; bytes that are no UTF-8 become '?'. */
+json_t *tool_json_text(const char *text);
 json_t *tool_json_floats(const float *values, int count);
 
 /* Memory under --max-memory; NULL after a recorded error. */

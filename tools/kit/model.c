@@ -47,5 +47,7 @@ int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
 int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure) {
     fct_mesh_save_def def = fct_mesh_save_def_default();
     def.exposure = (float)exposure;
-    return tool_result(t, fct_mesh_save(&t->env, path, mesh, &def));
+    int code = tool_refuse_input(t, path);
+    if (code == TOOL_DONE) code = tool_check_inputs(t);
+    return code == TOOL_DONE ? tool_result(t, fct_mesh_save(&t->env, path, mesh, &def)) : code;
 }

@@ -9,13 +9,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/kit/env.h"
+
 error_t tool_usage(struct argp_state *state, const char *format, ...) {
+    char text[1024];
     va_list values;
     va_start(values, format);
-    fprintf(stderr, "%s: ", state->name);
-    vfprintf(stderr, format, values);
-    fputc('\n', stderr);
+    vsnprintf(text, sizeof text, format, values);
     va_end(values);
+    tool_clean_text(text);
+    fprintf(stderr, "%s: %s\n", state->name, text);
     return ECANCELED;
 }
 

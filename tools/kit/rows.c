@@ -95,8 +95,9 @@ int tool_rows_read(tool *t, const char *path, int least, int columns, const floa
     bool standard = !strcmp(path, "-");
     FILE *file = standard ? stdin : fopen(path, "re");
     if (!file) return tool_fail(t, TOOL_INPUT, "%s: cannot be read: %s", path, strerror(errno));
+    int noted = standard ? TOOL_DONE : tool_note_input(t, path);
     reader r = {t, standard ? "standard input" : path, 0, least, columns, missing};
-    int code = read_rows(&r, file, rows);
+    int code = noted == TOOL_DONE ? read_rows(&r, file, rows) : noted;
     if (!standard) fclose(file);
     if (code != TOOL_DONE) tool_rows_release(t, rows);
     return code;

@@ -122,7 +122,8 @@ static bool is_written_by_rows(int (*mesh)(make_mesh *m, uint32_t triangles), co
 
 static int make_one(tool *t, int index, uint32_t triangles, bool inside, make_result *result) {
     make_mesh m = {.t = t};
-    int code = tool_check_output(t, t->output);
+    int code = tool_check_kind(t, t->output, TOOL_MESHES, NULL);
+    if (code == TOOL_DONE) code = tool_check_output(t, t->output);
     if (code == TOOL_DONE && is_written_by_rows(things[index].mesh, t->output)) {
         uint32_t n = round_root(triangles / 2.);
         result->triangles = 2 * (uint64_t)n * n;
@@ -152,7 +153,7 @@ static int make_folder(tool *t, int index, uint32_t triangles, make_result *resu
     if (length >= tail && strcmp(folder + length - tail, file) == 0 &&
         (length == tail || folder[length - tail - 1] == '/'))
         snprintf(folder + length - tail, 2, length == tail ? "." : "");
-    else if (tool_ends(folder, "json"))
+    else if (!tool_is_folder(folder) && !tool_is_unknown_kind(folder))
         return tool_fail(t, TOOL_USAGE, "%s: expected the name of a folder, or of the %s in it", t->output,
                          file);
     int code = tool_check_folder(t, folder);

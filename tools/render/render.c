@@ -282,7 +282,8 @@ int tool_render(int argc, char **argv) {
         .run = run_render,
         .inputs_min = 1,
         .inputs_max = 1,
-        .output = TOOL_OUTPUT_REQUIRED};
+        .output = TOOL_OUTPUT_REQUIRED,
+        .endings = "png"};
     render_options o = {.width = 1280, .height = 800, .samples = 16, .exposure = 1, .crease = 40};
     o.frame.view = -1;
     o.frame.fov = 35;

@@ -1,0 +1,257 @@
+/* tools/bake/bake.c: facetree bake: the radiosity of a scene as vertex colours, in one file or one file per
+ * object, and at probes. */
+#define _GNU_SOURCE
+
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "tools/bake/objects.h"
+#include "tools/bake/probes.h"
+#include "tools/commands.h"
+#include "tools/kit/command.h"
+#include "tools/kit/file.h"
+#include "tools/kit/model.h"
+#include "tools/kit/options.h"
+
+typedef struct bake_options {
+    fct_bake_def def;
+    fct_backend backend;
+    const char *probes;
+    double exposure;
+    const char *also;
+} bake_options;
+
+enum {
+    KEY_METHOD = TOOL_KEY,
+    KEY_ERROR,
+    KEY_SAMPLES,
+    KEY_VISIBILITY,
+    KEY_INDIRECT,
+    KEY_FINAL,
+    KEY_PROBE,
+    KEY_EXPOSURE,
+    KEY_MAX_EDGE,
+    KEY_ALSO
+};
+
+static const struct argp_option bake_options_table[] = {
+    {"method", KEY_METHOD, "NAME", 0,
+     "face: radiosity of face clusters (default); reference: path tracing at every vertex", 0},
+    {"error", KEY_ERROR, "E", 0,
+     "Split links until the uncertainty of each is at most this share of the emitted power (default 2e-5, "
+     "from "
+     "1e-9 to 1). A smaller E also means more rays and anchors",
+     0},
+    {"samples", KEY_SAMPLES, "N", 0,
+     "reference: paths per vertex (default 256); face: gather rays per anchor (default: from --error)", 0},
+    {"visibility", KEY_VISIBILITY, "NAME", 0, "Backend for rays: obb (default) or embree", 0},
+    {"backend", KEY_VISIBILITY, NULL, OPTION_ALIAS, NULL, 0},
+    {"indirect-only", KEY_INDIRECT, NULL, 0, "Leave out emission and direct light", 0},
+    {"final", KEY_FINAL, "HOW", 0,
+     "none: the solution as it is; direct: shadow rays for direct light, anchors for indirect light; gather "
+     "(default): as direct, with more anchors where the surface has relief",
+     0},
+    {"probe", KEY_PROBE, "FILE", 0,
+     "Also compute the light at points, one per line: x y z nx ny nz; - is standard input", 0},
+    {"exposure", KEY_EXPOSURE, "F", 0,
+     "Factor on the colours for display (default 1); the stored radiosity does not change", 0},
+    {"max-edge", KEY_MAX_EDGE, "L", 0,
+     "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
+     "scene)",
+     0},
+    {"also", KEY_ALSO, "FILE", 0, "Also write the mesh to a second file, in the format of its name", 0},
+    {0}};
+
+static error_t parse_bake(int key, char *text, struct argp_state *state) {
+    static const char *const methods[] = {"face", "reference", NULL}, *const finals[] = {"none", "direct",
+                                                                                         "gather", NULL};
+    static const fct_bake_method method_values[] = {FCT_BAKE_FACE, FCT_BAKE_REFERENCE};
+    static const fct_final final_values[] = {FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER};
+    bake_options *o = state->input;
+    int index = 0;
+    error_t error;
+    switch (key) {
+    case KEY_METHOD:
+        error = tool_parse_choice(state, "--method", text, methods, &index);
+        o->def.method = method_values[index];
+        return error;
+    case KEY_FINAL:
+        error = tool_parse_choice(state, "--final", text, finals, &index);
+        o->def.final = final_values[index];
+        return error;
+    case KEY_ERROR:
+        return tool_parse_real(state, "--error", text, 1e-9, 1, &o->def.error);
+    case KEY_SAMPLES:
+        return tool_parse_count32(state, "--samples", text, 1, 100000000, &o->def.samples);
+    case KEY_VISIBILITY:
+        return tool_parse_backend(state, "--visibility", text, &o->backend);
+    case KEY_INDIRECT:
+        o->def.indirect_only = true;
+        return 0;
+    case KEY_PROBE:
+        o->probes = text;
+        return 0;
+    case KEY_EXPOSURE:
+        return tool_parse_real(state, "--exposure", text, 0, 1e12, &o->exposure);
+    case KEY_ALSO:
+        o->also = text;
+        return 0;
+    case KEY_MAX_EDGE:
+        return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* --- Outputs --- */
+
+static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
+    fct_mesh mesh;
+    int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
+    if (code != TOOL_DONE) return code;
+    code = tool_save_mesh(t, t->output, &mesh, o->exposure);
+    if (code == TOOL_DONE && o->also) code = tool_save_mesh(t, o->also, &mesh, o->exposure);
+    fct_mesh_release(&t->env, &mesh);
+    return code;
+}
+
+/* Whether -o names a folder: one that exists, ends in /, or has no ending of a known kind of file. */
+static bool is_folder_output(const char *output) {
+    return tool_is_folder(output) || output[strlen(output) - 1] == '/' || tool_is_unknown_kind(output);
+}
+
+static int check_also(tool *t, const char *also) {
+    if (!t->output || is_folder_output(t->output) || tool_same_output(t->output, also))
+        return tool_fail(t, TOOL_USAGE, "--also %s: expected another file than that of -o FILE", also);
+    int code = tool_check_kind(t, also, TOOL_COLOR_MESHES, NULL);
+    return code == TOOL_DONE ? tool_check_output(t, also) : code;
+}
+
+static int check_bake_output(tool *t, const bake_options *o) {
+    int code = o->also ? check_also(t, o->also) : TOOL_DONE;
+    if (code != TOOL_DONE || !t->output) return code;
+    if (is_folder_output(t->output)) return tool_check_folder(t, t->output);
+    code = tool_check_kind(t, t->output, TOOL_COLOR_MESHES, "the name of a folder");
+    return code == TOOL_DONE ? tool_check_output(t, t->output) : code;
+}
+
+/* --- The bake --- */
+
+static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, double load, json_t *probes,
+                       json_t *files) {
+    double total = tool_seconds() - t->start;
+    tool_say(t, "%llu elements, %llu links, %llu rays in %u passes%s; output %llu vertices, %llu rays",
+             (unsigned long long)s->elements, (unsigned long long)s->links, (unsigned long long)s->rays,
+             s->passes, s->converged ? "" : " (NOT converged)", (unsigned long long)s->vertices,
+             (unsigned long long)s->output_rays);
+    tool_say(t, "power %.6g emitted, %.6g absorbed, %.6g escaped; estimated error %.2g %%", s->power_emitted,
+             s->power_absorbed, s->power_escaped, 100 * s->error_estimate);
+    tool_say(t, "load %.2f s, open %.2f s, solve %.2f s, output %.2f s, total %.2f s; peak %.0f MB", load,
+             s->seconds_open, s->seconds_solve, s->seconds_push, total, (double)tool_peak_bytes() / 1e6);
+    json_t *object = json_pack(
+        "{s:s, s:b, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:{s:f, s:f, s:f, s:f, s:f}, s:I, s:I, s:{s:f, s:f, "
+        "s:f}, s:f}",
+        "method", o->def.method == FCT_BAKE_REFERENCE ? "reference" : "face", "converged", s->converged,
+        "passes", (json_int_t)s->passes, "elements", (json_int_t)s->elements, "links", (json_int_t)s->links,
+        "rays", (json_int_t)s->rays, "output_rays", (json_int_t)s->output_rays, "vertices",
+        (json_int_t)s->vertices, "faces", (json_int_t)s->faces, "seconds", "load", load, "open",
+        s->seconds_open, "solve", s->seconds_solve, "push", s->seconds_push, "total", total, "peak_bytes",
+        (json_int_t)tool_peak_bytes(), "touched_bytes", (json_int_t)s->touched_bytes, "power", "emitted",
+        s->power_emitted, "absorbed", s->power_absorbed, "escaped", s->power_escaped, "error_estimate",
+        s->error_estimate);
+    if (probes && object) json_object_set(object, "probes", probes);
+    if (files && object) json_object_set(object, "files", files);
+    int code = tool_json(t, object);
+    return code != TOOL_DONE ? code : s->converged ? TOOL_DONE : TOOL_NO;
+}
+
+/* What a bake writes beside its mesh or meshes. */
+typedef struct bake_answers {
+    json_t *probes, *files; /* NULL: none */
+} bake_answers;
+
+static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, fct_scene *scene, double load,
+                       bake_answers *answers) {
+    fct_bake *bake = NULL;
+    bake_objects objects = {0};
+    fct_scene_view view = fct_scene_get(scene);
+    bool folder = t->output && is_folder_output(t->output);
+    int code = folder ? bake_plan_objects(t, &view, &objects) : TOOL_DONE;
+    if (code == TOOL_DONE) code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
+    if (code == TOOL_DONE && folder) {
+        answers->files = json_array();
+        code = bake_write_objects(t, bake, &view, &objects, o->exposure, answers->files);
+    } else if (code == TOOL_DONE && t->output) {
+        code = write_file(t, o, bake);
+    }
+    if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
+    if (code == TOOL_DONE) {
+        fct_bake_stats stats = fct_bake_get_stats(bake);
+        code = report_bake(t, o, &stats, load, answers->probes, answers->files);
+    }
+    bake_release_objects(t, &objects);
+    fct_bake_destroy(bake);
+    return code;
+}
+
+static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
+    fct_scene *scene;
+    bake_answers answers = {0};
+    double start = tool_seconds();
+    int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], o->backend, &scene));
+    if (code == TOOL_DONE && o->also) code = tool_refuse_input(t, o->also);
+    if (code == TOOL_DONE) code = solve_scene(t, o, set, scene, tool_seconds() - start, &answers);
+    json_decref(answers.probes);
+    json_decref(answers.files);
+    fct_scene_destroy(scene);
+    return code;
+}
+
+static int run_bake(tool *t, void *options) {
+    bake_options *o = options;
+    bake_probes set = {0};
+    if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
+    o->def.seed = t->seed;
+    int code = check_bake_output(t, o);
+    if (code == TOOL_DONE && o->probes) code = bake_read_probes(t, o->probes, &set);
+    if (code == TOOL_DONE) code = bake_scene(t, o, &set);
+    bake_release_probes(t, &set);
+    return code;
+}
+
+int tool_bake(int argc, char **argv) {
+    static const tool_command command = {
+        .name = "bake",
+        .synopsis = "SCENE -o OUT\nSCENE --probe FILE",
+        .summary = "compute the radiosity of a scene as vertex colours",
+        .text =
+            "SCENE is a scene.json, an OBJ with its MTL, a glTF file (.gltf, .glb) or a mesh. OUT is "
+            "either a mesh in world "
+            "space or a folder, which receives one .ply per object. A .glb holds linear COLOR_0, exposed "
+            "and clamped, "
+            "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
+            "triangles are divided, so "
+            "that they can carry shadows. The exit code is 1 if the solution has not converged.\n\n"
+            "A probe belongs to a surface that lies at its point and faces its normal. In free space it "
+            "has irradiance "
+            "and no radiosity.\n\n"
+            "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
+            "seconds{load, open, "
+            "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
+            "error_estimate, "
+            "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
+            "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
+            "name of its model. Powers are sums over "
+            "red, green and blue.",
+        .options = bake_options_table,
+        .parse = parse_bake,
+        .run = run_bake,
+        .inputs_min = 1,
+        .inputs_max = 1,
+        .output = TOOL_OUTPUT_OPTIONAL,
+        .output_folder = true};
+    bake_options options = {.def = fct_bake_def_default(), .exposure = 1};
+    return tool_main(&command, argc, argv, &options);
+}
