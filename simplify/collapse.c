@@ -125,6 +125,15 @@ static void move_corners(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t cou
     s->last_corners[a] = last;
 }
 
+void fct_simplify_remove_faces(fct_simplifier *s, uint32_t point) {
+    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
+        if (corner_dead(s, c)) continue;
+        for (uint32_t k = 0; k < 3; ++k) count_corner_out(s, c - c % 3 + k);
+        s->triangles[c - c % 3] = FCT_NONE;
+        --s->live_faces;
+    }
+}
+
 void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_candidate *candidate,
                            uint32_t keep, uint32_t count_b) {
     uint32_t a = ends[keep], b = ends[1 - keep];

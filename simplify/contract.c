@@ -15,6 +15,7 @@
 #include "simplify/collapse.h"
 #include "simplify/cost/loss.h"
 #include "simplify/topology/link.h"
+#include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
 
 enum {
@@ -54,13 +55,14 @@ static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t cou
     }
 }
 
-/* Whether contracting a and b folds no face over and, if the caller asked, keeps the topology. */
-static bool check_contraction(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
-                              v3 at) {
-    if (s->def->keep_topology && !fct_simplify_link_holds(s, a, b, count_a, count_b)) return false;
-    return !s->def->check_foldover ||
-           !(fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), at) ||
-             fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), at));
+/* Whether the contraction leaves good faces and, if the caller asked, keeps the topology. *body: the edge
+ * belongs to a body of four faces, and all of them vanish. */
+static bool check_contraction(fct_simplifier *s, const fct_move *move, bool *body) {
+    *body = s->def->check_foldover && !s->def->keep_topology && fct_simplify_is_tetrahedron(s, move);
+    if (*body) return true;
+    if (s->def->keep_topology && !fct_simplify_link_holds(s, move->a, move->b, move->count_a, move->count_b))
+        return false;
+    return fct_simplify_remains_good(s, move);
 }
 
 /* Whether the edge may be contracted now. If its cost has grown beyond the current bucket, the edge returns
@@ -81,24 +83,21 @@ static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
 }
 
 /* Contracts the edge if the checks and the loss allow it. Gathers both rings, or only that of the smaller end
- * if the larger one is a hub. */
+ * if the larger one is a hub. An edge of two hubs is dropped, and so is one without faces. */
 static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
     fct_edge *edge = &s->edges[e];
     uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
     uint32_t a = ends[keep], b = ends[1 - keep];
-    bool hub = s->valences[a] > SIMPLIFY_HUB, two_hubs = s->valences[b] > SIMPLIFY_HUB;
+    bool hub = s->valences[a] > SIMPLIFY_HUB, two_hubs = s->valences[b] > SIMPLIFY_HUB, body;
+    if (two_hubs || fct_simplify_find_side(s, s->first_corners[b], a) == FCT_NONE) {
+        fct_simplify_drop_edge(s, e);
+        return false;
+    }
     uint32_t count_a = hub ? 0 : fct_simplify_gather(s, a, s->ring_a);
-    uint32_t count_b = fct_simplify_gather(s, b, s->ring_b), shared = 0;
-    for (uint32_t i = 0; i < count_b; ++i)
-        shared +=
-            s->triangles[corner_next(s->ring_b[i])] == a || s->triangles[corner_previous(s->ring_b[i])] == a;
-    bool fine = shared > 0 && check_contraction(s, a, b, count_a, count_b, candidate->at);
-    if (!fine) {
-        /* An edge without faces no longer exists. An edge of two hubs is tried only once, because it takes
-         * long. */
-        if (shared == 0 || two_hubs)
-            fct_simplify_drop_edge(s, e);
-        else if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
+    uint32_t count_b = fct_simplify_gather(s, b, s->ring_b);
+    const fct_move move = {a, b, count_a, count_b, candidate->at};
+    if (!check_contraction(s, &move, &body)) {
+        if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
             refuse_edge(s, e, ends, EDGE_REFUSED);
         else {
             edge->ends_only = true;
@@ -107,13 +106,16 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
         return false;
     }
     fct_loss loss;
-    double cost = hub ? 0 : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
+    double cost = body  ? fct_loss_measure_body(s, b, count_b, candidate, &loss)
+                  : hub ? 0
+                        : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
     if (cost > 0) {
         candidate->error += cost, candidate->key += cost;
         if (!confirm_cost(s, e, ends, candidate)) return false;
     }
     fct_simplify_drop_edge(s, e);
     fct_simplify_collapse(s, ends, candidate, keep, count_b);
+    if (body) fct_simplify_remove_faces(s, a);
     if (cost > 0) fct_loss_add(&loss, find_first_quadric(s, a));
     s->refused[a] |= s->refused[b];
     if (s->refused[a]) {

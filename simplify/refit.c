@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "simplify/cost/nearest.h"
+#include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
 
 /* The fraction of a least-squares step that a point takes: half, because its neighbours move too. */
@@ -95,10 +96,8 @@ static bool is_degenerate(const fct_simplifier *s, uint32_t f) {
     return a == b || b == c || c == a;
 }
 
-static double find_input_area(const fct_simplifier *s, uint32_t f) {
-    v3 a = find_input_position(s, 3 * f);
-    return .5 * v3_norm(v3_cross(v3_sub(find_input_position(s, 3 * f + 1), a),
-                                 v3_sub(find_input_position(s, 3 * f + 2), a)));
+static double find_area(const v3 p[3]) {
+    return .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
 }
 
 static uint32_t find_input_wedge(const fct_simplifier *s, uint32_t corner) {
@@ -118,10 +117,13 @@ static uint32_t find_sample_corners(const refit *r, size_t sample, uint32_t corn
     return is_degenerate(s, f) ? 0 : 3;
 }
 
-static v3 find_sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count) {
-    v3 sum = {0, 0, 0};
-    for (uint32_t i = 0; i < count; ++i) sum = v3_add(sum, find_input_position(s, corners[i]));
-    return count == 1 ? sum : v3_scale(sum, 1. / 3);
+/* The position of a sample; p receives those of its corners. */
+static inline v3 find_sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count,
+                                      v3 p[3]) {
+    p[0] = find_input_position(s, corners[0]);
+    if (count == 1) return p[0];
+    p[1] = find_input_position(s, corners[1]), p[2] = find_input_position(s, corners[2]);
+    return v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
 }
 
 /* If the nearest point lies on the rim of the searched rings, searches the rings of the points of that rim,
@@ -161,7 +163,8 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
     for (size_t i = begin; i < end; ++i) {
         landing *out = &r->landings[i];
         uint32_t corners[3], points[3], count = find_sample_corners(r, i, corners);
-        v3 p = find_sample_position(s, corners, count);
+        if (count == 0) continue;
+        v3 ends[3], p = find_sample_position(s, corners, count, ends);
         foot best = {0, 0, INFINITY};
         if (out->target != FCT_NONE)
             best = triangle_nearest(&r->targets[out->target].shape, p);
@@ -213,12 +216,12 @@ static void add_sample(refit *r, size_t sample, const landing *at) {
     const fct_simplifier *s = r->s;
     if (at->target == FCT_NONE) return;
     uint32_t corners[3], count = find_sample_corners(r, sample, corners);
-    double weight =
-        count == 1 ? r->corner_weights[sample] : CENTROID_WEIGHT * find_input_area(s, corners[0] / 3);
+    v3 ends[3], p = find_sample_position(s, corners, count, ends);
+    double weight = count == 1 ? r->corner_weights[sample] : CENTROID_WEIGHT * find_area(ends);
     const target *face = &r->targets[at->target];
     const triangle *shape = &face->shape;
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
-    v3 rest = v3_sub(find_sample_position(s, corners, count), shape->a);
+    v3 rest = v3_sub(p, shape->a);
     rest = v3_sub(rest, v3_add(v3_scale(shape->ab, b[1]), v3_scale(shape->ac, b[2])));
     double residual = v3_norm(rest);
     v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : face->n;
@@ -263,7 +266,8 @@ static void move_points(refit *r) {
         double most2 = MAX_STEP * MAX_STEP * shortest2;
         if (length2 > most2) step = v3_scale(step, sqrt(most2 / length2));
         v3 at = v3_add(from, step);
-        if (fct_simplify_folds_over(s, s->ring_a, count, FCT_NONE, from, at)) continue;
+        const fct_move move = {.a = p, .b = FCT_NONE, .count_a = count, .at = at};
+        if (!fct_simplify_remains_good(s, &move)) continue;
         double *position = s->positions + 3 * (size_t)p;
         position[0] = at.x, position[1] = at.y, position[2] = at.z;
         s->sources[p] = FCT_NONE;
@@ -323,7 +327,9 @@ static void prepare_samples(refit *r) {
     memset(r->corners, 0xff, s->wedge_count * sizeof *r->corners);
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
         if (is_degenerate(s, f)) continue;
-        double area = find_input_area(s, f);
+        v3 ends[3];
+        for (uint32_t k = 0; k < 3; ++k) ends[k] = find_input_position(s, 3 * f + k);
+        double area = find_area(ends);
         for (uint32_t c = 3 * f; c < 3 * f + 3; ++c) {
             uint32_t w = find_input_wedge(s, c);
             if (r->corners[w] == FCT_NONE) r->corners[w] = c;

@@ -11,10 +11,9 @@ static fct_result fill_simplifier(fct_simplifier *s) {
     if (result == FCT_OK) result = fct_simplify_attributes(s);
     if (result == FCT_OK) result = fct_simplify_quadrics(s);
     if (result != FCT_OK) return result;
-    size_t ring = s->face_count > SIMPLIFY_HUB ? s->face_count : SIMPLIFY_HUB;
-    s->ring_b = fct_allocate(s->env, ring, sizeof *s->ring_b);
     s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
-    if (!s->ring_b || !s->refused) return fct_fail_memory(s->env, "rings");
+    s->side_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->side_marks);
+    if (!s->refused || !s->side_marks) return fct_fail_memory(s->env, "marks of points");
     if (!s->def->keep_topology) return FCT_OK;
     s->link_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->link_marks);
     return s->link_marks ? FCT_OK : fct_fail_memory(s->env, "marks of points");
@@ -26,7 +25,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->last_corners,  s->valences,      s->first_wedges, s->triangles,     s->next_corners,
                       s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,    s->quadrics,
                       s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,    s->wedge_classes,
-                      s->class_parents, s->link_marks,    s->ring_b,       s->refused};
+                      s->class_parents, s->link_marks,    s->side_marks,   s->refused};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_release(s->env, s);
 }

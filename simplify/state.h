@@ -36,6 +36,20 @@ typedef struct fct_channel {
     double lower, upper; /* range of value * factor in the input; results are clamped to it */
 } fct_channel;
 
+/* A face that remains after a move of a point. */
+typedef struct fct_remaining {
+    uint32_t corner, x, y; /* the corner at the point that moves, and the next two points */
+    bool turned;           /* its normal turns so far that it can fold onto the face across x-y */
+    v3 normal;             /* after the move, of any length; 0 if the area is a rounding error */
+    double norm2;          /* of `normal` */
+} fct_remaining;
+
+/* The faces of an edge from the moved point. */
+typedef struct fct_side_mark {
+    uint32_t epoch;
+    uint32_t first; /* the only face so far, as an index of `remaining`; FCT_NONE after the second */
+} fct_side_mark;
+
 typedef struct fct_simplifier {
     const fct_env *env;
     const fct_mesh *mesh;
@@ -75,11 +89,15 @@ typedef struct fct_simplifier {
     uint32_t class_count;
 
     fct_queue queue;
-    uint32_t ring_a[SIMPLIFY_HUB]; /* corners around the two ends of the current edge */
-    uint32_t *ring_b;              /* x face_count */
-    uint8_t *refused;              /* per point: 1 if an edge at the point may be refused */
-    uint32_t *link_marks;          /* per point; only with keep_topology */
+    uint32_t ring_a[SIMPLIFY_HUB], ring_b[SIMPLIFY_HUB]; /* corners around the ends of the current edge */
+    fct_remaining remaining[2 * SIMPLIFY_HUB];           /* the faces after the current move */
+    uint32_t remaining_count;
+    double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
+    uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
+    uint32_t *link_marks; /* per point; only with keep_topology */
     uint32_t link_epoch;
+    fct_side_mark *side_marks; /* per point */
+    uint32_t side_epoch;
     double max_error2; /* largest squared error of a contraction that was made */
 } fct_simplifier;
 

@@ -56,7 +56,9 @@ typedef struct fct_simplify_def {
     uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions; default 2.
                               None are made with SUBSET, whose vertices are those of the input */
     bool keep_topology;    /* refuse contractions that fail the link condition; default false */
-    bool check_foldover;   /* refuse contractions that fold a face over; default true */
+    /* Refuse contractions that make a bad face or edge: a face that folds over, loses its area or gets the
+     * corners of another, or an edge of more than two faces; default true. */
+    bool check_foldover;
 } fct_simplify_def;
 FCT_API fct_simplify_def fct_simplify_def_default(void);
 
@@ -72,11 +74,14 @@ typedef struct fct_simplify_stats {
  *
  * Vertices: if open sides of faces coincide, their vertices move together, also with different attributes. So
  * doubled creases and texture seams do not crack. Doubled vertices with equal attributes become one vertex.
- * Bodies that only touch stay apart. A point of more than 512 faces does not move. Attributes: colours,
- * texture coordinates and normals stay within the range of each component in the input; normals then get unit
- * length. Dropped: vertices that no face uses, and faces with two corners at one point. Every run and every
- * thread count give the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is negative
- * or NaN), MEMORY, CANCELLED. */
+ * Bodies that only touch stay apart. A point of more than 512 faces does not move. Faces: with
+ * check_foldover, the result has no duplicate face, no face whose area is 0 in the written floats, no two
+ * faces folded onto each other (less than 26 degrees between them) and no edge of more than two faces, unless
+ * the input has such there. If no other contraction is left, more than target_faces remain. Attributes:
+ * colours, texture coordinates and normals stay within the range of each component in the input; normals then
+ * get unit length. Dropped: vertices that no face uses, and faces with two corners at one point. Every run
+ * and every thread count give the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is
+ * negative or NaN), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 

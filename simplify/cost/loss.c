@@ -63,16 +63,18 @@ static void add_apexes(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t
     }
 }
 
-/* Measures the distance from the lost points to the remaining faces of a ring, with their corner moved to
- * `at`. Faces that touch `other` vanish. */
-static void search_ring_faces(const fct_simplifier *s, const uint32_t *ring, uint32_t count, uint32_t other,
-                              v3 at, fct_loss *loss) {
-    for (uint32_t i = 0; i < count; ++i) {
-        uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
-        if (x == other || y == other) continue;
-        triangle t = triangle_make(at, point_position(s, x), point_position(s, y));
+/* Measures the distance from the lost points to the remaining faces, whose corner moves to `at`. A point is
+ * at least as far from a face as from its plane. */
+static void search_remaining(const fct_simplifier *s, v3 at, fct_loss *loss) {
+    for (const fct_remaining *r = s->remaining; r < s->remaining + s->remaining_count; ++r) {
+        triangle t;
+        bool made = false;
         for (uint32_t k = 0; k < loss->count; ++k) {
             if (loss->distance2[k] <= LOSS_NOISE * LOSS_NOISE) continue;
+            double height = v3_dot(r->normal, v3_sub(loss->lost[k], at));
+            if (r->norm2 > 0 && height * height >= loss->distance2[k] * r->norm2) continue;
+            if (!made) t = triangle_make(at, point_position(s, r->x), point_position(s, r->y));
+            made = true;
             foot found = triangle_nearest(&t, loss->lost[k]);
             if (found.distance2 >= loss->distance2[k]) continue;
             loss->distance2[k] = found.distance2;
@@ -81,15 +83,9 @@ static void search_ring_faces(const fct_simplifier *s, const uint32_t *ring, uin
     }
 }
 
-double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
-                        const fct_candidate *candidate, fct_loss *loss) {
+/* Reduces the weights by the quadric's resistance. Returns the cost. */
+static double weigh_lost(const fct_candidate *candidate, fct_loss *loss) {
     double cost = 0;
-    loss->count = 0;
-    add_lost(loss, point_position(s, a), candidate->at, sum_area(s, a) / 3);
-    add_lost(loss, point_position(s, b), candidate->at, sum_area(s, b) / 3);
-    add_apexes(s, a, b, count_a, count_b, candidate->at, loss);
-    search_ring_faces(s, s->ring_a, count_a, b, candidate->at, loss);
-    search_ring_faces(s, s->ring_b, count_b, a, candidate->at, loss);
     for (uint32_t k = 0; k < loss->count; ++k) {
         double distance2 = loss->distance2[k];
         v3 away = v3_sub(loss->lost[k], loss->nearest[k]);
@@ -99,6 +95,27 @@ double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_
         cost += loss->weights[k] * distance2;
     }
     return cost;
+}
+
+double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
+                        const fct_candidate *candidate, fct_loss *loss) {
+    loss->count = 0;
+    add_lost(loss, point_position(s, a), candidate->at, sum_area(s, a) / 3);
+    add_lost(loss, point_position(s, b), candidate->at, sum_area(s, b) / 3);
+    add_apexes(s, a, b, count_a, count_b, candidate->at, loss);
+    search_remaining(s, candidate->at, loss);
+    return weigh_lost(candidate, loss);
+}
+
+double fct_loss_measure_body(const fct_simplifier *s, uint32_t b, uint32_t count_b,
+                             const fct_candidate *candidate, fct_loss *loss) {
+    loss->count = 0;
+    add_lost(loss, point_position(s, b), candidate->at, sum_area(s, b) / 3);
+    for (uint32_t i = 0; i < count_b; ++i) {
+        uint32_t x = s->triangles[corner_next(s->ring_b[i])]; /* each other point of the body once */
+        add_lost(loss, point_position(s, x), candidate->at, sum_area(s, x) / 3);
+    }
+    return weigh_lost(candidate, loss);
 }
 
 void fct_loss_add(const fct_loss *loss, double *q) {

@@ -21,9 +21,12 @@ typedef struct fct_loss {
 } fct_loss;
 
 /* The cost of contracting a and b in addition to candidate->error. Neither end is a hub; ring_a and ring_b
- * hold their corners. */
+ * hold their corners, `remaining` the faces after the move. */
 double fct_loss_measure(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
                         const fct_candidate *candidate, fct_loss *loss);
+/* The same if the whole body of four faces vanishes. */
+double fct_loss_measure_body(const fct_simplifier *s, uint32_t b, uint32_t count_b,
+                             const fct_candidate *candidate, fct_loss *loss);
 /* Adds a plane through each lost point to the quadric q of the new point, so that later contractions count
  * the same loss again. */
 void fct_loss_add(const fct_loss *loss, double *q);

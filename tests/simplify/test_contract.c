@@ -3,6 +3,7 @@
 #include "simplify/collapse.h"
 #include "simplify/contract.h"
 #include "simplify/cost/loss.h"
+#include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
 
 static fct_env env;
@@ -195,9 +196,8 @@ static bool price_edge(fct_simplifier *s, uint32_t e, double *key, double *error
     fct_loss loss;
     if (!fct_place(s, a, b, false, &c)) return false;
     uint32_t count_a = fct_simplify_gather(s, a, s->ring_a), count_b = fct_simplify_gather(s, b, s->ring_b);
-    if (fct_simplify_folds_over(s, s->ring_a, count_a, b, point_position(s, a), c.at) ||
-        fct_simplify_folds_over(s, s->ring_b, count_b, a, point_position(s, b), c.at))
-        return false;
+    const fct_move move = {a, b, count_a, count_b, c.at};
+    if (!fct_simplify_remains_good(s, &move)) return false;
     double lost = fct_loss_measure(s, a, b, count_a, count_b, &c, &loss);
     *key = c.key + lost, *error2 = (c.error + lost) / c.area;
     return true;

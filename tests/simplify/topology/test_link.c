@@ -1,6 +1,7 @@
 /* The link condition and the fold-over test against their definitions. */
 #include "../oracle.h"
 #include "simplify/topology/link.h"
+#include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
 
 static fct_env env;
@@ -188,6 +189,7 @@ static void faces_may_turn_by_84_degrees(void **state) {
         if (other == p) continue;
         v3 from = point_position(s, p), at = v3_mad(from, .4, random_vector(&seed));
         uint32_t count = fct_simplify_gather(s, p, s->ring_a);
+        fct_simplify_begin_move(s);
         bool got = fct_simplify_folds_over(s, s->ring_a, count, other, from, at);
         assert_true(got == folds(s, p, other, at));
         ++*(got ? &yes : &no);
@@ -206,6 +208,7 @@ static void faces_may_turn_by_84_degrees(void **state) {
         double cosine = over ? .095 : .105;
         v3 from = point_position(s, s->point_of[2]), at = {from.x, -.5 + cosine, sqrt(1 - cosine * cosine)};
         uint32_t count = fct_simplify_gather(s, s->point_of[2], s->ring_a);
+        fct_simplify_begin_move(s);
         assert_true(fct_simplify_folds_over(s, s->ring_a, count, FCT_NONE, from, at) == over);
         fct_simplifier_destroy(s);
         fct_mesh_release(&env, &mesh);
