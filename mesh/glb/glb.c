@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "base/io/json.h"
+
 static uint32_t little_32(const unsigned char *p) {
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
@@ -13,6 +15,8 @@ static fct_result fail_glb(const fct_glb *glb, const char *what) {
 
 static fct_result parse_json(fct_glb *glb, const char *text, size_t size) {
     json_error_t error;
+    fct_result result = fct_json_check_memory(glb->source->env, glb->source->name, text, size);
+    if (result != FCT_OK) return result;
     glb->root = json_loadb(text, size, JSON_ALLOW_NUL, &error);
     if (glb->root) return json_is_object(glb->root) ? FCT_OK : fail_glb(glb, "its JSON is no object");
     if (json_error_code(&error) == json_error_out_of_memory)

@@ -118,5 +118,16 @@ says '1 material libraries cannot be read ("nowhere.mtl" first)'
 printf 'newmtl a\nKd .5 .5 .5\nKe 1 1 1\n' >nowhere.mtl
 expect 0 bake no-mtl.obj -o good.glb
 check "no output" test ! -e bad.glb
+# JSON that does not fit into the budget is refused before it is parsed.
+{ printf '{"models": {"a": "'; head -c 20000000 /dev/zero | tr '\0' x; printf '"}}'; } >long.json
+{ printf '{"models": ['; yes '[],' | head -n 300000; printf '[]]}'; } >wide.json
+for file in long wide; do
+    for command in info 'bake -o big.glb'; do
+        expect 75 $command $file.json --max-memory 60M
+        says "$file.json"
+    done
+    expect 65 info $file.json
+done
+rm -f long.json wide.json
 leftovers
 finish
