@@ -7,6 +7,8 @@
  * No box loses a hit: the box test allows for the rounding of its products, and instance boxes have slack for
  * the rounding of the transformed ray (transform.c). Equal t: the lower instance.
  */
+#include "scene/rays.h"
+
 #include <float.h>
 #include <math.h>
 
@@ -14,7 +16,8 @@
 #include "scene/transform.h"
 
 enum { STACK = FCT_SCENE_DEPTH * (FCT_SCENE_WIDTH - 1) + 1 };
-#define ROUNDING 4e-7f
+#define ROUNDING    4e-7f
+#define COINCIDENCE 1e-6f
 
 typedef struct slabs {
     float origin[3], inverse[3];
@@ -87,43 +90,81 @@ static inline int push_children_sorted(const fct_scene_node *node, const float e
     return top;
 }
 
-bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit,
-                           fct_visits *visits) {
-    slabs s;
-    fct_hit best = {.face = FCT_NONE};
-    float limit = ray->t_max;
+/* The state of a search for the closest hit. */
+typedef struct search {
+    fct_hit best;
+    uint32_t instance; /* of best, or FCT_NONE */
+    float limit;       /* t of best, or t_max */
+    float base; /* largest coordinate of the origin over that of the direction; negative: no lamps first */
+    bool lit;   /* best is a lamp's lit side */
+} search;
+
+/* Surfaces whose hits differ by less than this coincide: a hit's t has roundings of the size of the
+ * coordinates. */
+static inline float coincidence(const search *s) {
+    return s->base < 0 || s->instance == FCT_NONE ? 0 : COINCIDENCE * (s->limit + s->base);
+}
+
+static inline bool is_lit_side(const fct_scene_frame *frame, const fct_ray *local, const fct_hit *hit) {
+    if (!frame->emits || frame->two_sided) return frame->emits;
+    const float *d = local->direction, *n = hit->normal; /* the sign is that of the world */
+    return d[0] * n[0] + d[1] * n[1] + d[2] * n[2] < 0;
+}
+
+static inline void meet_instance(const fct_scene *scene, const fct_ray *ray, uint32_t i, search *s,
+                                 fct_visits *visits) {
+    const fct_scene_frame *frame = scene->frames + i;
+    const bool lamps_first = s->base >= 0, behind = lamps_first && frame->emits && !s->lit;
+    const float slack = coincidence(s), reach = behind ? s->limit + slack : s->limit;
+    fct_ray local = *ray;
+    fct_hit found;
+    local.t_max = reach;
+    if (!frame->identity) move_ray_to_model(frame, ray, reach, &local);
+    if (!fct_bvh_closest_hit(frame->bvh, &local, &found, visits) || found.t > reach) return;
+    const bool lit = lamps_first && is_lit_side(frame, &local, &found);
+    if (s->instance != FCT_NONE) {
+        if (lit == s->lit ? found.t > s->limit || (found.t == s->limit && i > s->instance)
+                          : !lit && found.t >= s->limit - slack)
+            return;
+    }
+    s->best = found, s->limit = found.t, s->instance = i, s->lit = lit;
+}
+
+static inline bool find_closest(const fct_scene *scene, const fct_ray *ray, bool lamps_first,
+                                fct_scene_hit *hit, fct_visits *visits) {
+    slabs box;
     pending stack[STACK];
     int top = 0;
+    search s = {.instance = FCT_NONE, .limit = ray->t_max, .base = -1};
     hit->instance = hit->face = FCT_NONE;
-    if (!prepare_slabs(ray, &s)) return false;
+    if (!prepare_slabs(ray, &box)) return false;
+    if (lamps_first) {
+        float o = 0, d = FLT_MIN;
+        for (int c = 0; c < 3; ++c) {
+            o = fabsf(ray->origin[c]) > o ? fabsf(ray->origin[c]) : o;
+            d = fabsf(ray->direction[c]) > d ? fabsf(ray->direction[c]) : d;
+        }
+        s.base = o / d;
+    }
     stack[top++] = (pending){ray->t_min, 0};
     while (top > 0) {
         pending next = stack[--top];
-        if (next.entry > limit) continue;
-        if (!(next.child & FCT_SCENE_LEAF)) {
-            float entry[FCT_SCENE_WIDTH];
-            meet_children(scene->nodes + next.child, &s, ray->t_min, limit, entry);
-            top = push_children_sorted(scene->nodes + next.child, entry, stack, top);
-            if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
+        const float reach = s.limit + coincidence(&s);
+        if (next.entry > reach) continue;
+        if (next.child & FCT_SCENE_LEAF) {
+            meet_instance(scene, ray, next.child & ~FCT_SCENE_LEAF, &s, visits);
             continue;
         }
-        uint32_t i = next.child & ~FCT_SCENE_LEAF;
-        const fct_scene_frame *frame = scene->frames + i;
-        fct_ray local = *ray;
-        fct_hit found;
-        local.t_max = limit;
-        if (!frame->identity) move_ray_to_model(frame, ray, limit, &local);
-        if (!fct_bvh_closest_hit(frame->bvh, &local, &found, visits)) continue;
-        if (hit->instance != FCT_NONE && (found.t > limit || (found.t == limit && i > hit->instance)))
-            continue;
-        best = found;
-        limit = found.t;
-        hit->instance = i;
+        float entry[FCT_SCENE_WIDTH];
+        meet_children(scene->nodes + next.child, &box, ray->t_min, reach, entry);
+        top = push_children_sorted(scene->nodes + next.child, entry, stack, top);
+        if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
     }
-    if (hit->instance == FCT_NONE) return false;
-    hit->t = best.t, hit->u = best.u, hit->v = best.v;
-    hit->face = best.face, hit->place = best.place;
-    v3 normal = v3_load(best.normal);
+    if (s.instance == FCT_NONE) return false;
+    hit->instance = s.instance;
+    hit->t = s.best.t, hit->u = s.best.u, hit->v = s.best.v;
+    hit->face = s.best.face, hit->place = s.best.place;
+    v3 normal = v3_load(s.best.normal);
     if (!scene->frames[hit->instance].identity) {
         /* Normalised first, so that the products of a tiny or huge normal stay in range. */
         const fct_instance *placed = scene->instances + hit->instance;
@@ -132,6 +173,15 @@ bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene
     }
     v3_store(hit->normal, v3_unit(normal));
     return true;
+}
+
+bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit,
+                           fct_visits *visits) {
+    return find_closest(scene, ray, false, hit, visits);
+}
+
+bool fct_scene_light_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit, fct_visits *visits) {
+    return find_closest(scene, ray, true, hit, visits);
 }
 
 bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits) {

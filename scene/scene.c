@@ -270,6 +270,9 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
         assert(materials[k] < scene->material_count);
         instance.model = first + k;
         instance.material = materials[k];
+        const fct_material *m = scene->materials + materials[k];
+        frame.emits = m->emission[0] > 0 || m->emission[1] > 0 || m->emission[2] > 0;
+        frame.two_sided = m->two_sided;
         scene->instances[scene->instance_count] = instance;
         scene->frames[scene->instance_count++] = frame;
     }

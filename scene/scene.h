@@ -16,6 +16,7 @@ typedef struct fct_scene_frame {
     double to_model[12];
     float linear[9]; /* of to_model */
     bool identity;
+    bool emits, two_sided; /* of the material */
     const fct_bvh *bvh;
     double shrink; /* world distance >= shrink * model distance */
 } fct_scene_frame;

@@ -13,6 +13,7 @@
 
 #include "base/parallel.h"
 #include "radiosity/sample.h"
+#include "scene/rays.h"
 #include "scene/transform.h"
 
 #include <float.h>
@@ -148,7 +149,7 @@ static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to
                        const fct_material **material, const emitter **source, double *kernel) {
     fct_ray ray = ray_from(from, direction, INFINITY);
     fct_scene_hit hit;
-    if (!fct_scene_closest_hit(t->scene, &ray, &hit, NULL)) return false;
+    if (!fct_scene_light_hit(t->scene, &ray, &hit, NULL)) return false;
     v3 c[3];
     world_triangle(t, hit.instance, hit.place, c);
     v3 n = v3_unit(v3_cross(v3_sub(c[1], c[0]), v3_sub(c[2], c[0])));

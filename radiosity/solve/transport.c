@@ -5,6 +5,7 @@
 
 #include "radiosity/solve/iterate.h"
 #include "radiosity/solve/oracle.h"
+#include "scene/rays.h"
 
 /* Points per leaf for direct light, shadow rays per point and lamp, and points that test for coincident
  * faces. The mean over many leaves is unbiased with any number; fewer points make single leaves noisier. */
@@ -31,7 +32,7 @@ fct_found fct_transport_look(const fct_elements *set, const float *stored, const
     memcpy(ray.origin, origin, sizeof ray.origin);
     memcpy(ray.direction, direction, sizeof ray.direction);
     fct_scene_hit hit;
-    if (!fct_scene_closest_hit(set->scene, &ray, &hit, NULL))
+    if (!fct_scene_light_hit(set->scene, &ray, &hit, NULL))
         return (fct_found){black, FCT_NONE, INFINITY, false};
     bool back =
         direction[0] * hit.normal[0] + direction[1] * hit.normal[1] + direction[2] * hit.normal[2] > 0;
@@ -103,7 +104,7 @@ static bool is_bare(const fct_elements *set, uint32_t instance, const fct_elemen
         ray.origin[c] = p->position[c] + p->offset * p->normal[c];
         ray.direction[c] = -p->offset * p->normal[c];
     }
-    if (!fct_scene_closest_hit(set->scene, &ray, &hit, NULL)) return true;
+    if (!fct_scene_light_hit(set->scene, &ray, &hit, NULL)) return true;
     return hit.instance == instance && hit.place == p->place;
 }
 
