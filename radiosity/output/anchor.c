@@ -88,18 +88,21 @@ static uint32_t find_middle_vertex(const grouping *g, const group *k) {
     return best;
 }
 
-/* True if a vertex of the group is farther from the anchor than the tolerance allows. */
+/* True if a vertex of the group is farther from the anchor than the tolerance allows, or turned too far to
+ * use it. */
 static bool group_is_too_wide(const grouping *g, const group *k, const fct_anchor *a, uint32_t middle) {
     const fct_surface *s = g->surface;
     v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)middle);
-    double worst = 0;
+    double worst = 0, least_cosine = 1;
     for (uint32_t m = k->begin; m < k->end; ++m) {
         const size_t w = g->vertices[m];
         double apart = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p)) / a->reach;
-        double turn = sqrt(fct_max(1 - v3_dot(n, v3_load(s->normals + 3 * w)), 0));
-        worst = fct_max(worst, apart + turn);
+        double cosine = v3_dot(n, v3_load(s->normals + 3 * w));
+        worst = fct_max(worst, apart + sqrt(fct_max(1 - cosine, 0)));
+        least_cosine = fct_min(cosine, least_cosine);
     }
-    return k->end - k->begin > 1 && worst > g->def->tolerance;
+    bool turned = 2 - 2 * least_cosine > .9 * FCT_MOST_TURN2; /* the search rounds normals to floats */
+    return k->end - k->begin > 1 && (turned || worst > g->def->tolerance);
 }
 
 /* Places the group's anchor on its middle vertex and gathers. Returns the number of rays. */

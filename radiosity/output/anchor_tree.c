@@ -4,9 +4,6 @@
 #include "base/math/vec.h"
 
 enum { STACK = 64 };
-/* |n - n'|^2 = 2 - 2 cos beyond which an anchor is not used: 37 degrees. The vertices of one group are nearer
- * (anchor.c), so each vertex finds at least its own anchor unless groups are coarse (--final direct). */
-#define MOST_TURN2 .4
 
 static int find_longest_axis(const fct_anchors *t, uint32_t begin, uint32_t end) {
     float lower[3], upper[3];
@@ -90,7 +87,7 @@ void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3
             double dp = (double)p[k] - a->position[k], dn = (double)n[k] - a->normal[k];
             d2 += dp * dp, turn2 += dn * dn;
         }
-        if (turn2 < MOST_TURN2) insert_anchor(found, mid, d2 + t->turn * t->turn * turn2);
+        if (turn2 < FCT_MOST_TURN2) insert_anchor(found, mid, d2 + t->turn * t->turn * turn2);
         double side = (double)p[t->axes[mid]] - a->position[t->axes[mid]];
         struct visit low = {r.begin, mid, r.least2}, high = {mid + 1, r.end, r.least2};
         if (side < 0)

@@ -27,6 +27,10 @@ typedef struct fct_anchors {
 /* Anchors that a blend uses. Fewer make the borders between anchors visible. */
 enum { FCT_NEAREST_ANCHORS = 10 };
 
+/* |n - n'|^2 = 2 - 2 cos beyond which an anchor is not used: 37 degrees. The vertices of one group are nearer
+ * (anchor.c), so each vertex finds at least its own anchor. */
+#define FCT_MOST_TURN2 .4
+
 /* Nearest anchors, nearest first. */
 typedef struct fct_nearest {
     uint32_t ids[FCT_NEAREST_ANCHORS];

@@ -105,6 +105,69 @@ static void expect_radiosity(fixture *f, fct_bake *b, uint32_t instance, double 
     if (rms > 2 * tolerance * expected) fail_msg("rms %g about %g", rms, expected);
 }
 
+/* A lamp exactly in the plane of a ceiling, before or behind it in the list of instances: irradiance of the
+ * point under the lamp's centre, and the whole power. For a rectangle of half sides a, b at height h the
+ * configuration factor of a parallel point under its centre is
+ * 4 / (2 pi) (A atan(B / C) / C + B atan(A / D) / D), A = a / h, B = b / h, C^2 = 1 + A^2, D^2 = 1 + B^2. */
+static void a_lamp_in_the_ceiling_shines(void **state) {
+    (void)state;
+    const double a = .5 / 2, c = sqrt(1 + a * a);
+    const double factor = 4 / (2 * 3.14159265358979323846) * 2 * a * atan(a / c) / c;
+    for (int method = 0; method < 2; ++method)
+        for (int order = 0; order < 4; ++order) {
+            fixture f;
+            begin(&f);
+            uint32_t dark = material(&f, 0, 0), lamp = material(&f, 0, 10);
+            const float floor[12] = {6, 0, 0, .1f, 0, 6, 0, .2f, 0, 0, 6, 0};
+            const float ceiling[12] = {6, 0, 0, .1f, 0, -6, 0, .2f, 0, 0, -6, 2};
+            /* The same plane by another transform, whose hits may round otherwise. */
+            const float turned[12] = {.6f, -.8f, 0, 0, -.8f, -.6f, 0, 0, 0, 0, -1, 2};
+            const float straight[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 2};
+            add_square(&f, "floor", 3, floor, dark);
+            if (order % 2) add_square(&f, "ceiling", 7, ceiling, dark);
+            add_square(&f, "lamp", 2, order / 2 ? turned : straight, lamp);
+            if (order % 2 == 0) add_square(&f, "ceiling", 7, ceiling, dark);
+            assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+            fct_bake_def def = fct_bake_def_default();
+            def.method = method ? FCT_BAKE_REFERENCE : FCT_BAKE_FACE, def.samples = 20000, def.max_edge = 3;
+            fct_bake *b;
+            assert_int_equal(fct_bake_create(&f.env, f.scene, &def, &b), FCT_OK);
+            const float point[3] = {0, 0, 0}, normal[3] = {0, 0, 1};
+            fct_probe probe;
+            assert_int_equal(fct_bake_probe(b, 1, point, normal, &probe), FCT_OK);
+            double found = probe.irradiance[1] / 10;
+            printf("    method %d, order %d: %.6g, expected %.6g\n", method, order, found, factor);
+            assert_true(fabs(found / factor - 1) < .003);
+            if (method == 0) {
+                fct_bake_stats s = fct_bake_get_stats(b);
+                assert_true(fabs(s.power_emitted - 30) < 1e-3);
+                assert_true(fabs(s.power_absorbed + s.power_escaped - 30) < .3);
+            }
+            end(&f, b);
+        }
+}
+
+/* Every vertex of a sphere in a furnace is lit, also where --final direct makes its widest groups. */
+static void direct_leaves_no_vertex_dark(void **state) {
+    (void)state;
+    fixture f;
+    begin(&f);
+    fct_mesh shell = make_sphere(&f.env, 12), ball = make_sphere(&f.env, 8);
+    turn_inside_out(&shell);
+    const float around[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0};
+    add(&f, "shell", &shell, around, material(&f, .5f, 1), NULL);
+    add(&f, "ball", &ball, identity, material(&f, .5f, 0), NULL);
+    fct_bake *b = bake(&f, FCT_FINAL_DIRECT);
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_instance(b, 1, &mesh), FCT_OK);
+    float least = INFINITY;
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) least = fminf(least, mesh.colors[3 * (size_t)v + 1]);
+    printf("    darkest vertex %g\n", (double)least);
+    assert_true(least > .5f); /* the closed furnace has 2 everywhere, so the ball 1 */
+    fct_mesh_release(&f.env, &mesh);
+    end(&f, b);
+}
+
 static void furnace_is_even(void **state) {
     (void)state;
     if (SANITIZED) skip();
@@ -368,6 +431,8 @@ static void lamp_near_a_wall_is_stable(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_lamp_in_the_ceiling_shines),
+        cmocka_unit_test(direct_leaves_no_vertex_dark),
         cmocka_unit_test(furnace_is_even),
         cmocka_unit_test(the_bare_solution_lights_elements_newer_than_its_links),
         cmocka_unit_test(furnace_of_a_scanned_head_is_even),
