@@ -167,6 +167,18 @@ static uint32_t choose_samples(const fct_bake *bake) {
     return bake->solution.def.samples ? bake->solution.def.samples : REFERENCE_SAMPLES;
 }
 
+/* Adds the power of a vertex: its area emits, absorbs (1 - rho) E, and sends b to the share `lost` of its
+ * directions. */
+static void count_power(fct_bake_stats *stats, const fct_material *m, double area, const float *irradiance,
+                        double lost) {
+    for (int c = 0; c < 3; ++c) {
+        double e = irradiance[c], b = m->emission[c] + m->reflectance[c] * e;
+        stats->power_emitted += area * m->emission[c];
+        stats->power_absorbed += area * (1 - m->reflectance[c]) * e;
+        stats->power_escaped += area * b * lost;
+    }
+}
+
 /* Vertex colours by path tracing, on the surface without splits at shadow borders. */
 static fct_result trace_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     fct_solution *s = &bake->solution;
@@ -175,14 +187,21 @@ static fct_result trace_instance(fct_bake *bake, uint32_t instance, fct_mesh *ou
     fct_surface f;
     fct_result result = fct_surface_build(s->env, s->scene, instance, s->max_edge, &f);
     if (result != FCT_OK) return result;
-    result = fct_reference_estimate(s->env, s->scene, f.mesh.vertex_count, f.sample_points, f.normals,
-                                    f.offsets, choose_samples(bake), fct_hash2(s->def.seed, instance),
-                                    s->def.indirect_only, f.mesh.colors, &bake->stats.output_rays);
-    for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i)
+    float *lost = fct_allocate(s->env, f.mesh.vertex_count, sizeof *lost);
+    if (lost)
+        result = fct_reference_estimate(s->env, s->scene, f.mesh.vertex_count, f.sample_points, f.normals,
+                                        f.offsets, choose_samples(bake), fct_hash2(s->def.seed, instance),
+                                        s->def.indirect_only, f.mesh.colors, lost, &bake->stats.output_rays);
+    else
+        result = fct_fail_memory(s->env, "a reference");
+    for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
+        if (!s->def.indirect_only) count_power(&bake->stats, m, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
         for (int c = 0; c < 3; ++c) {
             float *x = &f.mesh.colors[3 * i + (size_t)c];
             *x = (s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * *x;
         }
+    }
+    fct_release(s->env, lost);
     if (result == FCT_OK) {
         *out = f.mesh;
         f.mesh = (fct_mesh){0};
@@ -258,8 +277,9 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
         offsets[i] = site.offset;
         memcpy(sites + 3 * i, site.point, sizeof site.point);
     }
-    result = fct_reference_estimate(s->env, s->scene, count, sites, units, offsets, choose_samples(bake),
-                                    s->def.seed, s->def.indirect_only, irradiance, &bake->stats.output_rays);
+    result =
+        fct_reference_estimate(s->env, s->scene, count, sites, units, offsets, choose_samples(bake),
+                               s->def.seed, s->def.indirect_only, irradiance, NULL, &bake->stats.output_rays);
     for (size_t i = 0; result == FCT_OK && i < count; ++i)
         for (int c = 0; c < 3; ++c) {
             out[i].irradiance[c] = irradiance[3 * i + (size_t)c];

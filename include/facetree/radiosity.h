@@ -38,16 +38,17 @@ typedef struct fct_bake_def {
 FCT_API fct_bake_def fct_bake_def_default(void);
 
 typedef struct fct_bake_stats {
-    bool converged;                       /* the iteration reached its tolerance */
-    uint32_t passes;                      /* sweeps of all iterations */
-    uint64_t elements, links;             /* of the solution */
-    uint64_t rays, output_rays;           /* of the solution; of the output so far */
-    uint64_t vertices, faces;             /* of the output so far */
-    double seconds_open;                  /* refinement of links and elements */
-    double seconds_solve;                 /* iterations and gathers */
-    double seconds_push;                  /* output so far */
-    double seconds_total;                 /* all of fct_bake_create, and the output so far */
-    uint64_t touched_bytes;               /* pages of the hierarchies that were read, without rays */
+    bool converged;             /* the iteration reached its tolerance */
+    uint32_t passes;            /* sweeps of all iterations */
+    uint64_t elements, links;   /* of the solution */
+    uint64_t rays, output_rays; /* of the solution; of the output so far */
+    uint64_t vertices, faces;   /* of the output so far */
+    double seconds_open;        /* refinement of links and elements */
+    double seconds_solve;       /* iterations and gathers */
+    double seconds_push;        /* output so far */
+    double seconds_total;       /* all of fct_bake_create, and the output so far */
+    uint64_t touched_bytes;     /* pages of the hierarchies that were read, without rays */
+    /* The reference counts the power of the instances that it has written. */
     double power_emitted;                 /* area times emission, summed over RGB */
     double power_absorbed, power_escaped; /* their sum equals power_emitted up to the noise of the rays */
     double error_estimate;                /* noise of the stored solution: relative standard error (RMS over

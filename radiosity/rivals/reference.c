@@ -50,9 +50,9 @@ typedef struct tracer {
     uint32_t samples, blocks;
     uint64_t seed;
     bool indirect_only;
-    float *irradiance;
-    double *parts;  /* count x blocks x 3, or NULL where blocks is 1 */
-    uint64_t *rays; /* per chunk */
+    float *irradiance, *lost; /* lost may be NULL */
+    double *parts;            /* count x blocks x 4, as trace_paths sums, or NULL where blocks is 1 */
+    uint64_t *rays;           /* per chunk */
 } tracer;
 
 /* A point on a surface with the normal of the side that receives light. */
@@ -170,9 +170,10 @@ static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to
     return true;
 }
 
-/* Traces one path and adds its estimate of the irradiance. */
+/* Traces one path and adds its estimate of the irradiance to sum[0..2], and 1 to sum[3] if its first ray is
+ * lost. */
 static void trace_path(const tracer *t, const spot *start, const double first[4], fct_random *random,
-                       double sum[3], uint64_t *rays) {
+                       double sum[4], uint64_t *rays) {
     spot at = *start;
     double through[3] = {1, 1, 1};
     for (uint32_t bounce = 0; bounce < MAX_BOUNCES; ++bounce) {
@@ -186,7 +187,10 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
         double kernel, survival = 0;
         spot next;
         ++*rays;
-        if (!follow_ray(t, &at, direction, &next, &material, &source, &kernel)) return;
+        if (!follow_ray(t, &at, direction, &next, &material, &source, &kernel)) {
+            sum[3] += bounce == 0;
+            return;
+        }
         if (direct && source) {
             double weight = isfinite(kernel) ? kernel / (kernel + find_emitter_density(source)) : 1;
             for (int k = 0; k < 3; ++k) sum[k] += through[k] * source->emission[k] * weight;
@@ -205,12 +209,12 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
 }
 
 /* Sums the estimates of paths [begin, end) of point i. */
-static void trace_paths(const tracer *t, size_t i, uint32_t begin, uint32_t end, double sum[3],
+static void trace_paths(const tracer *t, size_t i, uint32_t begin, uint32_t end, double sum[4],
                         uint64_t *rays) {
     spot start = {v3_load(t->points + 3 * i), v3_unit(v3_load(t->normals + 3 * i)), 0};
     start.offset = t->offsets ? t->offsets[i] : choose_offset(start.p, 0);
     uint64_t seed = fct_hash2(t->seed, i), ways = fct_hash2(seed, 1), lights = fct_hash2(seed, 2);
-    sum[0] = sum[1] = sum[2] = 0;
+    sum[0] = sum[1] = sum[2] = sum[3] = 0;
     if (v3_norm2(start.n) == 0) return;
     for (uint32_t s = begin; s < end; ++s) {
         double first[4];
@@ -219,6 +223,11 @@ static void trace_paths(const tracer *t, size_t i, uint32_t begin, uint32_t end,
         fct_random random = {fct_hash3(seed, 3, s)};
         trace_path(t, &start, first, &random, sum, rays);
     }
+}
+
+static void store_sums(const tracer *t, size_t i, const double sum[4]) {
+    for (int k = 0; k < 3; ++k) t->irradiance[3 * i + (size_t)k] = (float)(sum[k] / t->samples);
+    if (t->lost) t->lost[i] = (float)(sum[3] / t->samples);
 }
 
 /* A work item is a point, or a block of a point's paths. */
@@ -230,14 +239,12 @@ static void trace_items(void *user, size_t begin, size_t end, size_t chunk, uint
         size_t i = item / t->blocks, block = item % t->blocks;
         uint32_t from = (uint32_t)((uint64_t)t->samples * block / t->blocks);
         uint32_t to = (uint32_t)((uint64_t)t->samples * (block + 1) / t->blocks);
-        double sum[3];
+        double sum[4];
         trace_paths(t, i, from, to, sum, &rays);
-        for (int k = 0; k < 3; ++k) {
-            if (t->parts)
-                t->parts[3 * item + k] = sum[k];
-            else
-                t->irradiance[3 * i + k] = (float)(sum[k] / t->samples);
-        }
+        if (t->parts)
+            memcpy(t->parts + 4 * item, sum, sizeof sum);
+        else
+            store_sums(t, i, sum);
     }
     t->rays[chunk] = rays;
 }
@@ -293,18 +300,18 @@ static fct_result list_emitters(tracer *t) {
 
 /* Adds the blocks of each point in order. */
 static void join_blocks(tracer *t, size_t count) {
-    for (size_t i = 0; i < count; ++i)
-        for (int k = 0; k < 3; ++k) {
-            double sum = 0;
-            for (size_t b = 0; b < t->blocks; ++b) sum += t->parts[3 * (i * t->blocks + b) + k];
-            t->irradiance[3 * i + k] = (float)(sum / t->samples);
-        }
+    for (size_t i = 0; i < count; ++i) {
+        double sum[4] = {0, 0, 0, 0};
+        for (size_t b = 0; b < t->blocks; ++b)
+            for (size_t k = 0; k < 4; ++k) sum[k] += t->parts[4 * (i * t->blocks + b) + k];
+        store_sums(t, i, sum);
+    }
 }
 
 fct_result fct_reference_estimate(const fct_env *env, const fct_scene *scene, size_t count,
                                   const float *points, const float *normals, const float *offsets,
                                   uint32_t samples, uint64_t seed, bool indirect_only, float *irradiance,
-                                  uint64_t *rays) {
+                                  float *lost, uint64_t *rays) {
     tracer t = {.env = env,
                 .scene = scene,
                 .view = fct_scene_get(scene),
@@ -315,9 +322,11 @@ fct_result fct_reference_estimate(const fct_env *env, const fct_scene *scene, si
                 .blocks = 1,
                 .seed = seed,
                 .indirect_only = indirect_only,
-                .irradiance = irradiance};
+                .irradiance = irradiance,
+                .lost = lost};
     if (count == 0 || samples == 0) {
         if (count) memset(irradiance, 0, count * 3 * sizeof *irradiance);
+        if (count && lost) memset(lost, 0, count * sizeof *lost);
         return FCT_OK;
     }
     if (count < FEW_POINTS) t.blocks = (uint32_t)fct_chunk_count(samples, BLOCK);
@@ -326,7 +335,7 @@ fct_result fct_reference_estimate(const fct_env *env, const fct_scene *scene, si
     fct_result result = list_emitters(&t);
     if (result != FCT_OK) goto done;
     t.rays = fct_allocate_zero(env, chunks, sizeof *t.rays);
-    if (t.blocks > 1) t.parts = fct_allocate(env, 3 * items, sizeof *t.parts);
+    if (t.blocks > 1) t.parts = fct_allocate(env, 4 * items, sizeof *t.parts);
     if (!t.rays || (t.blocks > 1 && !t.parts)) {
         result = fct_fail_memory(env, "a reference");
         goto done;

@@ -138,11 +138,11 @@ static void a_lamp_in_the_ceiling_shines(void **state) {
             double found = probe.irradiance[1] / 10;
             printf("    method %d, order %d: %.6g, expected %.6g\n", method, order, found, factor);
             assert_true(fabs(found / factor - 1) < .003);
-            if (method == 0) {
-                fct_bake_stats s = fct_bake_get_stats(b);
-                assert_true(fabs(s.power_emitted - 30) < 1e-3);
-                assert_true(fabs(s.power_absorbed + s.power_escaped - 30) < .3);
-            }
+            for (uint32_t i = 0; i < 3 && method; ++i) mean_radiosity(&f, b, i, 0, NULL);
+            fct_bake_stats s = fct_bake_get_stats(b);
+            assert_true(fabs(s.power_emitted - 30) < 1e-3);
+            assert_true(fabs(s.power_absorbed + s.power_escaped - 30) <
+                        (method ? 1.5 : .3)); /* coarse floor */
             end(&f, b);
         }
 }

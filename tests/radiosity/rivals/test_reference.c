@@ -15,7 +15,8 @@ static double irradiance(const fct_scene *scene, v3 p, v3 n, uint32_t samples, b
     float point[3], normal[3], e[3];
     v3_store(point, p), v3_store(normal, n);
     assert_int_equal(
-        fct_reference_estimate(&plain, scene, 1, point, normal, NULL, samples, 7, indirect, e, NULL), FCT_OK);
+        fct_reference_estimate(&plain, scene, 1, point, normal, NULL, samples, 7, indirect, e, NULL, NULL),
+        FCT_OK);
     return e[0];
 }
 
@@ -168,16 +169,17 @@ static void threads_and_seeds(void **state) {
         one.thread_count = 1, three.thread_count = 3;
         rays = more = 0;
         assert_int_equal(fct_reference_estimate(&one, scene, COUNT, points, normals, NULL, (uint32_t)samples,
-                                                1, false, a, &rays),
+                                                1, false, a, NULL, &rays),
                          FCT_OK);
         assert_int_equal(fct_reference_estimate(&three, scene, COUNT, points, normals, NULL,
-                                                (uint32_t)samples, 1, false, b, &more),
+                                                (uint32_t)samples, 1, false, b, NULL, &more),
                          FCT_OK);
         assert_memory_equal(a, b, sizeof a);
         assert_true(rays == more && rays >= (uint64_t)samples * COUNT);
     }
     assert_int_equal(
-        fct_reference_estimate(&plain, scene, COUNT, points, normals, NULL, 1200, 2, false, c, NULL), FCT_OK);
+        fct_reference_estimate(&plain, scene, COUNT, points, normals, NULL, 1200, 2, false, c, NULL, NULL),
+        FCT_OK);
     double mean[2] = {0, 0};
     for (int i = 0; i < COUNT; ++i) mean[0] += a[3 * i], mean[1] += c[3 * i];
     assert_memory_not_equal(a, c, sizeof a);
@@ -186,8 +188,9 @@ static void threads_and_seeds(void **state) {
     canceller stop = {2};
     fct_env env = plain;
     env.progress = cancel, env.progress_user = &stop;
-    assert_int_equal(fct_reference_estimate(&env, scene, COUNT, points, normals, NULL, 64, 1, false, a, NULL),
-                     FCT_ERROR_CANCELLED);
+    assert_int_equal(
+        fct_reference_estimate(&env, scene, COUNT, points, normals, NULL, 64, 1, false, a, NULL, NULL),
+        FCT_ERROR_CANCELLED);
     fct_scene_destroy(scene);
 }
 
@@ -200,7 +203,7 @@ static void memory_runs_out(void **state) {
     for (; result != FCT_OK; ++n) {
         recorder r = {.fail_at = n};
         fct_env env = recorder_env(&r);
-        result = fct_reference_estimate(&env, scene, 1, point, normal, NULL, 1024, 1, false, e, NULL);
+        result = fct_reference_estimate(&env, scene, 1, point, normal, NULL, 1024, 1, false, e, NULL, NULL);
         assert_true(result == FCT_OK || (result == FCT_ERROR_MEMORY && r.messages));
         assert_int_equal(r.alive, 0);
     }
