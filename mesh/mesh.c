@@ -242,3 +242,15 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
 fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh) {
     return fct_mesh_check(env, NULL, mesh);
 }
+
+void fct_mesh_turn_over(fct_mesh *mesh) {
+    for (size_t f = 0; f < mesh->face_count; ++f) {
+        uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
+        t[1] = t[2], t[2] = swap;
+        float *c = mesh->texcoords ? mesh->texcoords + 6 * f : NULL;
+        for (int k = 0; c && k < 2; ++k) {
+            float second = c[2 + k];
+            c[2 + k] = c[4 + k], c[4 + k] = second;
+        }
+    }
+}

@@ -11,6 +11,9 @@
 /* fct_mesh_validate whose messages begin with `name`. NULL: they begin with the element. */
 fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *mesh);
 
+/* Reverses the winding of every face. */
+void fct_mesh_turn_over(fct_mesh *mesh);
+
 /* A copy of text[0, length) with a final 0, or NULL without memory. */
 char *fct_copy_text(const fct_env *env, const char *text, size_t length);
 /* Releases `count` strings and the array. NULL is allowed. */

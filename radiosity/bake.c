@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "facetree/radiosity.h"
+#include "mesh/mesh.h"
 #include "radiosity/output/output.h"
 #include "radiosity/output/probe.h"
 #include "radiosity/rivals/reference.h"
@@ -179,8 +180,9 @@ static void count_power(fct_bake_stats *stats, const fct_material *m, double are
     }
 }
 
-/* Vertex colours by path tracing, on the surface without splits at shadow borders. */
-static fct_result trace_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
+/* Vertex colours of one side by path tracing, on the surface without splits at shadow borders. *power: the
+ * radiosity summed over area and channels. */
+static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_mesh *out, double *power) {
     fct_solution *s = &bake->solution;
     const fct_scene_view *view = &s->elements.view;
     const fct_material *m = &view->materials[view->instances[instance].material];
@@ -188,37 +190,57 @@ static fct_result trace_instance(fct_bake *bake, uint32_t instance, fct_mesh *ou
     fct_result result = fct_surface_build(s->env, s->scene, instance, s->max_edge, &f);
     if (result != FCT_OK) return result;
     float *lost = fct_allocate(s->env, f.mesh.vertex_count, sizeof *lost);
+    for (size_t i = 0; back && i < 3 * (size_t)f.mesh.vertex_count; ++i) f.normals[i] = -f.normals[i];
     if (lost)
         result = fct_reference_estimate(s->env, s->scene, f.mesh.vertex_count, f.sample_points, f.normals,
                                         f.offsets, choose_samples(bake), fct_hash2(s->def.seed, instance),
                                         s->def.indirect_only, f.mesh.colors, lost, &bake->stats.output_rays);
     else
         result = fct_fail_memory(s->env, "a reference");
+    *power = 0;
     for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
         if (!s->def.indirect_only) count_power(&bake->stats, m, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
         for (int c = 0; c < 3; ++c) {
             float *x = &f.mesh.colors[3 * i + (size_t)c];
             *x = (s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * *x;
+            *power += f.areas[i] * *x;
         }
     }
     fct_release(s->env, lost);
     if (result == FCT_OK) {
         *out = f.mesh;
         f.mesh = (fct_mesh){0};
+        if (back) fct_mesh_turn_over(out);
     }
     fct_surface_release(s->env, &f);
     return result;
 }
 
-fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
-    *out = (fct_mesh){0};
-    double start = fct_seconds();
-    fct_result result = bake->solution.def.method == FCT_BAKE_FACE
-                            ? fct_output_instance(&bake->solution, instance, out, &bake->stats.output_rays)
-                            : trace_instance(bake, instance, out);
-    bake->stats.seconds_push += fct_seconds() - start;
-    bake->stats.vertices += out->vertex_count;
-    bake->stats.faces += out->face_count;
+/* The sides of an instance by path tracing, the brighter one first. */
+static fct_result trace_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], uint32_t *count) {
+    const fct_scene_view *view = &bake->solution.elements.view;
+    double power[2] = {0, 0};
+    *count = view->materials[view->instances[instance].material].two_sided ? 2 : 1;
+    for (uint32_t k = 0; k < *count; ++k) {
+        fct_result result = trace_side(bake, instance, k == 1, &sides[k], &power[k]);
+        if (result != FCT_OK) return result;
+    }
+    if (*count == 1) return FCT_OK;
+    if (power[1] > power[0]) {
+        fct_mesh swap = sides[0];
+        sides[0] = sides[1], sides[1] = swap;
+    }
+    if (fct_min(power[0], power[1]) <= FCT_OUTPUT_DARK * fct_max(power[0], power[1])) *count = 1;
+    return FCT_OK;
+}
+
+static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], uint32_t *count) {
+    bool back[2];
+    if (bake->solution.def.method != FCT_BAKE_FACE) return trace_sides(bake, instance, sides, count);
+    *count = fct_output_sides(&bake->solution, instance, back);
+    fct_result result = FCT_OK;
+    for (uint32_t k = 0; k < *count && result == FCT_OK; ++k)
+        result = fct_output_side(&bake->solution, instance, back[k], &sides[k], &bake->stats.output_rays);
     return result;
 }
 
@@ -230,8 +252,45 @@ static void append_mesh(fct_mesh *whole, const fct_mesh *part) {
            3 * (size_t)part->vertex_count * sizeof(float));
     for (size_t i = 0; i < 3 * (size_t)part->face_count; ++i)
         whole->triangles[3 * (size_t)whole->face_count + i] = part->triangles[i] + whole->vertex_count;
+    if (whole->source_faces)
+        memcpy(whole->source_faces + whole->face_count, part->source_faces,
+               part->face_count * sizeof *part->source_faces);
     whole->vertex_count += part->vertex_count;
     whole->face_count += part->face_count;
+}
+
+/* Joins parts into one mesh. arrays: FCT_MESH_ bits. */
+static fct_result join_meshes(const fct_env *env, const fct_mesh *parts, uint32_t count, unsigned arrays,
+                              fct_mesh *out) {
+    uint64_t vertices = 0, faces = 0;
+    for (uint32_t i = 0; i < count; ++i) vertices += parts[i].vertex_count, faces += parts[i].face_count;
+    if (vertices >= INT32_MAX || faces >= INT32_MAX)
+        return fct_fail(env, FCT_ERROR_MEMORY, "the lit mesh has more than 2^31 vertices or faces");
+    fct_result result = fct_mesh_create(env, (uint32_t)vertices, (uint32_t)faces, arrays, out);
+    if (result != FCT_OK) return result;
+    out->vertex_count = out->face_count = 0;
+    for (uint32_t i = 0; i < count; ++i) append_mesh(out, &parts[i]);
+    return FCT_OK;
+}
+
+fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
+    const fct_env *env = bake->solution.env;
+    fct_mesh sides[2] = {{0}, {0}};
+    uint32_t count = 0;
+    *out = (fct_mesh){0};
+    double start = fct_seconds();
+    fct_result result = light_sides(bake, instance, sides, &count);
+    if (result == FCT_OK && count == 2) {
+        result = join_meshes(env, sides, 2, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, out);
+    } else if (result == FCT_OK) {
+        *out = sides[0];
+        sides[0] = (fct_mesh){0};
+    }
+    for (int k = 0; k < 2; ++k) fct_mesh_release(env, &sides[k]);
+    bake->stats.seconds_push += fct_seconds() - start;
+    bake->stats.vertices += out->vertex_count;
+    bake->stats.faces += out->face_count;
+    return result;
 }
 
 fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
@@ -241,20 +300,11 @@ fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
     fct_mesh *parts = fct_allocate_zero(env, count, sizeof *parts);
     if (!parts) return fct_fail_memory(env, "the lit mesh");
     fct_result result = FCT_OK;
-    uint64_t vertices = 0, faces = 0;
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         result = fct_bake_instance(bake, i, &parts[i]);
-        vertices += parts[i].vertex_count, faces += parts[i].face_count;
         if (face_counts) face_counts[i] = parts[i].face_count;
     }
-    if (result == FCT_OK && (vertices >= INT32_MAX || faces >= INT32_MAX))
-        result = fct_fail(env, FCT_ERROR_MEMORY, "the lit mesh has more than 2^31 vertices or faces");
-    if (result == FCT_OK)
-        result = fct_mesh_create(env, (uint32_t)vertices, (uint32_t)faces, FCT_MESH_COLORS, out);
-    if (result == FCT_OK) {
-        out->vertex_count = out->face_count = 0;
-        for (uint32_t i = 0; i < count; ++i) append_mesh(out, &parts[i]);
-    }
+    if (result == FCT_OK) result = join_meshes(env, parts, count, FCT_MESH_COLORS, out);
     for (uint32_t i = 0; i < count; ++i) fct_mesh_release(env, &parts[i]);
     fct_release(env, parts);
     return result;

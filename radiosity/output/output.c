@@ -9,6 +9,8 @@
  */
 #include "radiosity/output/output.h"
 
+#include "mesh/mesh.h"
+
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/blend.h"
 #include "radiosity/output/smooth.h"
@@ -146,23 +148,18 @@ static bool edge_crosses_border(void *user, uint32_t a, uint32_t b) {
            fct_output_crosses_border(m->colors + i, m->colors + j, l->s->mean_radiosity);
 }
 
-static void turn_faces_over(fct_mesh *mesh) {
-    for (size_t f = 0; f < mesh->face_count; ++f) {
-        uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
-        t[1] = t[2], t[2] = swap;
-    }
-}
-
-bool fct_output_back(const fct_solution *s, uint32_t instance) {
+uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]) {
     const fct_elements *set = &s->elements;
     const fct_scene_view *view = &set->view;
-    if (!view->materials[view->instances[instance].material].two_sided) return false;
+    back[0] = false, back[1] = true;
+    if (!view->materials[view->instances[instance].material].two_sided) return 1;
     double power[2] = {0, 0};
     uint32_t root = set->roots[instance], n = set->root_counts[instance];
     for (uint32_t i = 0; i < 2 * n; ++i)
         for (int c = 0; c < 3; ++c)
             power[i >= n] += set->items[root + i].area * set->items[root + i].radiosity[c];
-    return power[1] > power[0] * (1 + 1e-6); /* equal but for rounding: the front */
+    if (power[1] > power[0] * (1 + 1e-6)) back[0] = true, back[1] = false; /* equal but for rounding: front */
+    return power[back[1]] > FCT_OUTPUT_DARK * power[back[0]] ? 2 : 1;
 }
 
 static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
@@ -177,15 +174,15 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     return fct_anchors_create(s->env, &s->elements, s->transport.stored, l->surface, &def, anchors);
 }
 
-fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mesh *out, uint64_t *rays) {
+fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
+                           uint64_t *rays) {
     const fct_env *env = s->env;
     bool gathers = s->def.final != FCT_FINAL_NONE;
     fct_surface surface = {0};
     fct_anchors anchors = {0};
     fct_result result = fct_surface_build(env, s->scene, instance, s->max_edge, &surface);
     if (result != FCT_OK) return result;
-    lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance};
-    l.back = fct_output_back(s, instance);
+    lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
     if (gathers) result = make_anchors(&l, &anchors);
     *rays += anchors.rays;
     for (int round = 0; result == FCT_OK; ++round) {
@@ -198,7 +195,7 @@ fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mes
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};
-        if (l.back) turn_faces_over(out);
+        if (back) fct_mesh_turn_over(out);
     }
     fct_anchors_release(env, &anchors);
     fct_surface_release(env, &surface);

@@ -4,12 +4,17 @@
 
 #include "radiosity/output/solution.h"
 
-/* The lit mesh of an instance in world space, of the side that fct_output_back chooses. *rays grows by the
- * rays traced. Errors: MEMORY, CANCELLED. */
-fct_result fct_output_instance(const fct_solution *s, uint32_t instance, fct_mesh *out, uint64_t *rays);
+/* The lit mesh of one side of an instance in world space, wound so that this side is in front. *rays grows by
+ * the rays traced. Errors: MEMORY, CANCELLED. */
+fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
+                           uint64_t *rays);
 
-/* True if the output shows the back of a two-sided instance, because it has more radiosity than the front. */
-bool fct_output_back(const fct_solution *s, uint32_t instance);
+/* Share of the power of an instance's brighter side below which the other side counts as dark. */
+#define FCT_OUTPUT_DARK 1e-4
+
+/* The sides of an instance that the output shows, the brighter one first; returns their number. A one-sided
+ * instance has its front, a two-sided one also its other side unless that is dark. */
+uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]);
 
 /* Factor on the rays of a vertex: sqrt(200,000 / faces of the scene), in [1, 4]. A small scene has few
  * vertices, so more rays per vertex cost little time. */

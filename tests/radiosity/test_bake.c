@@ -168,6 +168,45 @@ static void direct_leaves_no_vertex_dark(void **state) {
     end(&f, b);
 }
 
+/* A two-sided sheet close between two lamps: each side sees its lamp alone, so that its radiosity is rho
+ * times the lamp's emission. */
+static void both_sides_are_kept(void **state) {
+    (void)state;
+    for (int method = 0; method < 2; ++method) {
+        fixture f;
+        begin(&f);
+        fct_material both = {.name = "both", .reflectance = {.5f, .5f, .5f}, .two_sided = true};
+        uint32_t id;
+        assert_int_equal(fct_scene_add_material(f.scene, &both, &id), FCT_OK);
+        const float up[12] = {60, 0, 0, 0, 0, 60, 0, 0, 0, 0, 60, -.1f};
+        const float down[12] = {60, 0, 0, 0, 0, -60, 0, 0, 0, 0, -60, .1f};
+        add_square(&f, "sheet", 3, identity, id);
+        add_square(&f, "below", 1, up, material(&f, 0, 3));
+        add_square(&f, "above", 1, down, material(&f, 0, 1));
+        assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+        fct_bake_def def = fct_bake_def_default();
+        def.method = method ? FCT_BAKE_REFERENCE : FCT_BAKE_FACE, def.samples = 200, def.max_edge = .5;
+        fct_bake *b;
+        fct_mesh mesh;
+        assert_int_equal(fct_bake_create(&f.env, f.scene, &def, &b), FCT_OK);
+        assert_int_equal(fct_bake_instance(b, 0, &mesh), FCT_OK);
+        assert_true(mesh.face_count >= 36 && mesh.face_count % 2 == 0 && mesh.source_faces);
+        for (uint32_t i = 0; i < mesh.face_count; ++i) {
+            const uint32_t *t = mesh.triangles + 3 * (size_t)i;
+            v3 p[3];
+            for (int k = 0; k < 3; ++k) p[k] = v3_load(mesh.positions + 3 * (size_t)t[k]);
+            bool lower = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])).z < 0;
+            assert_int_equal(lower, i < mesh.face_count / 2); /* the brighter side comes first */
+            assert_in_range(mesh.source_faces[i], 0, 17);
+            double expected = lower ? 1.5 : .5;
+            for (int k = 0; k < 3; ++k)
+                assert_true(fabs((double)mesh.colors[3 * (size_t)t[k] + 1] / expected - 1) < .02);
+        }
+        fct_mesh_release(&f.env, &mesh);
+        end(&f, b);
+    }
+}
+
 static void furnace_is_even(void **state) {
     (void)state;
     if (SANITIZED) skip();
@@ -433,6 +472,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_lamp_in_the_ceiling_shines),
         cmocka_unit_test(direct_leaves_no_vertex_dark),
+        cmocka_unit_test(both_sides_are_kept),
         cmocka_unit_test(furnace_is_even),
         cmocka_unit_test(the_bare_solution_lights_elements_newer_than_its_links),
         cmocka_unit_test(furnace_of_a_scanned_head_is_even),

@@ -90,6 +90,28 @@ static void samples_on_a_shared_side_belong_to_one_face(void **state) {
     assert_true(mixed > 1000);
 }
 
+/* A face and its reverse in one place: the one that shows its front is seen, whichever comes first. */
+static void a_front_covers_its_own_back(void **state) {
+    (void)state;
+    raster_camera camera = make_camera();
+    static float image[4 * PIXELS];
+    uint64_t seed = 5;
+    int seen = 0;
+    for (int round = 0; round < 100; ++round) {
+        float p[18];
+        random_triangle(&seed, p);
+        memcpy(p + 9, p, 9 * sizeof *p);
+        uint32_t t[6] = {0, 1, 2, 3, 5, 4};
+        draw(&camera, p, 6, t, 2, shade_face, NULL, image);
+        for (int i = 0; i < PIXELS; ++i) {
+            if (image[4 * i + 3] < .99F) continue;
+            assert_true(image[4 * i + 1] == 0);
+            ++seen;
+        }
+    }
+    assert_true(seen > 1000);
+}
+
 static double cross2(const double a[2], const double b[2], const double c[2]) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
 }
@@ -370,6 +392,7 @@ int main(void) {
     tool_env_open(&test_tool);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_on_a_shared_side_belong_to_one_face),
+        cmocka_unit_test(a_front_covers_its_own_back),
         cmocka_unit_test(coverage_is_the_area_of_the_triangle),
         cmocka_unit_test(the_nearest_face_wins_as_a_ray_finds_it),
         cmocka_unit_test(weights_are_right_in_perspective),

@@ -234,11 +234,17 @@ typedef struct edges {
     float low, high; /* of 1/z at the corners */
 } edges;
 
+/* Factor on 1/z of faces that show their back. Where the two sides of a surface are separate faces in one
+ * place, the front covers the back. */
+#define BACK_DEPTH (1 - 4e-6f)
+
 static edges make_edges(const raster *r, const piece *p) {
     corner v[3] = {r->corners[p->corner[0]], r->corners[p->corner[1]], r->corners[p->corner[2]]};
     if (find_twice_area(v[0], v[1], v[2]) < 0) {
         corner swap = v[1];
         v[1] = v[2], v[2] = swap;
+    } else {
+        for (int i = 0; i < 3; ++i) v[i].depth *= BACK_DEPTH;
     }
     edges e = {.origin = v[0], .z0 = v[0].depth};
     double area = (double)find_twice_area(v[0], v[1], v[2]);

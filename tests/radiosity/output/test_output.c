@@ -133,7 +133,7 @@ static void radiosity_is_emission_plus_reflection(void **state) {
     fct_scene_destroy(scene);
 }
 
-static void the_brighter_side_is_shown(void **state) {
+static void lit_sides_are_shown(void **state) {
     (void)state;
     fct_scene *scene = begin();
     place_sheet(&plain, scene, place_material(scene, .5, 0, true), 2, v3_make(0, 0, 0), v3_make(1, 0, 0),
@@ -145,13 +145,23 @@ static void the_brighter_side_is_shown(void **state) {
     assert_int_equal(fct_elements_create(&plain, scene, 1, &s.elements), FCT_OK);
     fct_element *front = &s.elements.items[s.elements.roots[0]];
     assert_true(front[1].back && !front[0].back);
-    assert_false(fct_output_back(&s, 0));
+    bool back[2];
+    assert_int_equal(fct_output_sides(&s, 0, back), 1); /* both are dark */
+    assert_false(back[0]);
     front[1].radiosity[2] = .1;
-    assert_true(fct_output_back(&s, 0));
+    assert_int_equal(fct_output_sides(&s, 0, back), 1);
+    assert_true(back[0]);
     front[0].radiosity[0] = .2;
-    assert_false(fct_output_back(&s, 0));
+    assert_int_equal(fct_output_sides(&s, 0, back), 2);
+    assert_true(!back[0] && back[1]);
+    front[1].radiosity[2] = 1.9e-5;
+    assert_int_equal(fct_output_sides(&s, 0, back), 1);
+    front[1].radiosity[2] = .3;
+    assert_int_equal(fct_output_sides(&s, 0, back), 2);
+    assert_true(back[0] && !back[1]);
     s.elements.items[s.elements.roots[1]].radiosity[0] = 1;
-    assert_false(fct_output_back(&s, 1));
+    assert_int_equal(fct_output_sides(&s, 1, back), 1); /* one-sided */
+    assert_false(back[0]);
     fct_elements_release(&s.elements);
     fct_scene_destroy(scene);
 }
@@ -201,7 +211,7 @@ int main(void) {
         cmocka_unit_test(borders_are_relative_and_absolute),
         cmocka_unit_test(small_scenes_get_more_rays),
         cmocka_unit_test(radiosity_is_emission_plus_reflection),
-        cmocka_unit_test(the_brighter_side_is_shown),
+        cmocka_unit_test(lit_sides_are_shown),
         cmocka_unit_test(probes_find_their_surface),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
