@@ -244,6 +244,15 @@ static fct_result set_instance_transform(const fct_env *env, const char *name, c
     return FCT_OK;
 }
 
+static bool emits_light(const fct_material *m) {
+    return m->emission[0] > 0 || m->emission[1] > 0 || m->emission[2] > 0;
+}
+
+void fct_scene_make_two_sided(fct_scene *scene) {
+    for (uint32_t m = 0; m < scene->material_count; ++m)
+        if (!emits_light(&scene->materials[m])) scene->materials[m].two_sided = true;
+}
+
 fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, uint32_t count,
                            const uint32_t *materials, const float transform[12]) {
     assert(!scene->committed);
@@ -271,7 +280,7 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
         instance.model = first + k;
         instance.material = materials[k];
         const fct_material *m = scene->materials + materials[k];
-        frame.emits = m->emission[0] > 0 || m->emission[1] > 0 || m->emission[2] > 0;
+        frame.emits = emits_light(m);
         frame.two_sided = m->two_sided;
         scene->instances[scene->instance_count] = instance;
         scene->frames[scene->instance_count++] = frame;

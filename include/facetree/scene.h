@@ -106,6 +106,10 @@ FCT_API void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera);
  * CANCELLED, INTERNAL. */
 FCT_API fct_result fct_scene_commit(fct_scene *scene);
 
+/* Makes every material that emits no light reflect on both sides. Allowed before and after
+ * fct_scene_commit, but not while a bake of the scene exists. */
+FCT_API void fct_scene_make_two_sided(fct_scene *scene);
+
 /* Reads a scene file and commits it: scene.json (docs/scene.md), OBJ with MTL, glTF 2.0 (.gltf, .glb), or any
  * mesh or hierarchy file (one grey object without light). Paths are relative to the scene file. If mesh.fct
  * beside mesh.ply records the hash of mesh.ply, it is opened and nothing is clustered. Messages about text

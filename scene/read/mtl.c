@@ -62,7 +62,6 @@ static fct_result add_material(fct_mtl *mtl, const char *name, fct_material *mat
 
 fct_result fct_mtl_add_grey(fct_mtl *mtl, const char *name, uint32_t *id) {
     fct_material grey = standard;
-    grey.two_sided = true;
     return add_material(mtl, name, &grey, id);
 }
 
@@ -164,8 +163,6 @@ static fct_result end_material(fct_mtl *mtl, reading *m) {
     count_material(&mtl->dark, m->dark, m->name);
     count_material(&mtl->textured, m->textured, m->name);
     count_material(&mtl->transparent, m->transparent, m->name);
-    const float *e = m->material.emission;
-    m->material.two_sided = !(e[0] > 0 || e[1] > 0 || e[2] > 0);
     return add_material(mtl, m->name, &m->material, &id);
 }
 

@@ -21,6 +21,7 @@ typedef struct bake_options {
     const char *probes;
     double exposure;
     const char *also;
+    bool two_sided;
 } bake_options;
 
 enum {
@@ -33,7 +34,8 @@ enum {
     KEY_PROBE,
     KEY_EXPOSURE,
     KEY_MAX_EDGE,
-    KEY_ALSO
+    KEY_ALSO,
+    KEY_TWO_SIDED
 };
 
 static const struct argp_option bake_options_table[] = {
@@ -61,6 +63,8 @@ static const struct argp_option bake_options_table[] = {
      "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
      "scene)",
      0},
+    {"two-sided", KEY_TWO_SIDED, NULL, 0,
+     "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
     {"also", KEY_ALSO, "FILE", 0, "Also write the mesh to a second file, in the format of its name", 0},
     {0}};
 
@@ -97,6 +101,9 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         return tool_parse_real(state, "--exposure", text, 0, 1e12, &o->exposure);
     case KEY_ALSO:
         o->also = text;
+        return 0;
+    case KEY_TWO_SIDED:
+        o->two_sided = true;
         return 0;
     case KEY_MAX_EDGE:
         return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
@@ -201,6 +208,7 @@ static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
     bake_answers answers = {0};
     double start = tool_seconds();
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], o->backend, &scene));
+    if (code == TOOL_DONE && o->two_sided) fct_scene_make_two_sided(scene);
     if (code == TOOL_DONE && o->also) code = tool_refuse_input(t, o->also);
     if (code == TOOL_DONE) code = solve_scene(t, o, set, scene, tool_seconds() - start, &answers);
     json_decref(answers.probes);
@@ -234,6 +242,10 @@ int tool_bake(int argc, char **argv) {
             "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
             "triangles are divided, so "
             "that they can carry shadows. The exit code is 1 if the solution has not converged.\n\n"
+            "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
+            "surface "
+            "that is lit on both sides is written twice: its brighter side, then the other one, each with "
+            "its own vertices and wound so that it is in front.\n\n"
             "A probe belongs to a surface that lies at its point and faces its normal. In free space it "
             "has irradiance "
             "and no radiosity.\n\n"
