@@ -5,6 +5,7 @@
 #define FCT_MESH_COLOR_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/math/elementary.h"
@@ -19,6 +20,25 @@ static inline double fct_srgb_from_linear(double x) {
     if (x <= .0031308) return 12.92 * x;
     double power = sqrt(sqrt(fct_root(x * x * x * (x * x), 3))); /* x^(1/2.4) = x^(5/12) */
     return 1.055 * power - .055;
+}
+
+/* The range of the components of a file's float colours. Begin with zero. */
+typedef struct fct_color_range {
+    float lowest, highest;
+    bool fraction; /* a component is no whole number */
+} fct_color_range;
+
+static inline void fct_color_range_add(fct_color_range *range, float component) {
+    if (component < range->lowest) range->lowest = component;
+    if (component > range->highest) range->highest = component;
+    range->fraction = range->fraction || component != floorf(component);
+}
+
+/* Whether the components are sRGB from 0 to 255: all lie in that range, and one is over 1. A fraction below 2
+ * is a bright float. */
+static inline bool fct_color_range_is_bytes(const fct_color_range *range) {
+    bool over = range->highest > 1 && (!range->fraction || range->highest >= 2);
+    return over && range->highest <= 255 && range->lowest >= 0;
 }
 
 /* The nearest sRGB byte of a linear value, which is clamped to [0, 1]. */

@@ -1,6 +1,7 @@
 /* mesh/load.c: selects the reader by the ending of the file name. */
 #include "mesh/load.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -16,11 +17,16 @@
 typedef struct format {
     const char *ending;
     fct_result (*read)(const fct_source *source, fct_soup *out);
+    unsigned layouts;
 } format;
 
 static const format *find_format(const char *ending) {
-    static const format formats[] = {{"ply", fct_read_ply}, {"obj", fct_read_obj}, {"off", fct_read_off},
-                                     {"stl", fct_read_stl}, {"glb", fct_read_glb}, {"om", fct_read_om}};
+    static const format formats[] = {{"ply", fct_read_ply, FCT_PLY_LAYOUTS},
+                                     {"obj", fct_read_obj, 1},
+                                     {"off", fct_read_off, FCT_OFF_LAYOUTS},
+                                     {"stl", fct_read_stl, 1},
+                                     {"glb", fct_read_glb, 1},
+                                     {"om", fct_read_om, 1}};
     for (size_t i = 0; i < sizeof formats / sizeof *formats; ++i)
         if (!strcasecmp(formats[i].ending, ending)) return formats + i;
     return NULL;
@@ -31,6 +37,59 @@ static fct_result fail_format(const fct_env *env, const char *name) {
                     "%s: unknown kind of file; .obj, .ply, .off, .stl, .om and .glb are known", name);
 }
 
+/* Messages of one attempt to read a file, kept until it is known which attempt counts. Beyond MOST, the last
+ * message replaces the one before it, because an error comes last. */
+enum { MOST = 12 };
+typedef struct held {
+    int count;
+    fct_severity severity[MOST];
+    char text[MOST][1024];
+} held;
+
+static void hold_message(void *user, fct_severity severity, const char *text) {
+    held *h = user;
+    if (h->count < MOST) ++h->count;
+    h->severity[h->count - 1] = severity;
+    snprintf(h->text[h->count - 1], sizeof h->text[0], "%s", text);
+}
+
+static void send_held(const fct_env *env, const held *h) {
+    for (int i = 0; i < h->count; ++i) fct_note(env, h->severity[i], "%s", h->text[i]);
+}
+
+/* One attempt with the layout and the origin in *soup. The rest of the soup is replaced. */
+static fct_result attempt_read(const format *f, const fct_source *source, fct_soup *soup, held *h) {
+    fct_env env = *source->env;
+    env.message = hold_message, env.message_user = h;
+    fct_source quiet = *source;
+    quiet.env = &env;
+    fct_soup empty = {.layout = soup->layout};
+    memcpy(empty.origin, soup->origin, sizeof empty.origin);
+    fct_soup_release(source->env, soup);
+    *soup = empty;
+    h->count = 0;
+    return f->read(&quiet, soup);
+}
+
+/* Tries the layouts of the format in their order until one fits. If none fits, the messages are those of the
+ * first. Coordinates that need a local origin are then read again, relative to it. */
+static fct_result read_soup(const format *f, const fct_source *source, fct_soup *soup, held *first,
+                            held *next) {
+    fct_result result = attempt_read(f, source, soup, first);
+    const held *sent = first;
+    while (result == FCT_ERROR_DATA && soup->layout + 1 < f->layouts) {
+        ++soup->layout;
+        result = attempt_read(f, source, soup, next);
+        sent = result == FCT_ERROR_DATA ? first : next;
+    }
+    if (result == FCT_OK && fct_extent_origin(&soup->extent, soup->origin)) {
+        result = attempt_read(f, source, soup, next);
+        sent = next;
+    }
+    send_held(source->env, sent);
+    return result;
+}
+
 fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
                           const char *ending, fct_mesh *out) {
     *out = (fct_mesh){0};
@@ -39,9 +98,12 @@ fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data
     if (!size) return fct_fail(env, FCT_ERROR_DATA, "%s: the file is empty", name);
     fct_result result = fct_progress(env, "read", 0);
     if (result != FCT_OK) return result;
+    held *messages = fct_allocate(env, 2, sizeof *messages);
+    if (!messages) return fct_fail_memory(env, "messages");
     fct_source source = {env, name, data, size};
     fct_soup soup = {0};
-    result = f->read(&source, &soup);
+    result = read_soup(f, &source, &soup, messages, messages + 1);
+    fct_release(env, messages);
     if (result == FCT_OK) result = fct_progress(env, "read", 1);
     if (result == FCT_OK) return fct_soup_mesh(env, name, &soup, out);
     fct_soup_release(env, &soup);

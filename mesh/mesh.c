@@ -88,6 +88,7 @@ fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out
     fct_result result = fct_mesh_create(env, mesh->vertex_count, mesh->face_count, arrays_of(mesh), out);
     if (result != FCT_OK) return result;
     size_t vertices = mesh->vertex_count, faces = mesh->face_count;
+    memcpy(out->origin, mesh->origin, sizeof out->origin);
     copy(out->positions, mesh->positions, vertices, 3 * sizeof(float));
     copy(out->colors, mesh->colors, vertices, 3 * sizeof(float));
     copy(out->normals, mesh->normals, vertices, 3 * sizeof(float));
@@ -149,6 +150,7 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
     if (result == FCT_OK && vertex_ids && !(ids = fct_allocate(env, used, sizeof(uint32_t))))
         result = fct_fail_memory(env, "vertex ids");
     if (result == FCT_OK) {
+        memcpy(out->origin, mesh->origin, sizeof out->origin);
         extract_vertices(mesh, numbers, out, ids);
         extract_faces(mesh, numbers, faces, count, out);
         result = copy_names(env, mesh, out);
@@ -163,9 +165,9 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
     return result;
 }
 
-/* The first of `count` floats that is not finite, or count. Compares bits as integers per block, because
- * compilers vectorise that, and searches only a block with such a float. */
-static size_t first_not_finite(const float *values, size_t count) {
+/* Compares bits as integers per block, because compilers vectorise that, and searches only a block with such
+ * a float. */
+size_t fct_first_not_finite(const float *values, size_t count) {
     for (size_t begin = 0; begin < count; begin += 4096) {
         size_t end = begin + 4096 < count ? begin + 4096 : count;
         uint32_t largest = 0;
@@ -195,7 +197,7 @@ static size_t first_at_least(const uint32_t *values, size_t count, uint32_t limi
 static fct_result check_floats(const fct_env *env, const char *prefix, const char *element, const char *what,
                                const float *values, size_t count, unsigned width) {
     if (!values) return FCT_OK;
-    size_t bad = first_not_finite(values, count * width);
+    size_t bad = fct_first_not_finite(values, count * width);
     if (bad == count * width) return FCT_OK;
     return fct_fail(env, FCT_ERROR_DATA, "%s%s %zu: its %s is not finite (%g)", prefix, element, bad / width,
                     what, (double)values[bad]);
@@ -222,6 +224,8 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
     if (vertices > FCT_MESH_LIMIT || faces > FCT_MESH_LIMIT)
         return fct_fail(env, FCT_ERROR_DATA, "%s%zu vertices and %zu faces: at most %llu of each are allowed",
                         prefix, vertices, faces, (unsigned long long)FCT_MESH_LIMIT);
+    if (!isfinite(mesh->origin[0]) || !isfinite(mesh->origin[1]) || !isfinite(mesh->origin[2]))
+        return fct_fail(env, FCT_ERROR_DATA, "%sthe origin is not finite", prefix);
     fct_result result = check_ids(env, prefix, mesh);
     const struct {
         const char *element, *what;

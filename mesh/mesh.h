@@ -13,6 +13,12 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
 
 /* Reverses the winding of every face. */
 void fct_mesh_turn_over(fct_mesh *mesh);
+static inline bool fct_mesh_has_origin(const fct_mesh *mesh) {
+    return mesh->origin[0] != 0 || mesh->origin[1] != 0 || mesh->origin[2] != 0;
+}
+
+/* The index of the first value that is not finite, or count. */
+size_t fct_first_not_finite(const float *values, size_t count);
 
 /* A copy of text[0, length) with a final 0, or NULL without memory. */
 char *fct_copy_text(const fct_env *env, const char *text, size_t length);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/env.h"
+#include "mesh/mesh.h"
 
 void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
     const fct_mesh *m = sink->mesh;
@@ -20,4 +21,13 @@ void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         if ((arrays & all[i].flag) && all[i].there) strcat(strcat(text, *text ? ", " : ""), all[i].name);
     if (*text) fct_note(sink->env, FCT_MESSAGE_NOTE, "%s: this format has no place for %s", sink->name, text);
+}
+
+void fct_warn_of_origin(const fct_sink *sink) {
+    const double *o = sink->mesh->origin;
+    if (fct_mesh_has_origin(sink->mesh))
+        fct_note(sink->env, FCT_MESSAGE_WARNING,
+                 "%s: this format stores coordinates as floats, which lose digits this far from 0 "
+                 "(about %g %g %g)",
+                 sink->name, o[0], o[1], o[2]);
 }

@@ -24,6 +24,9 @@ typedef struct fct_sink {
 /* Sends one note that names the arrays of the mesh which the format cannot store. arrays: FCT_MESH_ bits. */
 void fct_note_left_out(const fct_sink *sink, unsigned arrays);
 
+/* Warns that the format stores positions as floats, if the mesh has an origin. */
+void fct_warn_of_origin(const fct_sink *sink);
+
 #ifdef __cplusplus
 }
 #endif

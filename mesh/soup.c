@@ -18,6 +18,32 @@ void fct_soup_release(const fct_env *env, fct_soup *soup) {
     *soup = (fct_soup){0};
 }
 
+static size_t count_triangles(const fct_soup *soup) {
+    if (!soup->starts) return soup->polygon_count;
+    size_t count = 0;
+    for (uint32_t i = 0; i < soup->polygon_count; ++i) {
+        uint32_t corners = soup->starts[i + 1] - soup->starts[i];
+        count += corners > 2 ? corners - 2 : 0;
+    }
+    return count;
+}
+
+/* Sends one warning for polygons of fewer than three corners. */
+static void warn_of_small_polygons(const fct_env *env, const char *name, const fct_soup *soup) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; soup->starts && i < soup->polygon_count; ++i)
+        count += soup->starts[i + 1] - soup->starts[i] < 3;
+    if (count)
+        fct_note(env, FCT_MESSAGE_WARNING, "%s: %u face%s with fewer than three corners %s left out", name,
+                 count, count == 1 ? "" : "s", count == 1 ? "is" : "are");
+}
+
+static bool is_polygon_list(const fct_soup *soup) {
+    for (uint32_t i = 0; soup->starts && i < soup->polygon_count; ++i)
+        if (soup->starts[i + 1] - soup->starts[i] != 3) return true;
+    return false;
+}
+
 static fct_result check_soup(const fct_env *env, const char *name, const fct_soup *soup) {
     uint32_t largest = 0;
     for (size_t i = 0; i < soup->corner_count; ++i)
@@ -31,15 +57,36 @@ static fct_result check_soup(const fct_env *env, const char *name, const fct_sou
         return fct_fail(env, FCT_ERROR_DATA, "%s: face %zu: vertex index %d is out of range, of %u vertices",
                         name, face, (int)soup->corners[i], soup->vertex_count);
     }
-    size_t faces = soup->starts ? soup->corner_count - 2 * (size_t)soup->polygon_count : soup->polygon_count;
-    if (faces > FCT_MESH_LIMIT || soup->vertex_count > FCT_MESH_LIMIT)
+    if (count_triangles(soup) > FCT_MESH_LIMIT || soup->vertex_count > FCT_MESH_LIMIT)
         return fct_fail(env, FCT_ERROR_DATA, "%s: more than %llu vertices or triangles", name,
                         (unsigned long long)FCT_MESH_LIMIT);
     return FCT_OK;
 }
 
+/* Releases *array if a value is not finite, and sends one warning that names the first such element. */
+static void drop_if_not_finite(const fct_env *env, const char *name, const char *element, const char *what,
+                               float **array, size_t count, unsigned width) {
+    if (!*array) return;
+    size_t first = fct_first_not_finite(*array, count * width) / width, bad = 0;
+    if (first == count) return;
+    for (size_t i = first; i < count; ++i) bad += fct_first_not_finite(*array + i * width, width) < width;
+    fct_note(env, FCT_MESSAGE_WARNING, "%s: the %s are left out, because %zu of %zu are wrong (%s %zu first)",
+             name, what, bad, count, element, first);
+    fct_release(env, *array);
+    *array = NULL;
+}
+
+static void drop_wrong_attributes(const fct_env *env, const char *name, fct_soup *soup) {
+    size_t vertices = soup->vertex_count, polygons = soup->polygon_count;
+    drop_if_not_finite(env, name, "vertex", "colours", &soup->colors, vertices, 3);
+    drop_if_not_finite(env, name, "vertex", "normals", &soup->normals, vertices, 3);
+    drop_if_not_finite(env, name, "corner", "texture coordinates", &soup->texcoords, soup->corner_count, 2);
+    drop_if_not_finite(env, name, "face", "face colours", &soup->polygon_colors, polygons, 3);
+}
+
 /* Moves the arrays of vertices, and the material names. */
 static void move_shared(fct_soup *soup, fct_mesh *out) {
+    memcpy(out->origin, soup->origin, sizeof out->origin);
     out->vertex_count = soup->vertex_count;
     out->positions = soup->positions;
     out->colors = soup->colors;
@@ -67,7 +114,8 @@ static void cut_polygons(const fct_env *env, const char *name, const fct_soup *s
     uint32_t face = 0;
     for (uint32_t polygon = 0; polygon < soup->polygon_count; ++polygon) {
         uint32_t first = soup->starts[polygon], count = soup->starts[polygon + 1] - first;
-        fct_triangulate(soup->positions, soup->corners + first, count, scratch, &budget, local);
+        if (count > 2)
+            fct_triangulate(soup->positions, soup->corners + first, count, scratch, &budget, local);
         for (uint32_t k = 0; k + 2 < count; ++k, ++face) {
             for (uint32_t j = 0; j < 3; ++j) {
                 size_t corner = first + local[3 * k + j], place = 3 * (size_t)face + j;
@@ -103,9 +151,7 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
                       (soup->materials ? FCT_MESH_MATERIALS : 0);
     fct_mesh faces = {0};
     fct_result result = fct_allocate_all(env, lists, FCT_LENGTH(lists), "triangulation");
-    if (result == FCT_OK)
-        result = fct_mesh_create(env, 0, (uint32_t)(soup->corner_count - 2 * (size_t)soup->polygon_count),
-                                 arrays, &faces);
+    if (result == FCT_OK) result = fct_mesh_create(env, 0, (uint32_t)count_triangles(soup), arrays, &faces);
     if (result == FCT_OK) {
         cut_polygons(env, name, soup, &scratch, local, &faces);
         fct_release(env, faces.positions);
@@ -118,9 +164,14 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
 fct_result fct_soup_mesh(const fct_env *env, const char *name, fct_soup *soup, fct_mesh *out) {
     *out = (fct_mesh){0};
     fct_result result = check_soup(env, name, soup);
-    bool triangles = !soup->starts || soup->corner_count == 3 * (size_t)soup->polygon_count;
-    if (result == FCT_OK && triangles) move_triangles(soup, out);
-    if (result == FCT_OK && !triangles) result = triangulate_soup(env, name, soup, out);
+    if (result == FCT_OK) {
+        warn_of_small_polygons(env, name, soup);
+        drop_wrong_attributes(env, name, soup);
+    }
+    if (result == FCT_OK && is_polygon_list(soup))
+        result = triangulate_soup(env, name, soup, out);
+    else if (result == FCT_OK)
+        move_triangles(soup, out);
     if (result == FCT_OK) {
         move_shared(soup, out);
         result = fct_mesh_check(env, name, out);

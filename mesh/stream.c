@@ -1,8 +1,8 @@
 /* mesh/stream.c: see stream.h.
  *
  * A PLY is read in place if its header and its size determine the layout: it is binary, vertex records have
- * one size, and all faces are triangles. A face has at least three corners, so if the file has the size for
- * three corners per face, each face has three. The code that reads whole files converts the rows.
+ * one size, and the file has the size for three corners per face. Reading checks each face, because a face of
+ * two corners can hide one of four. The code that reads whole files converts the rows.
  */
 #define _GNU_SOURCE
 #include "mesh/stream.h"
@@ -15,6 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "mesh/color.h"
 #include "mesh/mesh.h"
 #include "mesh/ply/bind.h"
 #include "mesh/ply/value.h"
@@ -43,6 +44,7 @@ struct fct_stream {
     fct_soup rows; /* values of ROWS records */
     unsigned char *buffer;
     bool swap;
+    bool byte_colors; /* the colours are floats from 0 to 255 */
     /* or a spool: positions, triangles, colours, materials */
     fct_spool spool;
     uint64_t triangles_at, colors_at, materials_at;
@@ -144,18 +146,80 @@ static fct_result open_tables(fct_stream *s, const fct_text *t) {
     return FCT_OK;
 }
 
-/* Reads the text of the header. *end is NULL if the first part of the file has no end of a header. */
-static fct_result read_header(fct_stream *s, const char **end) {
-    *end = NULL;
-    for (size_t look = 4096; !*end && look <= HEADER_MOST; look *= 16) {
+/* Reads vertex rows [first, first + count) into s->buffer. count <= ROWS. */
+static fct_result read_vertices(fct_stream *s, uint32_t first, uint32_t count) {
+    const table *v = &s->vertices;
+    return read_bytes(s, v->offset + (uint64_t)first * v->size, s->buffer, count * v->size);
+}
+
+/* The origin that the reader of whole files finds. Reads vertices until they show that there is none. */
+static fct_result choose_origin(fct_stream *s) {
+    table *v = &s->vertices;
+    fct_extent extent = {0};
+    fct_result result = FCT_OK;
+    bool any = true;
+    for (uint32_t at = 0; any && at < s->info.vertex_count && !extent.near && result == FCT_OK; at += ROWS) {
+        uint32_t left = s->info.vertex_count - at, rows = left < ROWS ? left : ROWS;
+        result = read_vertices(s, at, rows);
+        if (result == FCT_OK)
+            fct_ply_extend(&v->target, v->properties, s->buffer, v->size, v->offsets, s->swap, false, rows,
+                           &extent);
+        any = extent.any; /* false: the coordinates are floats */
+    }
+    if (result != FCT_OK || !fct_extent_origin(&extent, s->info.origin)) return result;
+    for (size_t i = 0; i < v->target.column_count; ++i)
+        for (int k = 0; k < 3; ++k)
+            if ((ptrdiff_t)v->target.columns[i].property == v->target.positions[k])
+                v->target.columns[i].origin = s->info.origin[k];
+    return FCT_OK;
+}
+
+/* Whether colours have a type that can hold a wrong value. */
+static bool has_uncertain_colors(const table *v) {
+    for (size_t i = 0; i < v->target.column_count; ++i) {
+        fct_ply_type type = v->properties[v->target.columns[i].property].type;
+        if (v->target.columns[i].color && type != FCT_PLY_UINT8 && type != FCT_PLY_UINT16) return true;
+    }
+    return false;
+}
+
+/* Reads all colours that are no bytes: finds the scale of floats, and drops them if one is not finite, as the
+ * reader of whole files does. */
+static fct_result examine_colors(fct_stream *s) {
+    const table *v = &s->vertices;
+    fct_color_range range = {0};
+    if (!has_uncertain_colors(v)) return FCT_OK;
+    for (uint32_t at = 0; at < s->info.vertex_count; at += ROWS) {
+        uint32_t left = s->info.vertex_count - at, rows = left < ROWS ? left : ROWS;
+        fct_result result = read_vertices(s, at, rows);
+        if (result != FCT_OK) return result;
+        fct_ply_fill_columns(&v->target, v->properties, s->buffer, v->size, v->offsets, s->swap, false, 0,
+                             rows);
+        size_t bad = fct_first_not_finite(s->rows.colors, 3 * (size_t)rows);
+        if (bad < 3 * (size_t)rows) {
+            fct_note(s->env, FCT_MESSAGE_WARNING,
+                     "%s: the colours are left out, because that of vertex %zu is wrong", s->name,
+                     at + bad / 3);
+            s->info.colors = false;
+            return FCT_OK;
+        }
+        for (size_t i = 0; i < 3 * (size_t)rows; ++i) fct_color_range_add(&range, s->rows.colors[i]);
+    }
+    s->byte_colors = v->target.any_scale && fct_color_range_is_bytes(&range);
+    return FCT_OK;
+}
+
+/* Reads the text of the header. *body is NULL if the first part of the file has no end of a header. */
+static fct_result read_header(fct_stream *s, const char **body) {
+    *body = NULL;
+    for (size_t look = 4096; !*body && look <= HEADER_MOST; look *= 16) {
         size_t got;
         fct_release(s->env, s->header_text);
         s->header_text = fct_allocate(s->env, look, 1);
         if (!s->header_text) return fct_fail_memory(s->env, "a PLY header");
         errno = 0;
         if (!fct_read_at(s->descriptor, 0, s->header_text, look, &got)) return fail_read(s);
-        const char *word = memmem(s->header_text, got, "end_header", strlen("end_header"));
-        if (word) *end = memchr(word, '\n', (size_t)(s->header_text + got - word));
+        *body = fct_ply_find_body(s->header_text, got);
         if (got < look) break;
     }
     return FCT_OK;
@@ -164,20 +228,23 @@ static fct_result read_header(fct_stream *s, const char **end) {
 /* Opens a regular PLY file. *done: it can be read in place. */
 static fct_result open_ply(fct_stream *s, bool *done) {
     struct stat status;
-    const char *end;
+    const char *body;
     *done = false;
     s->descriptor = open(s->name, O_RDONLY | O_CLOEXEC);
     if (s->descriptor < 0) return fail_read(s);
     if (fstat(s->descriptor, &status) || !S_ISREG(status.st_mode)) return FCT_OK;
     if (s->env->opened) s->env->opened(s->env->opened_user, s->name, (uint64_t)status.st_size);
-    fct_result result = read_header(s, &end);
-    if (result != FCT_OK || !end) return result;
-    fct_text t = {s->header_text, end + 1, s->env, s->name, 1};
+    fct_result result = read_header(s, &body);
+    if (result != FCT_OK || !body) return result;
+    fct_text t = {s->header_text, body, s->env, s->name, 1};
     result = fct_ply_read_header(&t, &s->header);
     if (result != FCT_OK) return result;
     s->swap = s->header.format == FCT_PLY_BIG;
     *done = lay_out(s, (uint64_t)(t.p - s->header_text), (uint64_t)status.st_size);
-    return *done ? open_tables(s, &t) : FCT_OK;
+    if (*done) result = open_tables(s, &t);
+    if (result == FCT_OK && *done) result = choose_origin(s);
+    if (result == FCT_OK && s->info.colors) result = examine_colors(s);
+    return result;
 }
 
 /* --- Other files --- */
@@ -204,8 +271,13 @@ static fct_result open_other(fct_stream *s, const char *folder, const char *besi
     if (result != FCT_OK) return result;
     result = fct_spool_open(s->env, folder, beside, &s->spool);
     if (result == FCT_OK) result = spool_mesh(s, &mesh);
-    s->info = (fct_stream_info){mesh.vertex_count,      mesh.face_count,     mesh.colors != NULL,
-                                mesh.materials != NULL, mesh.material_count, mesh.material_names};
+    s->info = (fct_stream_info){mesh.vertex_count,
+                                mesh.face_count,
+                                mesh.colors != NULL,
+                                mesh.materials != NULL,
+                                mesh.material_count,
+                                mesh.material_names,
+                                {mesh.origin[0], mesh.origin[1], mesh.origin[2]}};
     s->names = mesh.material_names;
     mesh.material_names = NULL;
     fct_mesh_release(s->env, &mesh);
@@ -299,10 +371,12 @@ static fct_result check_floats(const fct_stream *s, const char *what, uint32_t f
 static fct_result vertex_rows(fct_stream *s, uint32_t first, uint32_t count, float *positions,
                               float *colors) {
     const table *v = &s->vertices;
-    fct_result result = read_bytes(s, v->offset + (uint64_t)first * v->size, s->buffer, count * v->size);
+    fct_result result = read_vertices(s, first, count);
     if (result != FCT_OK) return result;
     fct_ply_fill_columns(&v->target, v->properties, s->buffer, v->size, v->offsets, s->swap, false, 0, count);
     memcpy(positions, s->rows.positions, 12 * (size_t)count);
+    for (size_t i = 0; s->byte_colors && i < 3 * (size_t)count; ++i)
+        s->rows.colors[i] = fct_linear_from_srgb(s->rows.colors[i] / 255.0);
     if (colors) memcpy(colors, s->rows.colors, 12 * (size_t)count);
     return FCT_OK;
 }

@@ -17,6 +17,7 @@ typedef struct fct_stream_info {
     bool colors, materials;
     uint32_t material_count;     /* of names; without names the caller takes the greatest number */
     char *const *material_names; /* or NULL */
+    double origin[3];            /* as in fct_mesh */
 } fct_stream_info;
 
 /* folder and beside as for fct_spool_open. Errors: INPUT, DATA, MEMORY, OUTPUT, CANCELLED. */

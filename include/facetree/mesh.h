@@ -28,6 +28,7 @@ typedef struct fct_mesh {
     uint32_t *source_faces; /* face_count, polygon of each triangle, or NULL: the face number */
     uint32_t material_count;
     char **material_names; /* material_count strings, or NULL */
+    double origin[3];      /* the vertex is at origin + position; 0 unless a reader set it (docs/mesh.md) */
 } fct_mesh;
 
 /* The optional arrays of fct_mesh_create. */
@@ -69,7 +70,7 @@ typedef struct fct_mesh_report {
     uint32_t duplicate_faces;       /* same three vertices as an earlier face, in any order */
     uint32_t unreferenced_vertices; /* used by no face */
     uint32_t components;            /* of faces that share an edge */
-    fct_bounds bounds;
+    fct_bounds bounds;              /* of the positions, relative to the mesh's origin */
     double area;
     double diagonal; /* of the bounds */
 } fct_mesh_report;

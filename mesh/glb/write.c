@@ -14,6 +14,7 @@
 
 #include "base/env.h"
 #include "base/math/vec.h"
+#include "mesh/mesh.h"
 
 /* The vertices in the file, and the corners' indices into them. */
 typedef struct layout {
@@ -228,9 +229,10 @@ static size_t print_json(const fct_sink *sink, const layout *l, FILE *json) {
         return 0;
     }
     print_materials(sink, json);
-    fprintf(
-        json,
-        ",\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[");
+    fprintf(json, ",\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0");
+    if (fct_mesh_has_origin(m))
+        fprintf(json, ",\"translation\":[%.17g,%.17g,%.17g]", m->origin[0], m->origin[1], m->origin[2]);
+    fprintf(json, "}],\"meshes\":[{\"primitives\":[");
     print_primitives(sink, l, arrays, count, views, json);
     fprintf(json, "]}],\"accessors\":[");
     print_accessors(sink, l, arrays, count, json);

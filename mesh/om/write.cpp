@@ -16,6 +16,7 @@ extern "C" {
 #include "base/env.h"
 #include "base/sort.h"
 #include "mesh/color.h"
+#include "mesh/mesh.h"
 }
 #include "mesh/om/write.h"
 
@@ -52,7 +53,12 @@ class mesh_exporter : public IO::BaseExporter {
     bool is_point_double() const override { return false; }
     bool is_normal_double() const override { return false; }
 
-    Vec3f point(VertexHandle v) const override { return triple(mesh->positions, v); }
+    Vec3f point(VertexHandle v) const override {
+        const float *p = mesh->positions + 3 * size_t(v.idx());
+        const double *o = mesh->origin;
+        if (!fct_mesh_has_origin(mesh)) return Vec3f(p[0], p[1], p[2]); // keeps the sign of -0
+        return Vec3f(float(o[0] + double(p[0])), float(o[1] + double(p[1])), float(o[2] + double(p[2])));
+    }
     Vec3f normal(VertexHandle v) const override { return triple(mesh->normals, v); }
     Vec3f colorf(VertexHandle v) const override { return triple(mesh->colors, v); }
     Vec3f colorf(FaceHandle f) const override { return triple(mesh->face_colors, f); }
@@ -188,6 +194,7 @@ struct file_buffer : std::streambuf {
 extern "C" fct_result fct_write_om(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
     fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS);
+    fct_warn_of_origin(sink);
     size_t count = 3 * size_t(m->face_count);
     auto *keys = static_cast<uint64_t *>(fct_allocate(sink->env, count, sizeof(uint64_t)));
     auto *sides = static_cast<uint32_t *>(fct_allocate(sink->env, count, sizeof(uint32_t)));

@@ -18,12 +18,17 @@ typedef struct group {
 static const group groups[] = {
     {FCT_PLY_VERTICES, {"x", "y", "z"}, 3, POSITIONS},
     {FCT_PLY_VERTICES, {"nx", "ny", "nz"}, 3, NORMALS},
+    {FCT_PLY_VERTICES, {"r", "g", "b"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"diffuse_r", "diffuse_g", "diffuse_b"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"diffuse_red", "diffuse_green", "diffuse_blue"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"red", "green", "blue"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"texture_u", "texture_v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"u", "v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"s", "t"}, 2, TEXCOORDS},
+    {FCT_PLY_FACES, {"r", "g", "b"}, 3, POLYGON_COLORS},
+    {FCT_PLY_FACES, {"diffuse_r", "diffuse_g", "diffuse_b"}, 3, POLYGON_COLORS},
+    {FCT_PLY_FACES, {"diffuse_red", "diffuse_green", "diffuse_blue"}, 3, POLYGON_COLORS},
     {FCT_PLY_FACES, {"red", "green", "blue"}, 3, POLYGON_COLORS},
     {FCT_PLY_FACES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, POLYGON_COLORS},
 };
@@ -46,9 +51,32 @@ static ptrdiff_t find_either(const fct_ply_property *properties, size_t count, b
     return found != FCT_PLY_NOWHERE ? found : find_property(properties, count, list, b);
 }
 
+/* Appends the columns of the group, which are at the properties `found`. */
+static void append_columns(const group *g, const ptrdiff_t *found, const fct_ply_property *properties,
+                           const double *origin, float *array, fct_ply_target *out) {
+    bool color = g->destination == COLORS || g->destination == POLYGON_COLORS;
+    if (color) { /* replaces the earlier group */
+        while (out->column_count && out->columns[out->column_count - 1].color) --out->column_count;
+        out->any_scale = strncmp(g->names[0], "radiosity", 9) != 0;
+    } else if (g->destination == TEXCOORDS) {
+        while (out->column_count && out->columns[out->column_count - 1].stride == 2) --out->column_count;
+    }
+    for (size_t k = 0; k < g->width; ++k) {
+        bool position = g->destination == POSITIONS;
+        if (color && properties[found[k]].type < FCT_PLY_FLOAT) out->any_scale = false;
+        if (position) out->positions[k] = found[k];
+        out->columns[out->column_count++] = (fct_ply_column){.property = (size_t)found[k],
+                                                             .to = array + k,
+                                                             .stride = g->width,
+                                                             .origin = position ? origin[k] : 0,
+                                                             .color = color};
+    }
+}
+
 /* Appends the columns of the group if the element has all of them. */
 static fct_result bind_group(const fct_env *env, const group *g, const fct_ply_property *properties,
-                             const fct_ply_element *element, float **array, fct_ply_target *out) {
+                             const fct_ply_element *element, const double *origin, float **array,
+                             fct_ply_target *out) {
     ptrdiff_t found[3];
     for (size_t k = 0; k < g->width; ++k) {
         found[k] = find_property(properties, element->property_count, false, g->names[k]);
@@ -56,17 +84,7 @@ static fct_result bind_group(const fct_env *env, const group *g, const fct_ply_p
     }
     if (!*array) *array = fct_allocate(env, (size_t)element->count, g->width * sizeof(float));
     if (!*array) return fct_fail_memory(env, "a mesh");
-    if (g->destination == COLORS || g->destination == POLYGON_COLORS) { /* replaces the earlier group */
-        while (out->column_count && out->columns[out->column_count - 1].color) --out->column_count;
-    } else if (g->destination == TEXCOORDS) {
-        while (out->column_count && out->columns[out->column_count - 1].stride == 2) --out->column_count;
-    }
-    for (size_t k = 0; k < g->width; ++k)
-        out->columns[out->column_count++] =
-            (fct_ply_column){.property = (size_t)found[k],
-                             .to = *array + k,
-                             .stride = g->width,
-                             .color = g->destination == COLORS || g->destination == POLYGON_COLORS};
+    append_columns(g, found, properties, origin, *array, out);
     return FCT_OK;
 }
 
@@ -83,6 +101,7 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
         element->property_count ? header->properties + element->first_property : NULL;
     size_t count = element->property_count;
     *out = (fct_ply_target){.kind = fct_ply_kind_of(element),
+                            .positions = {FCT_PLY_NOWHERE, FCT_PLY_NOWHERE, FCT_PLY_NOWHERE},
                             .indices = FCT_PLY_NOWHERE,
                             .texcoords = FCT_PLY_NOWHERE,
                             .material = FCT_PLY_NOWHERE};
@@ -90,8 +109,8 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
                         &soup->polygon_colors};
     for (size_t i = 0; i < sizeof groups / sizeof *groups; ++i) {
         if (groups[i].kind != out->kind) continue;
-        fct_result result =
-            bind_group(t->env, groups + i, properties, element, arrays[groups[i].destination], out);
+        fct_result result = bind_group(t->env, groups + i, properties, element, soup->origin,
+                                       arrays[groups[i].destination], out);
         if (result != FCT_OK) return result;
     }
     if (out->kind == FCT_PLY_VERTICES && !soup->positions)
@@ -113,7 +132,7 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
 }
 
 /* Integers from 0 to 255 (65535 for ushort) are sRGB, floats are linear. An integer out of range becomes NaN,
- * and fct_mesh_check reports its element. */
+ * as if the file had no number there. */
 static float color_value(double value, fct_ply_type type) {
     if (type >= FCT_PLY_FLOAT) return (float)value;
     double top = type == FCT_PLY_UINT16 ? 65535 : 255;
@@ -139,11 +158,31 @@ void fct_ply_fill_columns(const fct_ply_target *target, const fct_ply_property *
             for (size_t i = begin; i < end; ++i)
                 column.to[i * column.stride] =
                     color_value(fct_ply_load(from + i * size, type, swap), declared);
-        else if (type == FCT_PLY_FLOAT)
+        else if (type == FCT_PLY_FLOAT && column.origin == 0)
             for (size_t i = begin; i < end; ++i)
                 column.to[i * column.stride] = (float)fct_ply_float(from + i * size, swap);
         else
             for (size_t i = begin; i < end; ++i)
-                column.to[i * column.stride] = (float)fct_ply_load(from + i * size, type, swap);
+                column.to[i * column.stride] =
+                    (float)(fct_ply_load(from + i * size, type, swap) - column.origin);
+    }
+}
+
+void fct_ply_extend(const fct_ply_target *target, const fct_ply_property *properties,
+                    const unsigned char *base, size_t size, const size_t *offsets, bool swap, bool as_double,
+                    size_t count, fct_extent *extent) {
+    bool fine = as_double;
+    fct_ply_type types[3];
+    for (int k = 0; k < 3; ++k) {
+        if (target->positions[k] == FCT_PLY_NOWHERE) return;
+        fct_ply_type declared = properties[target->positions[k]].type;
+        types[k] = as_double ? FCT_PLY_DOUBLE : declared;
+        fine = fine || declared == FCT_PLY_DOUBLE || declared == FCT_PLY_INT32 || declared == FCT_PLY_UINT32;
+    }
+    for (size_t i = 0; fine && i < count && !extent->near; ++i) {
+        double point[3];
+        for (int k = 0; k < 3; ++k)
+            point[k] = fct_ply_load(base + i * size + offsets[target->positions[k]], types[k], swap);
+        fct_extent_add(extent, point);
     }
 }

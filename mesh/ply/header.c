@@ -103,9 +103,8 @@ static fct_result read_comment(fct_text *t, fct_ply_header *h) {
     if (!WORD_IS("facetree")) return FCT_OK;
     word = fct_text_word(t, &length);
     if (!WORD_IS("material")) return FCT_OK;
-    const char *begin = t->p, *end = memchr(begin, '\n', (size_t)(t->end - begin));
-    if (!end) end = t->end;
-    if (end > begin && end[-1] == '\r') --end;
+    const char *begin = t->p, *end = begin;
+    while (end < t->end && *end != '\n' && *end != '\r') ++end;
     if (begin < end) ++begin;
     fct_result result = fct_grow(t->env, (void **)&h->material_names, &h->material_capacity,
                                  h->material_count + 1, sizeof(char *));
@@ -142,6 +141,31 @@ static fct_result read_line(fct_text *t, fct_ply_header *h, bool *format_seen, b
     return result;
 }
 
+/* Finds bytes in a text, or returns NULL. */
+static const char *find_text(const char *text, const char *end, const char *wanted, size_t length) {
+    for (; end - text >= (ptrdiff_t)length; ++text) {
+        text = memchr(text, *wanted, (size_t)(end - text) - length + 1);
+        if (!text || !memcmp(text, wanted, length)) return text;
+    }
+    return NULL;
+}
+
+const char *fct_ply_find_body(const char *text, size_t size) {
+    static const char word[] = "end_header";
+    const char *end = text + size, *first = text;
+    while (first < end && *first != '\n' && *first != '\r') ++first;
+    if (first == end) return NULL;
+    bool returns = *first == '\r' && (first + 1 == end || first[1] != '\n');
+    char line_end = returns ? '\r' : '\n';
+    const char *p = first;
+    do {
+        p = find_text(p + 1, end, word, strlen(word));
+        if (!p) return NULL;
+    } while (p[-1] != line_end); /* the words of a comment */
+    const char *found = memchr(p, line_end, (size_t)(end - p));
+    return found ? found + 1 : NULL;
+}
+
 fct_result fct_ply_read_header(fct_text *t, fct_ply_header *h) {
     *h = (fct_ply_header){0};
     size_t length;
@@ -151,6 +175,7 @@ fct_result fct_ply_read_header(fct_text *t, fct_ply_header *h) {
         return fct_text_expected(t, "'ply'");
     }
     fct_text_next_line(t);
+    const char *body = fct_ply_find_body(begin, (size_t)(t->end - begin));
     bool format_seen = false, ended = false;
     while (!ended) {
         if (t->p == t->end) return fct_text_expected(t, "'end_header'");
@@ -158,6 +183,7 @@ fct_result fct_ply_read_header(fct_text *t, fct_ply_header *h) {
         if (result != FCT_OK) return result;
         fct_text_next_line(t);
     }
+    if (body) t->p = body; /* a body of bytes may begin with LF after the CR */
     return format_seen ? FCT_OK : fct_text_fail(t, "the header has no format line");
 }
 

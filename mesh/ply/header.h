@@ -49,6 +49,10 @@ static inline size_t fct_ply_size(fct_ply_type type) {
     return sizes[type];
 }
 
+/* Returns the first byte after the header of the file that begins with `text`, or NULL if no header ends
+ * within `size` bytes. Lines end with LF, CR LF or CR, as the first line does. */
+const char *fct_ply_find_body(const char *text, size_t size);
+
 /* Reads the header. t is then at the first byte after the line "end_header". Errors: DATA, MEMORY. Release
  * the header even after an error. */
 fct_result fct_ply_read_header(fct_text *t, fct_ply_header *out);

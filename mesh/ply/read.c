@@ -4,18 +4,20 @@
  *   1. Compare the element's count with the bytes left in the file, before anything is allocated.
  *   2. If all binary records have the layout of the first (a pass over the list lengths checks this), convert
  *      them in parallel straight from the file.
- *   3. Else convert record by record. A text record first becomes a row of doubles.
- * Unknown elements and properties are skipped. Triangle strips (-1 separates strips) become triangles with
- * the same winding.
+ *   3. Else convert record by record. A text record first becomes a row of doubles. It is one line in layout
+ *      0. In layout 1 line ends mean nothing.
+ * Float colours without the prefix radiosity_ are linear, or sRGB from 0 to 255 (fct_color_range). Unknown
+ * elements and properties are skipped. Triangle strips (-1 separates strips) become triangles with the same
+ * winding.
  */
 #include "mesh/ply/read.h"
 
 #include <limits.h>
-#include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
 #include "base/parallel.h"
+#include "mesh/color.h"
 #include "mesh/ply/bind.h"
 #include "mesh/ply/value.h"
 
@@ -28,6 +30,7 @@ typedef struct reader {
     fct_ply_target target;
     const char *body; /* first byte after the header */
     bool swap, text;
+    bool free;               /* line ends mean nothing */
     unsigned seen;           /* bit k: an element of kind k came before */
     float *vertex_texcoords; /* V x 2 or NULL */
     size_t
@@ -152,13 +155,12 @@ static void store_face(const reader *r, const unsigned char *p, const size_t *of
     if (k != FCT_PLY_NOWHERE) load_ids(r, p + offsets[k], r->properties[k].type, 1, soup->materials + i);
 }
 
-/* Returns what is wrong with the list lengths of a face, NULL if they are right. */
-static const char *find_face_fault(const reader *r, const uint32_t *lengths) {
-    if (lengths[r->target.indices] < 3) return "fewer than three corners";
-    if (r->target.texcoords != FCT_PLY_NOWHERE &&
-        lengths[r->target.texcoords] != 2 * (uint64_t)lengths[r->target.indices])
-        return "texture coordinates do not match its corners";
-    return NULL;
+/* Whether the list of texture coordinates has the wrong length. It does not matter for a face without a
+ * triangle. */
+static bool has_wrong_texcoords(const reader *r, const uint32_t *lengths) {
+    uint64_t corners = lengths[r->target.indices];
+    return corners > 2 && r->target.texcoords != FCT_PLY_NOWHERE &&
+           lengths[r->target.texcoords] != 2 * corners;
 }
 
 typedef struct uniform {
@@ -228,7 +230,8 @@ static fct_result read_uniform(reader *r, bool *done) {
     size_t size = measure_record(r, base, end, r->offsets, r->lengths);
     if (!size || (size_t)(end - base) / size < count) return FCT_OK;
     if (r->target.kind == FCT_PLY_STRIPS) return FCT_OK;
-    if (r->target.kind == FCT_PLY_FACES && (r->soup->polygon_count || find_face_fault(r, r->lengths)))
+    if (r->target.kind == FCT_PLY_FACES &&
+        (r->soup->polygon_count || r->lengths[r->target.indices] < 3 || has_wrong_texcoords(r, r->lengths)))
         return FCT_OK;
     uniform u = {.r = r, .base = base, .size = size};
     fct_parallel_for(r->t.env, count, 16384, check_uniform, &u);
@@ -237,6 +240,8 @@ static fct_result read_uniform(reader *r, bool *done) {
         fct_result result = make_uniform_room(r);
         if (result != FCT_OK) return result;
     }
+    fct_ply_extend(&r->target, r->properties, base, size, r->offsets, r->swap, false, count,
+                   &r->soup->extent);
     if (r->target.kind != FCT_PLY_OTHER) fct_parallel_for(r->t.env, count, 16384, fill_uniform, &u);
     r->t.p += count * size;
     *done = true;
@@ -249,8 +254,15 @@ static bool fits_type(double value, fct_ply_type type) {
     return type >= FCT_PLY_FLOAT || (value >= lower[type] && value <= upper[type]);
 }
 
-/* Reads one value of a text file. A float that no array uses may be any word, for example nan. */
+/* Moves to the next value, over line ends if they mean nothing. */
+static void skip_to_value(reader *r) {
+    if (r->free) fct_text_skip_lines(&r->t, 0);
+}
+
+/* Reads one value of a text file. A float that an array uses may be nan, and the mesh is checked later.
+ * Another float may be any word. */
 static fct_result read_value(reader *r, fct_ply_type type, bool used, double *value) {
+    skip_to_value(r);
     const char *begin = r->t.p;
     if (type < FCT_PLY_FLOAT) {
         int64_t integer;
@@ -261,14 +273,7 @@ static fct_result read_value(reader *r, fct_ply_type type, bool used, double *va
         r->t.p = begin;
         return fct_text_expected(&r->t, "an integer in the range of its type");
     }
-    if (used) {
-        float number; /* not used: the call makes the message */
-        if (!fct_text_double(&r->t, value) || !isfinite((float)*value)) {
-            r->t.p = begin;
-            return fct_text_float(&r->t, "a number", &number);
-        }
-        return FCT_OK;
-    }
+    if (used) return fct_text_any_double(&r->t, "a number", value);
     size_t length;
     fct_text_word(&r->t, &length);
     *value = 0;
@@ -284,7 +289,7 @@ static bool is_used(const reader *r, size_t property) {
     return false;
 }
 
-/* Reads a line into r->row, r->offsets and r->lengths. */
+/* Reads a record of text into r->row, r->offsets and r->lengths. */
 static fct_result read_row(reader *r) {
     if (!fct_text_skip_lines(&r->t, 0)) return fct_text_expected(&r->t, "another record");
     size_t used = 0;
@@ -310,7 +315,7 @@ static fct_result read_row(reader *r) {
             if (result != FCT_OK) return result;
         }
     }
-    if (!fct_text_at_line_end(&r->t)) return fct_text_expected(&r->t, "the end of the line");
+    if (!r->free && !fct_text_at_line_end(&r->t)) return fct_text_expected(&r->t, "the end of the line");
     return FCT_OK;
 }
 
@@ -346,11 +351,12 @@ static fct_result store_record(reader *r, const unsigned char *p, uint64_t recor
     for (size_t c = 0; c < target.column_count; ++c)
         target.columns[c].to += (size_t)record * target.columns[c].stride;
     fct_ply_fill_columns(&target, r->properties, p, 0, r->offsets, r->swap, r->text, 0, 1);
+    fct_ply_extend(&target, r->properties, p, 0, r->offsets, r->swap, r->text, 1, &soup->extent);
     if (target.kind == FCT_PLY_STRIPS) return append_strip(r, p + r->offsets[target.indices]);
     if (target.kind != FCT_PLY_FACES) return FCT_OK;
-    const char *fault = find_face_fault(r, r->lengths);
-    if (fault) return fail_record(r, record, fault);
-    size_t corners = r->lengths[target.indices];
+    if (has_wrong_texcoords(r, r->lengths))
+        return fail_record(r, record, "texture coordinates do not match its corners");
+    size_t corners = r->lengths[target.indices] > 2 ? r->lengths[target.indices] : 0;
     fct_result result = make_room(r, corners, 1);
     if (result != FCT_OK) return result;
     store_face(r, p, r->offsets, corners, (size_t)record, soup->corner_count);
@@ -382,6 +388,19 @@ static fct_result read_records(reader *r) {
     return FCT_OK;
 }
 
+/* Converts the element's float colours if they are sRGB from 0 to 255. */
+static void scale_colors(reader *r) {
+    bool vertices = r->target.kind == FCT_PLY_VERTICES;
+    float *colors = vertices ? r->soup->colors : r->soup->polygon_colors;
+    size_t count = 3 * (size_t)r->element->count;
+    fct_color_range range = {0};
+    for (size_t i = 0; i < count; ++i) fct_color_range_add(&range, colors[i]);
+    if (!fct_color_range_is_bytes(&range)) return;
+    fct_note(r->t.env, FCT_MESSAGE_NOTE, "%s: float colours of %s are taken as 0 to 255", r->t.name,
+             vertices ? "vertices" : "faces");
+    for (size_t i = 0; i < count; ++i) colors[i] = fct_linear_from_srgb(colors[i] / 255.0);
+}
+
 static fct_result read_element(reader *r, const fct_ply_element *element) {
     r->element = element;
     r->properties = r->h.properties ? r->h.properties + element->first_property : NULL;
@@ -410,6 +429,7 @@ static fct_result read_element(reader *r, const fct_ply_element *element) {
     bool done = false;
     if (!r->text) result = read_uniform(r, &done);
     if (result == FCT_OK && !done) result = read_records(r);
+    if (result == FCT_OK && r->target.any_scale) scale_colors(r);
     return result;
 }
 
@@ -459,11 +479,19 @@ static fct_result spread_texcoords(reader *r) {
     return FCT_OK;
 }
 
+static bool has_valid_corners(const fct_soup *soup) {
+    for (size_t i = 0; i < soup->corner_count; ++i)
+        if (soup->corners[i] >= soup->vertex_count) return false;
+    return true;
+}
+
 static fct_result complete_mesh(reader *r) {
     fct_soup *soup = r->soup;
     if (!(r->seen >> FCT_PLY_VERTICES & 1))
         return fct_fail(r->t.env, FCT_ERROR_DATA, "%s: the header declares no vertices", r->t.name);
-    if (r->text ? fct_text_skip_lines(&r->t, 0) : r->t.p < r->t.end)
+    bool more = r->text ? fct_text_skip_lines(&r->t, 0) : r->t.p < r->t.end;
+    if (r->free && (more || !has_valid_corners(soup))) return FCT_ERROR_DATA;
+    if (more)
         fct_note(r->t.env, FCT_MESSAGE_WARNING, "%s: %zu bytes behind the last element are left out",
                  r->t.name, count_bytes_left(r));
     drop_partial(r);
@@ -475,10 +503,11 @@ static fct_result complete_mesh(reader *r) {
 }
 
 fct_result fct_read_ply(const fct_source *source, fct_soup *out) {
-    const char *begin = source->data;
-    reader r = {.t = {begin, begin + source->size, source->env, source->name, 1}, .soup = out};
+    reader r = {.t = fct_text_begin(source->env, source->name, source->data, source->size), .soup = out};
     fct_result result = fct_ply_read_header(&r.t, &r.h);
     r.text = r.h.format == FCT_PLY_ASCII;
+    r.free = out->layout > 0;
+    if (result == FCT_OK && r.free && !r.text) result = FCT_ERROR_DATA; /* binary files have one layout */
     r.swap = r.h.format == FCT_PLY_BIG;
     r.body = r.t.p;
     for (size_t i = 0; result == FCT_OK && i < r.h.element_count; ++i)

@@ -4,6 +4,7 @@
  *   face:   vertex_indices [texcoord, six floats] [red green blue radiosity_r ...] [material_index]
  *
  * red, green and blue are bytes for viewers (exposed, clamped, sRGB). radiosity_* are the linear floats.
+ * Positions are floats, or doubles if the mesh has an origin.
  * Lines "comment facetree material NAME" hold the names of the materials.
  */
 #include "mesh/ply/write.h"
@@ -12,6 +13,7 @@
 
 #include "base/env.h"
 #include "mesh/color.h"
+#include "mesh/mesh.h"
 
 enum { ROWS = 4096, ROW_SIZE = 64 };
 
@@ -21,8 +23,9 @@ static void write_header(const fct_sink *sink, FILE *stream) {
             sink->def->ascii ? "ascii" : "binary_little_endian", fct_version());
     for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
         fprintf(stream, "comment facetree material %s\n", m->material_names[i]);
-    fprintf(stream, "element vertex %u\nproperty float x\nproperty float y\nproperty float z\n",
-            m->vertex_count);
+    const char *type = fct_mesh_has_origin(m) ? "double" : "float";
+    fprintf(stream, "element vertex %u\nproperty %s x\nproperty %s y\nproperty %s z\n", m->vertex_count, type,
+            type, type);
     if (m->normals) fprintf(stream, "property float nx\nproperty float ny\nproperty float nz\n");
     static const char colors[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
                                  "property float radiosity_r\nproperty float radiosity_g\n"
@@ -50,6 +53,17 @@ static unsigned char *put_floats(unsigned char *p, const float *values, int coun
     return p;
 }
 
+static unsigned char *put_position(unsigned char *p, const fct_mesh *m, size_t v) {
+    if (!fct_mesh_has_origin(m)) return put_floats(p, m->positions + 3 * v, 3);
+    for (int k = 0; k < 3; ++k) {
+        double x = m->origin[k] + (double)m->positions[3 * v + (size_t)k];
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        p = put_32(put_32(p, (uint32_t)bits), (uint32_t)(bits >> 32));
+    }
+    return p;
+}
+
 static void convert_color(const fct_sink *sink, const float *color, unsigned char bytes[3]) {
     for (int k = 0; k < 3; ++k) bytes[k] = fct_srgb_byte((double)color[k] * (double)sink->def->exposure);
 }
@@ -61,7 +75,7 @@ static unsigned char *put_color(unsigned char *p, const fct_sink *sink, const fl
 
 static unsigned char *put_vertex(unsigned char *p, const fct_sink *sink, size_t v) {
     const fct_mesh *m = sink->mesh;
-    p = put_floats(p, m->positions + 3 * v, 3);
+    p = put_position(p, m, v);
     if (m->normals) p = put_floats(p, m->normals + 3 * v, 3);
     if (m->colors) p = put_color(p, sink, m->colors + 3 * v);
     return p;
@@ -108,6 +122,15 @@ static void print_floats(FILE *stream, const char *before, const float *values, 
     for (int i = 0; i < count; ++i) fprintf(stream, "%s%.9g", i ? " " : before, (double)values[i]);
 }
 
+static void print_position(FILE *stream, const fct_mesh *m, size_t v) {
+    if (!fct_mesh_has_origin(m)) {
+        print_floats(stream, "", m->positions + 3 * v, 3);
+        return;
+    }
+    for (size_t k = 0; k < 3; ++k)
+        fprintf(stream, "%s%.17g", k ? " " : "", m->origin[k] + (double)m->positions[3 * v + k]);
+}
+
 static void print_color(const fct_sink *sink, FILE *stream, const float *color) {
     unsigned char bytes[3];
     convert_color(sink, color, bytes);
@@ -118,7 +141,7 @@ static void print_color(const fct_sink *sink, FILE *stream, const float *color) 
 static fct_result write_ascii(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
     for (size_t v = 0; v < m->vertex_count; ++v) {
-        print_floats(stream, "", m->positions + 3 * v, 3);
+        print_position(stream, m, v);
         if (m->normals) print_floats(stream, " ", m->normals + 3 * v, 3);
         if (m->colors) print_color(sink, stream, m->colors + 3 * v);
         fputc('\n', stream);

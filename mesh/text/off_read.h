@@ -4,6 +4,10 @@
 
 #include "mesh/soup.h"
 
+/* Layout 0: each vertex and each face is one line. The others: line ends mean nothing, and all of the text is
+ * used. They differ in the number of colour components. */
+enum { FCT_OFF_LAYOUTS = 9 };
+
 /* Errors: DATA, MEMORY. */
 fct_result fct_read_off(const fct_source *source, fct_soup *out);
 

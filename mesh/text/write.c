@@ -7,6 +7,7 @@
 #include "base/env.h"
 #include "base/math/vec.h"
 #include "mesh/color.h"
+#include "mesh/mesh.h"
 
 static void print_floats(FILE *stream, const float *values, int count) {
     for (int i = 0; i < count; ++i) fprintf(stream, " %.9g", (double)values[i]);
@@ -16,6 +17,16 @@ static void print_floats(FILE *stream, const float *values, int count) {
  * at the joint of the two formulas, which change by a millionth. */
 static void print_srgb(FILE *stream, const float *linear) {
     for (int k = 0; k < 3; ++k) fprintf(stream, " %.9g", fct_srgb_from_linear((double)linear[k]));
+}
+
+/* Positions relative to an origin need the digits of a double. */
+static void print_position(FILE *stream, const fct_mesh *m, size_t v) {
+    const float *p = m->positions + 3 * v;
+    if (!fct_mesh_has_origin(m)) {
+        print_floats(stream, p, 3);
+        return;
+    }
+    for (int k = 0; k < 3; ++k) fprintf(stream, " %.17g", m->origin[k] + (double)p[k]);
 }
 
 /* OBJ: v x y z [r g b], vt per corner, vn per vertex, usemtl where the material changes. */
@@ -56,7 +67,7 @@ fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
     fprintf(stream, "# Facetree %s\n", fct_version());
     for (size_t v = 0; v < m->vertex_count; ++v) {
         fputc('v', stream);
-        print_floats(stream, m->positions + 3 * v, 3);
+        print_position(stream, m, v);
         if (m->colors) print_srgb(stream, m->colors + 3 * v);
         fputc('\n', stream);
     }
@@ -78,14 +89,24 @@ static void print_component(FILE *stream, float value) {
     fprintf(stream, " %s%s", text, strpbrk(text, ".e") ? "" : ".0");
 }
 
-/* OFF, COFF, NOFF or CNOFF; colours as linear floats. */
+/* Whether a colour is over 1, which OFF readers take for a byte. */
+static bool has_bright_color(const fct_mesh *m) {
+    for (size_t i = 0; m->colors && i < 3 * (size_t)m->vertex_count; ++i)
+        if (m->colors[i] > 1) return true;
+    for (size_t i = 0; m->face_colors && i < 3 * (size_t)m->face_count; ++i)
+        if (m->face_colors[i] > 1) return true;
+    return false;
+}
+
+/* OFF, COFF, NOFF or CNOFF; colours as linear floats. The comment `# facetree linear` says so if a reader
+ * would take them for bytes. */
 fct_result fct_write_off(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
     fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS);
-    fprintf(stream, "%s%sOFF\n%u %u 0\n", m->colors ? "C" : "", m->normals ? "N" : "", m->vertex_count,
-            m->face_count);
+    fprintf(stream, "%s%sOFF\n%s%u %u 0\n", m->colors ? "C" : "", m->normals ? "N" : "",
+            has_bright_color(m) ? "# facetree linear\n" : "", m->vertex_count, m->face_count);
     for (size_t v = 0; v < m->vertex_count; ++v) {
-        print_floats(stream, m->positions + 3 * v, 3);
+        print_position(stream, m, v);
         if (m->normals) print_floats(stream, m->normals + 3 * v, 3);
         for (int k = 0; m->colors && k < 3; ++k) print_component(stream, m->colors[3 * v + k]);
         fprintf(stream, m->colors ? " 1.0\n" : "\n");
@@ -114,17 +135,24 @@ static void put_32(unsigned char *p, uint32_t x) {
 
 static void write_stl_facet(const fct_mesh *m, size_t f, bool ascii, FILE *stream) {
     float values[12];
+    bool origin = fct_mesh_has_origin(m); /* without one, -0 stays -0 */
     compute_facet_normal(m, f, values);
-    for (int c = 0; c < 3; ++c)
-        memcpy(values + 3 + 3 * c, m->positions + 3 * (size_t)m->triangles[3 * f + c], 3 * sizeof(float));
     if (ascii) {
-        fprintf(stream, "facet normal %.9g %.9g %.9g\nouter loop\n", (double)values[0], (double)values[1],
-                (double)values[2]);
-        for (int c = 1; c < 4; ++c)
-            fprintf(stream, "vertex %.9g %.9g %.9g\n", (double)values[3 * c], (double)values[3 * c + 1],
-                    (double)values[3 * c + 2]);
+        fputs("facet normal", stream);
+        print_floats(stream, values, 3);
+        fputs("\nouter loop\n", stream);
+        for (int c = 0; c < 3; ++c) {
+            fputs("vertex", stream);
+            print_position(stream, m, m->triangles[3 * f + c]);
+            fputc('\n', stream);
+        }
         fprintf(stream, "endloop\nendfacet\n");
         return;
+    }
+    for (size_t i = 0; i < 9; ++i) {
+        size_t place = 3 * (size_t)m->triangles[3 * f + i / 3] + i % 3;
+        float relative = m->positions[place];
+        values[3 + i] = origin ? (float)(m->origin[i % 3] + (double)relative) : relative;
     }
     unsigned char record[50] = {0};
     for (int k = 0; k < 12; ++k) {
@@ -140,6 +168,7 @@ fct_result fct_write_stl(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
     fct_note_left_out(sink, FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_FACE_COLORS |
                                 FCT_MESH_MATERIALS);
+    if (!sink->def->ascii) fct_warn_of_origin(sink);
     if (sink->def->ascii) {
         fprintf(stream, "solid facetree\n");
     } else {

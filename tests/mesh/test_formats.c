@@ -1,51 +1,6 @@
-/* tests/mesh/test_formats.c: OFF, GLB, OM: writing and reading back; refused files. */
+/* tests/mesh/test_formats.c: GLB, OM: writing and reading back; refused files. */
 #include "mesh/color.h"
 #include "mesh_support.h"
-
-static void reads_off(void **state) {
-    (void)state;
-    recorder r = {0};
-    fct_mesh m;
-    static const char text[] = "# a comment\nSTCNOFF # tail\n4 2 0\n"
-                               "0 0 0 0 0 1 1.0 0.5 0.25 1.0 .1 .2\n1 0 0 0 0 1 255 0 0 1 0\n"
-                               "# between\n1 1 0 0 0 1 0. 0. 2. 1 1\n0 1 0 0 0 1 0 0 0 0 1\n"
-                               "4 0 1 2 3 0 255 0\n3 0 1 1 # no colour\n";
-    assert_int_equal(parse_text(&r, "off", text, &m), FCT_OK);
-    assert_int_equal(m.vertex_count, 4);
-    assert_int_equal(m.face_count, 3);
-    assert_true(m.colors[1] == .5f && m.colors[3] == 1 && m.colors[8] == 2);
-    assert_true(m.normals[5] == 1 && m.texcoords[0] == .1f && m.texcoords[1] == .2f && m.texcoords[2] == 1);
-    assert_true(m.face_colors[1] == 1 && m.face_colors[3] == 0 && m.face_colors[6] == 1);
-    assert_int_equal(m.source_faces[2], 1);
-    release(&r, &m);
-    starve("off", text, sizeof text - 1);
-}
-
-static void refuses_off(void **state) {
-    (void)state;
-    static const char *const cases[][2] = {
-        {"", "the file is empty"},
-        {"ply\n", "name:1: expected OFF"},
-        {"4OFF\n1 0 0\n", "expected OFF"},
-        {"OFF BINARY\n", "binary OFF is not read"},
-        {"OFF\n1\n", "expected the number of faces"},
-        {"OFF\nx\n", "expected the number of vertices, found 'x'"},
-        {"OFF\n-1 0 0\n", "expected the number of vertices"},
-        {"OFF\n100000000 0 0\n0 0 0\n", "100000000 vertices and 0 faces are declared, but"},
-        {"OFF\n1 100000000 0\n0 0 0\n", "are declared, but"},
-        {"OFF\n1 1 0\n0 0 0\n3 0 0 1\n", "name:4: vertex index 1 is out of range, of 1"},
-        {"OFF\n1 1 0\n0 0 0\n3 0 0 -1\n", "vertex index -1 is out of range"},
-        {"OFF\n1 1 0\n0 0 0\n2 0 0 0 0 0\n", "at least 3 corners, not 2"},
-        {"OFF\n1 1 0\n0 0 0\n9999999 0 0 0\n", "no room"},
-        {"OFF\n1 1 0\n0 0 x\n3 0 0 0\n", "name:3: expected a coordinate, found 'x'"},
-        {"OFF\n1 1 0\n0 0 nan\n3 0 0 0\n", "name:3: expected a coordinate, found 'nan'"},
-        {"OFF\n1 1 0\n0 0\n3 0 0 0 0\n", "expected a coordinate, found the end of the line"},
-        {"COFF\n1 0 0\n0 0 0 256 0 0\n", "a colour component of 256"},
-        {"OFF\n1 0 0\n0 0 0\n1 1 1\n", "expected the end of the file, found '1'"},
-        {"OFF\n2 0 0\n0 0 0\n#######\n", "expected another vertex, found the end of the file"},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) refuse("off", cases[i][0], cases[i][1]);
-}
 
 /* One triangle at (0,0,0) (1,0,0) (0,1,0), indices as bytes, placed by two nodes, one of which mirrors. */
 #define GLB_JSON(nodes, attributes, accessor)                                                                \
@@ -268,8 +223,6 @@ static void om_survives_damage(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reads_off),
-        cmocka_unit_test(refuses_off),
         cmocka_unit_test(reads_glb),
         cmocka_unit_test(refuses_glb),
         cmocka_unit_test(everything_round_trips_through_ply),

@@ -165,14 +165,13 @@ static void refuses(void **state) {
     } cases[] = {
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "vertex index 3 is out of range, of 3 vertices"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n", "vertex index -1 is out of range"},
-        {"3", "1", "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "name:13: face 0: fewer than three corners"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
          "name:13: expected an integer in the range of its type, found the end"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 2\n", "name:13: expected the end of the line, found '2'"},
         {"3", "1", "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n", "name:11: expected a number, found 'zero'"},
-        {"3", "1", "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n", "name:11: expected a number, found 'nan'"},
-        {"3", "1", "0 0 0\n1e39 0 0\n0 1 0\n3 0 1 2\n",
-         "name:11: expected a number that fits a float, found '1e39'"},
+        {"3", "1", "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n", "name: vertex 1: its position is not finite (nan)"},
+        {"4", "1", "0 0 0\n1 0 0\n0 1 0\n0 0 nan\n3 0 1 2\n", "name: vertex 3: its position is not finite"},
+        {"3", "1", "0 0 0\n1e39 0 0\n0 1 0\n3 0 1 2\n", "name: vertex 1: its position is not finite (inf)"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", "found '1.5'"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n300 0 1 2\n", "found '300'"},
         {"3", "1", "0 0 0\n1 0 0\n0 1 0\n", "expected another record"},
@@ -219,6 +218,182 @@ static void refuses_binary_nan_and_lies(void **state) {
         static const char *messages[] = {"vertex 0: its position is not finite (nan)",
                                          "vertex 0: its position is not finite (inf)", "face 0"};
         refuse_bytes("ply", b.data, b.size, messages[i]);
+    }
+}
+
+/* Parses a text PLY with the header lines and the body. */
+static fct_result parse_ply(recorder *r, const char *header, const char *body, fct_mesh *m) {
+    char text[2048];
+    snprintf(text, sizeof text, "%s%send_header\n%s", head_ascii, header, body);
+    return parse_text(r, "ply", text, m);
+}
+
+static const char xyz[] = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+static const char corners[] = "element face 1\nproperty list uchar int vertex_indices\n";
+
+/* Line ends mean nothing where the records fit no other way. */
+static void reads_rows_over_lines(void **state) {
+    (void)state;
+    static const char *const bodies[] = {"0 0\n0\n1 0 0\n0 1 0\n3 0 1 2\n", "0 0 0 1 0 0 0 1 0 3 0 1 2",
+                                         "0\n0\n0\n\n1 0 0 0\n1 0 3\n0 1\n2\n"};
+    char header[512];
+    snprintf(header, sizeof header, "%s%s", xyz, corners);
+    for (int i = 0; i < 3; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        assert_int_equal(parse_ply(&r, header, bodies[i], &m), FCT_OK);
+        const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+        const uint32_t triangle[] = {0, 1, 2};
+        assert_memory_equal(m.positions, positions, sizeof positions);
+        assert_memory_equal(m.triangles, triangle, sizeof triangle);
+        release(&r, &m);
+        char text[1024];
+        snprintf(text, sizeof text, "%s%send_header\n%s", head_ascii, header, bodies[i]);
+        starve("ply", text, strlen(text));
+    }
+    /* A row that is longer than the header says stays an error of its line. */
+    char text[1024];
+    snprintf(text, sizeof text, "%s%send_header\n0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n", head_ascii, header);
+    refuse("ply", text, "name:10: expected the end of the line, found '9'");
+    snprintf(text, sizeof text, "%s%send_header\n0 0 0 1 0 0 0 1 0 3 0 1 3\n", head_ascii, header);
+    refuse("ply", text, "name:10: expected the end of the line, found '1'");
+}
+
+/* Faces of 0 to 2 corners give no triangle. The others keep their numbers and values. */
+static void leaves_out_small_faces(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    char header[512];
+    snprintf(header, sizeof header, "%s%s", xyz,
+             "element face 5\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+             "property uchar green\nproperty uchar blue\n");
+    assert_int_equal(parse_ply(&r, header,
+                               "0 0 0\n1 0 0\n0 1 0\n2 0 1 1 1 1\n3 0 1 2 255 0 0\n0 2 2 2\n1 7 3 3 3\n"
+                               "3 2 1 0 0 255 0\n",
+                               &m),
+                     FCT_OK);
+    assert_string_equal(r.text, "name: 3 faces with fewer than three corners are left out");
+    const uint32_t triangles[] = {0, 1, 2, 2, 1, 0}, sources[] = {1, 4};
+    const float colors[] = {1, 0, 0, 0, 1, 0};
+    assert_int_equal(m.face_count, 2);
+    assert_memory_equal(m.triangles, triangles, sizeof triangles);
+    assert_memory_equal(m.source_faces, sources, sizeof sources);
+    assert_memory_equal(m.face_colors, colors, sizeof colors);
+    release(&r, &m);
+}
+
+/* An attribute with a value that is no number is dropped as a whole. */
+static void drops_attributes_that_are_not_finite(void **state) {
+    (void)state;
+    static const struct {
+        const char *properties, *rows, *message;
+    } cases[] = {
+        {"property float nx\nproperty float ny\nproperty float nz\n",
+         "0 0 0 0 0 1\n1 0 0 -nan(ind) 0 1\n0 1 0 0 0 NaN\n",
+         "name: the normals are left out, because 2 of 3 are wrong (vertex 1 first)"},
+        {"property float s\nproperty float t\n", "0 0 0 0 0\n1 0 0 1 inf\n0 1 0 0 0\n",
+         "name: the texture coordinates are left out, because 1 of 3 are wrong (corner 1 first)"},
+        {"property float red\nproperty float green\nproperty float blue\n",
+         "0 0 0 0 0 0\n1 0 0 1 1 1\n0 1 0 1.#QNAN 0 0\n",
+         "name: the colours are left out, because 1 of 3 are wrong (vertex 2 first)"},
+        {"property int red\nproperty int green\nproperty int blue\n",
+         "0 0 0 0 0 0\n1 0 0 1 256 1\n0 1 0 0 0 -1\n",
+         "name: the colours are left out, because 2 of 3 are wrong (vertex 1 first)"},
+    };
+    for (int i = 0; i < 4; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        char header[512], body[512];
+        snprintf(header, sizeof header, "%s%s%s", xyz, cases[i].properties, corners);
+        snprintf(body, sizeof body, "%s3 0 1 2\n", cases[i].rows);
+        assert_int_equal(parse_ply(&r, header, body, &m), FCT_OK);
+        assert_string_equal(r.text, cases[i].message);
+        assert_null(m.normals);
+        assert_null(m.texcoords);
+        assert_null(m.colors);
+        release(&r, &m);
+    }
+}
+
+/* Every name of colours, of vertices and of faces. */
+static void reads_names_of_colors(void **state) {
+    (void)state;
+    static const char *const names[][4] = {{"r", "g", "b", "a"},
+                                           {"diffuse_r", "diffuse_g", "diffuse_b", "diffuse_a"},
+                                           {"diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"},
+                                           {"red", "green", "blue", "alpha"}};
+    for (int i = 0; i < 4; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        char header[1024], values[256] = "";
+        for (int k = 0; k < 4; ++k)
+            snprintf(values + strlen(values), sizeof values - strlen(values), "property uchar %s\n",
+                     names[i][k]);
+        snprintf(header, sizeof header, "%s%s%s%s", xyz, values, corners, values);
+        assert_int_equal(parse_ply(&r, header,
+                                   "0 0 0 255 0 0 9\n1 0 0 0 255 0 9\n0 1 0 0 0 255 9\n3 0 1 2 0 255 255 9\n",
+                                   &m),
+                         FCT_OK);
+        const float colors[] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, face[] = {0, 1, 1};
+        assert_memory_equal(m.colors, colors, sizeof colors);
+        assert_memory_equal(m.face_colors, face, sizeof face);
+        release(&r, &m);
+    }
+}
+
+/* One rule per file: floats up to 255 with one over 1 are sRGB; below, or over 255, they are linear. */
+static void float_colors_have_one_scale(void **state) {
+    (void)state;
+    static const struct {
+        const char *color;
+        double divisor;
+    } cases[] = {{"255 51 0", 255}, {"127.5 51 0", 255}, {"2 1 0", 255}, {"1 0.2 0", 0},
+                 {"1.5 0.2 0", 0},  {"300 51 0", 0},     {"51 -1 0", 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        recorder r = {0};
+        fct_mesh m;
+        char header[512], body[512];
+        snprintf(header, sizeof header, "%sproperty float red\nproperty float green\nproperty float blue\n",
+                 xyz);
+        snprintf(body, sizeof body, "0 0 0 0 0 0\n1 0 0 1 1 1\n0 1 0 %s\n", cases[i].color);
+        assert_int_equal(parse_ply(&r, header, body, &m), FCT_OK);
+        double c[3];
+        assert_int_equal(sscanf(cases[i].color, "%lf %lf %lf", c, c + 1, c + 2), 3);
+        for (int k = 0; k < 3; ++k) {
+            double s = c[k] / 255, linear = s <= .04045 ? s / 12.92 : pow((s + .055) / 1.055, 2.4);
+            assert_true(fabs((double)m.colors[6 + k] - (cases[i].divisor > 0 ? linear : c[k])) <
+                        1e-6 * fabs(c[k]) + 1e-7);
+        }
+        assert_true(cases[i].divisor > 0 ? m.colors[3] < .001f : m.colors[3] == 1);
+        assert_int_equal(strstr(r.text, "taken as 0 to 255") != NULL, cases[i].divisor > 0);
+        release(&r, &m);
+    }
+}
+
+/* Heads whose lines end with CR, CR LF or LF. The first byte of the body is a line end itself. */
+static void finds_the_body_behind_any_line_end(void **state) {
+    (void)state;
+    static const char *const ends[] = {"\n", "\r\n", "\r"};
+    static const char *const lines[] = {"ply",
+                                        "format binary_little_endian 1.0",
+                                        "comment an end_header of a comment",
+                                        "element vertex 1",
+                                        "property uchar x",
+                                        "property uchar y",
+                                        "property uchar z",
+                                        "end_header"};
+    for (int e = 0; e < 3; ++e) {
+        recorder r = {0};
+        fct_mesh m;
+        bytes b = {.size = 0};
+        for (size_t i = 0; i < sizeof lines / sizeof *lines; ++i)
+            put_text(&b, lines[i]), put_text(&b, ends[e]);
+        put_text(&b, "\n\r\n");
+        assert_int_equal(parse_bytes(&r, "ply", b.data, b.size, &m), FCT_OK);
+        assert_true(m.positions[0] == 10 && m.positions[1] == 13 && m.positions[2] == 10);
+        assert_string_equal(r.text, "");
+        release(&r, &m);
     }
 }
 
@@ -275,6 +450,12 @@ int main(void) {
         cmocka_unit_test(keeps_degenerate_faces),
         cmocka_unit_test(refuses),
         cmocka_unit_test(refuses_binary_nan_and_lies),
+        cmocka_unit_test(reads_rows_over_lines),
+        cmocka_unit_test(leaves_out_small_faces),
+        cmocka_unit_test(drops_attributes_that_are_not_finite),
+        cmocka_unit_test(reads_names_of_colors),
+        cmocka_unit_test(float_colors_have_one_scale),
+        cmocka_unit_test(finds_the_body_behind_any_line_end),
         cmocka_unit_test(lies_cost_no_memory),
         cmocka_unit_test(a_mesh_without_faces_is_valid),
         cmocka_unit_test(keeps_extreme_extents),
