@@ -42,6 +42,12 @@ typedef struct fct_soup {
     char **material_names; /* material_count strings, or NULL */
 } fct_soup;
 
+/* Stores a point relative to the origin, and adds it to the extent. */
+static inline void fct_soup_place(fct_soup *soup, const double point[3], float *position) {
+    for (int k = 0; k < 3; ++k) position[k] = (float)(point[k] - soup->origin[k]);
+    fct_extent_add(&soup->extent, point);
+}
+
 void fct_soup_release(const fct_env *env, fct_soup *soup);
 
 /* Checks indices and floats, triangulates and moves. The soup is empty afterwards, whatever the result. A

@@ -67,13 +67,14 @@ static void count_statements(fct_text t, counts *c) {
 
 static fct_result read_vertex(reader *r) {
     fct_text *t = &r->t;
-    double more[4];
+    double point[3], more[4];
     size_t v = r->seen.vertices++, count = 0;
     fct_result result = FCT_OK;
     for (size_t k = 0; result == FCT_OK && k < 3; ++k) {
         fct_obj_skip_blanks(t);
-        result = fct_text_float(t, "a number", r->soup->positions + 3 * v + k);
+        result = fct_text_coordinate(t, "a number", point + k);
     }
+    if (result == FCT_OK) fct_soup_place(r->soup, point, r->soup->positions + 3 * v);
     while (result == FCT_OK && count < 4 && !fct_obj_at_line_end(t))
         result = fct_text_any_double(t, "a number", more + count++);
     if (result == FCT_OK && count == 2) return fct_text_fail(t, "a vertex has 3, 4, 6 or 7 numbers, not 5");

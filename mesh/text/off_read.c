@@ -144,15 +144,10 @@ static fct_result read_position(reader *r, float *position) {
     double point[3];
     for (int k = 0; k < 3; ++k) {
         skip_to_value(r);
-        const char *begin = r->t.p;
-        bool read = fct_text_double(&r->t, point + k);
-        if (!read || !isfinite((float)point[k])) {
-            r->t.p = begin;
-            return fct_text_expected(&r->t, read ? "a number that fits a float" : "a coordinate");
-        }
-        position[k] = (float)(point[k] - soup->origin[k]);
+        fct_result result = fct_text_coordinate(&r->t, "a coordinate", point + k);
+        if (result != FCT_OK) return result;
     }
-    fct_extent_add(&soup->extent, point);
+    fct_soup_place(soup, point, position);
     return FCT_OK;
 }
 
@@ -256,6 +251,7 @@ static fct_result read_face(reader *r, uint32_t face) {
     if (count > (t->end - t->p) / 2 + 1 || soup->corner_count + (size_t)count > UINT32_MAX)
         return fct_text_fail(t, "a face of %lld corners on a line that has no room for them",
                              (long long)count);
+    if (count < 3 && r->face_values) return FCT_ERROR_DATA; /* a colour without a face is no fit */
     fct_result result = read_indices(r, count);
     if (result != FCT_OK) return result;
     soup->starts[face + 1] = (uint32_t)soup->corner_count;

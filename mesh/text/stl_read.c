@@ -182,7 +182,7 @@ static fct_result expect_word(fct_text *t, const char *expected) {
 
 /* Reads what follows the word `facet`. */
 static fct_result read_facet(fct_text *t, welder *w) {
-    double ignored;
+    double ignored, point[3];
     float p[3];
     fct_result result = expect_word(t, "normal");
     for (int k = 0; result == FCT_OK && k < 3; ++k) { /* because some programs write nan here */
@@ -193,8 +193,11 @@ static fct_result read_facet(fct_text *t, welder *w) {
     if (result == FCT_OK) result = expect_word(t, "loop");
     for (int c = 0; result == FCT_OK && c < 3; ++c) {
         result = expect_word(t, "vertex");
-        for (int k = 0; result == FCT_OK && k < 3; ++k) result = fct_text_float(t, "a coordinate", p + k);
-        if (result == FCT_OK) result = add_corner(w, p);
+        for (int k = 0; result == FCT_OK && k < 3; ++k)
+            result = fct_text_coordinate(t, "a coordinate", point + k);
+        if (result != FCT_OK) break;
+        fct_soup_place(w->soup, point, p);
+        result = add_corner(w, p);
     }
     if (result == FCT_OK) result = expect_word(t, "endloop");
     if (result == FCT_OK) result = expect_word(t, "endfacet");

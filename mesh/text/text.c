@@ -153,14 +153,19 @@ bool fct_text_integer(fct_text *t, int64_t *value) {
     return true;
 }
 
-fct_result fct_text_float(fct_text *t, const char *what, float *value) {
-    double number;
+fct_result fct_text_coordinate(fct_text *t, const char *what, double *value) {
     const char *begin = t->p;
-    if (!fct_text_double(t, &number)) return fct_text_expected(t, what);
-    *value = (float)number;
-    if (isfinite(*value)) return FCT_OK;
+    if (!fct_text_double(t, value)) return fct_text_expected(t, what);
+    if (isfinite((float)*value)) return FCT_OK;
     t->p = begin;
     return fct_text_expected(t, "a number that fits a float");
+}
+
+fct_result fct_text_float(fct_text *t, const char *what, float *value) {
+    double number = 0;
+    fct_result result = fct_text_coordinate(t, what, &number);
+    *value = (float)number;
+    return result;
 }
 
 fct_result fct_text_any_double(fct_text *t, const char *what, double *value) {

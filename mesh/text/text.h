@@ -63,6 +63,8 @@ bool fct_text_integer(fct_text *t, int64_t *value);
 /* Reads a finite number that fits a float. `what` names it in messages. Errors: DATA, with the line and the
  * word found. */
 fct_result fct_text_float(fct_text *t, const char *what, float *value);
+/* The same, with the digits of a double. */
+fct_result fct_text_coordinate(fct_text *t, const char *what, double *value);
 
 /* Reads a number that may be infinite or no number: "nan", "inf" or "1.#IND" in any case, with a sign or
  * letters behind. *value is then not finite. Errors: DATA, as fct_text_float. */

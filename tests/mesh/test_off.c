@@ -46,7 +46,7 @@ static void refuses_off(void **state) {
         {"OFF8\n", "expected the number of faces, found the end"},
         {"OFFX 1 0 0\n0 0 0\n", "name:1: expected OFF"},
         {"COFF\n1 0 0\n0 0 0 17 -1 0\n", "a colour component of -1 at a vertex, expected 0 to 1 or 0 to 255"},
-        {"OFF\n2 0 0\n0 0 0\n1 1\n", "name:4: expected a coordinate, found the end of the line"},
+        {"OFF\n2 0 0\n0 0 0\n1 1     \n", "name:4: expected a coordinate, found the end of the line"},
         {"OFF\n1 1 0\n0 0 0\n9999999 0 0 0\n", "no room"},
         {"OFF\n1 1 0\n0 0 x\n3 0 0 0\n", "name:3: expected a coordinate, found 'x'"},
         {"OFF\n1 1 0\n0 0 nan\n3 0 0 0\n", "name:3: expected a coordinate, found 'nan'"},
@@ -94,7 +94,8 @@ static void reads_free_format(void **state) {
             snprintf(text, sizeof text, "%s%s", heads[h], bodies[b]);
             assert_tetrahedron(text);
         }
-    starve("off", "OFF4 4\n6 " TETRAHEDRON "3 0 2 1 3 0 1 3 3 1 2 3 3 2 0 3", 60);
+    static const char text[] = "OFF4 4 6 " TETRAHEDRON "3 0 2 1 3 0 1 3 3 1 2 3 3 2 0 3";
+    starve("off", text, sizeof text - 1);
 }
 
 /* Values behind the indices are a colour in free format too. */
@@ -131,6 +132,13 @@ static void reads_vertex_values_without_a_prefix(void **state) {
     const float normals[] = {0, 0, -1, 0, 0, 1, 0, 1, 0};
     assert_memory_equal(m.normals, normals, sizeof normals);
     assert_null(m.colors);
+    release(&r, &m);
+    assert_int_equal(
+        parse_text(&r, "off",
+                   "STOFF\n3 1 0\n0 0 0 255 0 0 .5 1\n1 0 0 0 255 0 0 0\n0 1 0 0 0 255 1 1\n3 0 1 2\n", &m),
+        FCT_OK);
+    assert_memory_equal(m.colors, colors, sizeof colors);
+    assert_true(m.texcoords[0] == .5f && m.texcoords[1] == 1);
     release(&r, &m);
 }
 
