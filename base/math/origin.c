@@ -63,12 +63,12 @@ static double find_step(double side) {
 
 bool fct_extent_origin(const fct_extent *e, double origin[3]) {
     double side = longest_side(e);
-    bool far = e->fine && largest_coordinate(e) > FAR * side;
+    bool far = e->fine && side > 0 && largest_coordinate(e) > FAR * side;
     for (int k = 0; k < 3; ++k) {
         double centre = .5 * e->lower[k] + .5 * e->upper[k];
         origin[k] = far ? centre : 0;
         /* Beyond 2^52 steps the centre is a multiple already. */
-        double steps = side > 0 ? centre / find_step(side) : INFINITY;
+        double steps = far ? centre / find_step(side) : 0;
         if (far && fabs(steps) < 4503599627370496.0) origin[k] = rint(steps) * find_step(side);
     }
     return far;

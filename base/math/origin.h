@@ -1,7 +1,7 @@
 /* base/math/origin.h: a local origin for coordinates that lose digits when they become floats.
  *
  * An fct_extent collects points of double coordinates. It asks for a local origin if both hold:
- *   - The largest coordinate is over 64 times the longest side of the bounding box.
+ *   - The largest coordinate is over 64 times the longest side of the bounding box, which is not 0.
  *   - A coordinate has more digits than a float. A float that was printed with 9 digits has no more.
  * The answer depends on the set of the points, not on their order. Adding stops, at the cost of one branch
  * per point, when no further point can make the first condition true.
