@@ -13,6 +13,7 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
 
 /* Reverses the winding of every face. */
 void fct_mesh_turn_over(fct_mesh *mesh);
+
 static inline bool fct_mesh_has_origin(const fct_mesh *mesh) {
     return mesh->origin[0] != 0 || mesh->origin[1] != 0 || mesh->origin[2] != 0;
 }
