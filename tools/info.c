@@ -165,7 +165,11 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     set_count(object, "emitting_instances", emitters);
     set_count(object, "light_groups", view.light_group_count);
     json_object_set_new(object, "camera", json_boolean(view.camera.given));
-    set_bounds(object, &view.bounds);
+    double lower[3], upper[3];
+    fct_bounds bounds;
+    fct_scene_bounds(scene, lower, upper);
+    for (int c = 0; c < 3; ++c) bounds.lower[c] = (float)lower[c], bounds.upper[c] = (float)upper[c];
+    set_bounds(object, &bounds);
     fct_scene_destroy(scene);
     return TOOL_DONE;
 }

@@ -68,7 +68,7 @@ typedef struct fct_scene_view {
     const fct_instance *instances;
     const fct_volume *volumes;
     const char *const *light_groups;
-    fct_bounds bounds;
+    fct_bounds bounds; /* of the instances' bounds, which may be larger than the instances */
     fct_camera camera;
     uint64_t face_count; /* over all instances */
 } fct_scene_view;
@@ -131,6 +131,9 @@ typedef struct fct_scene_hit {
      * transform. */
     float normal[3];
 } fct_scene_hit;
+
+/* The bounds of all vertices in the world, exact up to the rounding of doubles; view.bounds may be larger. */
+FCT_API void fct_scene_bounds(const fct_scene *scene, double lower[3], double upper[3]);
 
 /* Rays in the world; t is in units of the given direction. Equal t: the lower instance. hit->instance and
  * hit->face are FCT_NONE on a miss. visits may be NULL. */

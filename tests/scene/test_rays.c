@@ -375,6 +375,29 @@ static void volumes_hold_every_instance_once(void **unused) {
         }
 }
 
+/* Bounds against all transformed vertices, on transforms of every kind. */
+static void bounds_are_exact(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_scene *scene = make_scene(&env, FCT_BACKEND_OBB);
+    fct_scene_view view = fct_scene_get(scene);
+    double lower[3], upper[3], low[3] = {INFINITY, INFINITY, INFINITY},
+                               high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t i = 0; i < view.instance_count; ++i)
+        for (uint32_t f = 0; f < face_count(&view, i); ++f)
+            for (int k = 0; k < 3; ++k) {
+                v3 p = corner(&view, i, f, k);
+                const double x[3] = {p.x, p.y, p.z};
+                for (int c = 0; c < 3; ++c) low[c] = fmin(low[c], x[c]), high[c] = fmax(high[c], x[c]);
+            }
+    fct_scene_bounds(scene, lower, upper);
+    for (int c = 0; c < 3; ++c) {
+        assert_true(fabs(lower[c] - low[c]) < 1e-12 && fabs(upper[c] - high[c]) < 1e-12);
+        assert_true((double)view.bounds.lower[c] <= low[c] && (double)view.bounds.upper[c] >= high[c]);
+    }
+    fct_scene_destroy(scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_agree_with_brute_force),
@@ -384,6 +407,7 @@ int main(void) {
         cmocka_unit_test(closest_points_agree_with_brute_force),
         cmocka_unit_test(instances_say_what_their_transforms_do),
         cmocka_unit_test(volumes_hold_every_instance_once),
+        cmocka_unit_test(bounds_are_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
