@@ -287,6 +287,7 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
         sides[0] = (fct_mesh){0};
     }
     for (int k = 0; k < 2; ++k) fct_mesh_release(env, &sides[k]);
+    memcpy(out->origin, bake->solution.elements.view.origin, sizeof out->origin);
     bake->stats.seconds_push += fct_seconds() - start;
     bake->stats.vertices += out->vertex_count;
     bake->stats.faces += out->face_count;
@@ -305,6 +306,7 @@ fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
         if (face_counts) face_counts[i] = parts[i].face_count;
     }
     if (result == FCT_OK) result = join_meshes(env, parts, count, FCT_MESH_COLORS, out);
+    memcpy(out->origin, bake->solution.elements.view.origin, sizeof out->origin);
     for (uint32_t i = 0; i < count; ++i) fct_mesh_release(env, &parts[i]);
     fct_release(env, parts);
     return result;

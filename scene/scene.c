@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/math/elementary.h"
+#include "base/math/origin.h"
 #include "base/math/round.h"
 #include "scene/transform.h"
 
@@ -90,6 +91,44 @@ fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_
     return FCT_OK;
 }
 
+/* ---- Local origins ---- */
+
+/* Coordinates so many times larger than their bounding box have few digits left, and get a local origin. */
+#define FAR_AWAY 512
+
+static void choose_origin(const double lower[3], const double upper[3], double origin[3]) {
+    fct_extent extent = {.any = true, .fine = true};
+    double largest = 0, side = 0;
+    for (int c = 0; c < 3; ++c) {
+        extent.lower[c] = lower[c], extent.upper[c] = upper[c], origin[c] = 0;
+        largest = fmax(largest, fmax(fabs(lower[c]), fabs(upper[c])));
+        side = fmax(side, upper[c] - lower[c]);
+    }
+    if (largest > FAR_AWAY * side) fct_extent_origin(&extent, origin);
+}
+
+/* Moves a mesh to a local origin if it is far from its own one. *moved: its positions are a copy, which the
+ * caller releases. Errors: MEMORY. */
+static fct_result center_mesh(const fct_env *env, fct_mesh *mesh, double origin[3], bool *moved) {
+    double lower[3], upper[3], away[3];
+    size_t count = 3 * (size_t)mesh->vertex_count;
+    for (int c = 0; c < 3; ++c) lower[c] = INFINITY, upper[c] = -INFINITY, origin[c] = mesh->origin[c];
+    for (size_t i = 0; i < count; ++i) {
+        double x = mesh->positions[i];
+        lower[i % 3] = x < lower[i % 3] ? x : lower[i % 3],
+                  upper[i % 3] = x > upper[i % 3] ? x : upper[i % 3];
+    }
+    choose_origin(lower, upper, away);
+    *moved = away[0] != 0 || away[1] != 0 || away[2] != 0;
+    if (!*moved) return FCT_OK;
+    float *positions = fct_allocate(env, count, sizeof *positions);
+    if (!positions) return fct_fail_memory(env, "a model");
+    for (size_t i = 0; i < count; ++i) positions[i] = (float)(mesh->positions[i] - away[i % 3]);
+    for (int c = 0; c < 3; ++c) origin[c] += away[c];
+    mesh->positions = positions;
+    return FCT_OK;
+}
+
 /* ---- Models ---- */
 
 /* A tree with more roots is built again from its mesh: opening a model opens all its roots, and the links
@@ -136,7 +175,10 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     fct_mesh plain = faces ? part : *mesh;
     plain.materials = NULL, plain.material_names = NULL, plain.material_count = 0;
     fct_tree_def def = fct_tree_def_default();
+    bool moved = false;
+    if (result == FCT_OK) result = center_mesh(env, &plain, own.origin, &moved);
     if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
+    if (moved) fct_release(env, plain.positions);
     if (faces) fct_mesh_release(env, &part);
     if (result != FCT_OK) {
         release_model(env, &own);
@@ -281,6 +323,10 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
         instance.material = materials[k];
         const fct_material *m = scene->materials + materials[k];
         frame.emits = emits_light(m);
+        const double *o = scene->own[first + k].origin;
+        for (int c = 0; c < 3; ++c)
+            frame.at[c] = (double)instance.to_world[4 * c + 3] + instance.to_world[4 * c] * o[0] +
+                          instance.to_world[4 * c + 1] * o[1] + instance.to_world[4 * c + 2] * o[2];
         frame.two_sided = m->two_sided;
         scene->instances[scene->instance_count] = instance;
         scene->frames[scene->instance_count++] = frame;
@@ -355,6 +401,37 @@ static fct_result build_ray_structures(fct_scene *scene) {
     return FCT_OK;
 }
 
+/* Chooses the scene's origin and makes transforms and camera relative to it. */
+static fct_result move_to_origin(fct_scene *scene) {
+    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t i = 0; i < scene->instance_count; ++i) {
+        const float *m = scene->instances[i].to_world;
+        fct_bounds b = fct_bvh_bounds(scene->own[scene->instances[i].model].bvh);
+        for (int c = 0; c < 3; ++c) {
+            double middle = scene->frames[i].at[c], half = 0;
+            for (int k = 0; k < 3; ++k) {
+                middle += (double)m[4 * c + k] * (.5 * ((double)b.lower[k] + b.upper[k]));
+                half += fabs((double)m[4 * c + k]) * (.5 * ((double)b.upper[k] - b.lower[k]));
+            }
+            lower[c] = fmin(lower[c], middle - half), upper[c] = fmax(upper[c], middle + half);
+        }
+    }
+    choose_origin(lower, upper, scene->origin);
+    for (uint32_t i = 0; i < scene->instance_count; ++i) {
+        float m[12];
+        memcpy(m, scene->instances[i].to_world, sizeof m);
+        for (int c = 0; c < 3; ++c) m[4 * c + 3] = (float)(scene->frames[i].at[c] - scene->origin[c]);
+        fct_result result = set_instance_transform(scene->env, scene->instances[i].name, m,
+                                                   &scene->instances[i], &scene->frames[i]);
+        if (result != FCT_OK) return result;
+    }
+    for (int c = 0; c < 3; ++c) {
+        scene->camera.position[c] = (float)(scene->camera.position[c] - scene->origin[c]);
+        scene->camera.target[c] = (float)(scene->camera.target[c] - scene->origin[c]);
+    }
+    return FCT_OK;
+}
+
 static fct_result bound_instances(fct_scene *scene, fct_bounds *bounds) {
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         fct_instance *instance = scene->instances + i;
@@ -412,6 +489,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
     if (scene->instance_count == 0) return fct_fail(env, FCT_ERROR_DATA, "the scene has no instances");
     fct_result result = check_light_groups(scene);
     if (result == FCT_OK) result = build_ray_structures(scene);
+    if (result == FCT_OK) result = move_to_origin(scene);
     if (result != FCT_OK) return result;
     fct_bounds *bounds = fct_allocate(env, scene->instance_count, sizeof *bounds);
     scene->volumes = fct_allocate(env, 2 * (size_t)scene->instance_count - 1, sizeof *scene->volumes);
@@ -433,7 +511,9 @@ fct_result fct_scene_commit(fct_scene *scene) {
 }
 
 fct_scene_view fct_scene_get(const fct_scene *scene) {
-    return (fct_scene_view){.material_count = scene->material_count,
+    const double *origin = scene->origin;
+    return (fct_scene_view){.origin = {origin[0], origin[1], origin[2]},
+                            .material_count = scene->material_count,
                             .model_count = scene->model_count,
                             .instance_count = scene->instance_count,
                             .volume_count = scene->committed ? 2 * scene->instance_count - 1 : 0,

@@ -19,6 +19,7 @@ typedef struct fct_scene_frame {
     bool emits, two_sided; /* of the material */
     const fct_bvh *bvh;
     double shrink; /* world distance >= shrink * model distance */
+    double at[3];  /* the model's local origin in the file's coordinates */
 } fct_scene_frame;
 
 typedef struct fct_scene_model {
@@ -26,6 +27,7 @@ typedef struct fct_scene_model {
     fct_bvh *bvh;
     fct_bvh *points; /* answers closest points if bvh cannot (Embree), else NULL */
     uint32_t *source_faces, *source_vertices;
+    double origin[3]; /* the tree's positions are relative to it */
 } fct_scene_model;
 
 /* Instances [first, first + count) are the parts of one object. */
@@ -54,6 +56,7 @@ struct fct_scene {
     fct_bounds bounds;
     fct_camera camera;
     uint64_t face_count;
+    double origin[3];
 };
 
 /* Models [first, first + count) of one mesh, one per label, in ascending order of the labels. */

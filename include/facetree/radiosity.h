@@ -67,11 +67,12 @@ FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, c
 FCT_API void fct_bake_destroy(fct_bake *bake);
 FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
 
-/* The lit mesh of one instance in world space; colours are radiosity per vertex. Large flat triangles are
- * tessellated, and vertices on creases are doubled; source_faces gives the face of the mesh as it was added.
- * A two-sided instance has each of its sides that is lit, with its own vertices and wound so that this side
- * is in front: first the side with more radiosity, then the other one unless it has less than 1e-4 of that.
- * The caller releases *out with fct_mesh_release. Errors: MEMORY, CANCELLED; *out is empty then. */
+/* The lit mesh of one instance in world space, with the scene's origin; colours are radiosity per vertex.
+ * Large flat triangles are tessellated, and vertices on creases are doubled; source_faces gives the face of
+ * the mesh as it was added. A two-sided instance has each of its sides that is lit, with its own vertices and
+ * wound so that this side is in front: first the side with more radiosity, then the other one unless it has
+ * less than 1e-4 of that. The caller releases *out with fct_mesh_release. Errors: MEMORY, CANCELLED; *out is
+ * empty then. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
 /* All instances in one mesh, in their order. face_counts (may be NULL) receives the number of faces of each
  * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */

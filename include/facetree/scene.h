@@ -1,6 +1,10 @@
 /* facetree/scene.h: instances of models in a world, their materials and light groups, queries on all of them,
  * and a volume hierarchy over their boxes. docs/scene.md is the guide.
  *
+ * World coordinates of a committed scene are relative to fct_scene_view.origin. It is 0 unless the scene lies
+ * more than 512 times its size away from the origin of its files, where floats have few digits left: then it
+ * is near the scene, and rays, points, bounds, transforms and the camera are relative to it.
+ *
  * Lengths have the unit of the scene file. Emission is radiant exitance (power that leaves per area), linear
  * RGB.
  */
@@ -71,6 +75,7 @@ typedef struct fct_scene_view {
     fct_bounds bounds; /* of the instances' bounds, which may be larger than the instances */
     fct_camera camera;
     uint64_t face_count; /* over all instances */
+    double origin[3];    /* in the coordinates of the files: theirs are origin + world */
 } fct_scene_view;
 
 /* An empty scene. `backend` answers its rays. Errors: MEMORY. */

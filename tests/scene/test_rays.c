@@ -398,6 +398,56 @@ static void bounds_are_exact(void **unused) {
     fct_scene_destroy(scene);
 }
 
+/* A square at (4194304, 0, -2097152), placed by its vertices, by a transform, or by the mesh's own origin:
+ * the scene gets an origin near it, and hits are exact there. */
+static void far_scenes_have_an_origin(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    const double far[3] = {4194304, 0, -2097152};
+    for (int way = 0; way < 3; ++way) {
+        fct_scene *scene;
+        fct_material material = {.name = "m", .reflectance = {.5f, .5f, .5f}};
+        uint32_t id;
+        assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+        assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+        fct_mesh mesh = make_grid(&env, 4); /* the unit square at z = 0 */
+        float transform[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
+        for (size_t k = 0; k < 3 * (size_t)mesh.vertex_count && way == 0; ++k)
+            mesh.positions[k] += (float)(.5 * far[k % 3]);
+        for (int c = 0; c < 3; ++c) {
+            if (way == 1) transform[4 * c + 3] = (float)far[c];
+            if (way == 2) mesh.origin[c] = .5 * far[c];
+        }
+        assert_int_equal(fct_scene_add_object(scene, "far", &mesh, NULL, transform, id, NULL), FCT_OK);
+        fct_mesh_release(&env, &mesh);
+        fct_camera camera = {
+            .position = {4194306, 1, -2097142}, .target = {4194305, 1, -2097152}, .up = {0, 1, 0}};
+        fct_scene_set_camera(scene, &camera);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_scene_view view = fct_scene_get(scene);
+        double lower[3], upper[3];
+        fct_scene_bounds(scene, lower, upper);
+        fct_ray ray = {.direction = {0, 0, -1}, .t_max = INFINITY};
+        for (int c = 0; c < 3; ++c) {
+            assert_true(fabs(view.origin[c] - far[c]) <= 4);
+            assert_true(lower[c] + view.origin[c] == far[c]);
+            assert_true(upper[c] + view.origin[c] == far[c] + (c == 2 ? 0 : 2));
+            assert_true(view.camera.position[c] + view.origin[c] == camera.position[c]);
+            ray.origin[c] = (float)(far[c] + (c == 2 ? 1.0625 : .7001) - view.origin[c]);
+        }
+        fct_scene_hit hit;
+        assert_true(fct_scene_closest_hit(scene, &ray, &hit, NULL));
+        assert_true(hit.t == 1.0625f && hit.normal[2] == 1);
+        v3 p = {0, 0, 0};
+        for (int k = 0; k < 3; ++k) {
+            const double weights[3] = {1 - (double)hit.u - hit.v, hit.u, hit.v};
+            p = v3_mad(p, weights[k], corner(&view, hit.instance, hit.place, k));
+        }
+        assert_true(fabs(p.x - ray.origin[0]) < 1e-6 && fabs(p.y - ray.origin[1]) < 1e-6);
+        fct_scene_destroy(scene);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_agree_with_brute_force),
@@ -408,6 +458,7 @@ int main(void) {
         cmocka_unit_test(instances_say_what_their_transforms_do),
         cmocka_unit_test(volumes_hold_every_instance_once),
         cmocka_unit_test(bounds_are_exact),
+        cmocka_unit_test(far_scenes_have_an_origin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,6 +52,7 @@ static int append_part(tool *t, fct_mesh *all, const fct_mesh *part) {
                                               all->face_count + part->face_count,
                                               FCT_MESH_COLORS | (normals ? FCT_MESH_NORMALS : 0), &sum));
     if (code != TOOL_DONE) return code;
+    memcpy(sum.origin, part->origin, sizeof sum.origin);
     const fct_mesh *parts[2] = {all, part};
     size_t vertex = 0, corner = 0;
     for (int p = 0; p < 2; ++p) {
