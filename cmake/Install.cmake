@@ -1,4 +1,4 @@
-# `cmake --install` installs the library, headers, program, man pages and documents. Other projects find them as the CMake
+# `cmake --install` installs the library, headers, program, man pages, completions and documents. Other projects find them as the CMake
 # package facetree (target facetree::facetree) or as facetree of pkg-config.
 include(CMakePackageConfigHelpers)
 
@@ -15,6 +15,10 @@ if(TARGET facetree_program)
     file(RELATIVE_PATH from_program ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
     set_target_properties(facetree_program PROPERTIES INSTALL_RPATH "$ORIGIN/${from_program}")
     install(TARGETS facetree_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+    install(FILES ${PROJECT_BINARY_DIR}/completion/bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+        RENAME facetree)
+    install(FILES ${PROJECT_BINARY_DIR}/completion/zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions
+        RENAME _facetree)
     install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR} FILES_MATCHING PATTERN "*.1")
 endif()
 

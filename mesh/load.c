@@ -113,7 +113,7 @@ fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data
 fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out) {
     *out = (fct_mesh){0};
     bool standard = !strcmp(path, "-");
-    const char *dot = strrchr(path, '.'), *ending = standard ? "ply" : dot ? dot + 1 : "";
+    const char *ending = fct_file_format(env, path);
     if (!find_format(ending)) return fail_format(env, path);
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);

@@ -160,6 +160,8 @@ int tool_boxes(int argc, char **argv) {
                 "JSON keys: clusters, boxes[]{center, axes (three unit vectors), half_extents, plane (n, d "
                 "with n.x + d = 0), "
                 "area (of the surface inside), faces}.",
+        .examples = "  facetree boxes bunny.fct -k 200 -o boxes.json\n"
+                    "  facetree boxes bunny.obj --max-distance 1% -o boxes.ply",
         .options = box_options_table,
         .parse = parse_boxes,
         .run = run_boxes,

@@ -92,7 +92,7 @@ static int run_closest(tool *t, void *options) {
     if (!o->points) return tool_fail(t, TOOL_USAGE, "expected --points FILE");
     if (!strcmp(o->points, "-") && !strcmp(t->inputs[0], "-"))
         return tool_fail(t, TOOL_USAGE, "the mesh and the points cannot both come from standard input");
-    bool scene = tool_is_scene_name(t->inputs[0]);
+    bool scene = tool_is_scene(t, t->inputs[0]);
     tool_rows points;
     size_t hits = 0;
     int code = tool_rows_read(t, o->points, 3, 3, NULL, &points);
@@ -125,6 +125,8 @@ int tool_closest(int argc, char **argv) {
                 "standard output; with "
                 "--json the answers are only counted.\n\n"
                 "JSON keys: points, found, seconds (including the opening or building of the hierarchy).",
+        .examples = "  facetree closest bunny.fct --points points.txt -o nearest.txt\n"
+                    "  echo 0 0 1 | facetree closest bunny.obj --points -",
         .options = closest_options_table,
         .parse = parse_closest,
         .run = run_closest,

@@ -5,28 +5,50 @@
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
 
-enum { KEY_SAMPLES = TOOL_KEY };
+enum { KEY_SAMPLES = TOOL_KEY, KEY_BUDGET };
+
+typedef struct compare_options {
+    uint32_t samples; /* per face; UINT32_MAX: from the budget */
+    uint64_t budget;  /* samples over all faces */
+} compare_options;
+
+enum { USUAL_SAMPLES = 100 }; /* per face, as in Garland's dissertation */
 
 static const struct argp_option compare_options_table[] = {
-    {"samples", KEY_SAMPLES, "N", 0, "Random samples per face, in addition to the vertices (default 100)", 0},
+    {"samples", KEY_SAMPLES, "N", 0,
+     "Random samples per face, in addition to the vertices (default: 100, or fewer to keep the budget)", 0},
+    {"budget", KEY_BUDGET, "N", 0,
+     "Without --samples: at most N random samples over both meshes, but at least one per face (default "
+     "4000000)",
+     0},
     {0}};
 
 static error_t parse_compare(int key, char *text, struct argp_state *state) {
-    if (key != KEY_SAMPLES) return ARGP_ERR_UNKNOWN;
-    return tool_parse_count32(state, "--samples", text, 0, 1000000, state->input);
+    compare_options *o = state->input;
+    if (key == KEY_SAMPLES) return tool_parse_count32(state, "--samples", text, 0, 1000000, &o->samples);
+    if (key == KEY_BUDGET) return tool_parse_count(state, "--budget", text, 1, UINT64_MAX, &o->budget);
+    return ARGP_ERR_UNKNOWN;
 }
 
-static json_t *report_error(const fct_mesh_error *e, double seconds) {
+static uint32_t choose_samples(const compare_options *o, const fct_tree *a, const fct_tree *b) {
+    uint64_t faces = (uint64_t)fct_tree_get(a).face_count + fct_tree_get(b).face_count;
+    uint64_t each = o->budget / (faces ? faces : 1);
+    if (o->samples != UINT32_MAX) return o->samples;
+    return each < 1 ? 1 : each < USUAL_SAMPLES ? (uint32_t)each : USUAL_SAMPLES;
+}
+
+static json_t *report_error(const fct_mesh_error *e, uint32_t samples, double seconds) {
     double d = e->diameter > 0 ? e->diameter : 1;
-    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:f}", "e_avg",
+    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:f}", "e_avg",
                      e->e_avg, "e_max", e->e_max, "e_avg_ab", e->e_avg_ab, "e_avg_ba", e->e_avg_ba,
                      "e_max_ab", e->e_max_ab, "e_max_ba", e->e_max_ba, "e_avg_relative", e->e_avg / (d * d),
                      "e_max_relative", e->e_max / d, "diameter", e->diameter, "color_rms", e->color_rms,
                      "color_max", e->color_max, "color_rms_relative", e->color_rms_relative, "samples",
-                     (json_int_t)e->samples, "seconds", seconds);
+                     (json_int_t)e->samples, "samples_per_face", (json_int_t)samples, "seconds", seconds);
 }
 
 static int run_compare(tool *t, void *options) {
+    uint32_t samples = 0;
     fct_tree *trees[2] = {NULL, NULL};
     fct_bvh *bvhs[2] = {NULL, NULL};
     fct_mesh_error error;
@@ -37,10 +59,11 @@ static int run_compare(tool *t, void *options) {
             code = tool_result(t, fct_bvh_create(&t->env, trees[i], FCT_BACKEND_OBB, &bvhs[i]));
     }
     double start = tool_seconds();
-    if (code == TOOL_DONE)
-        code = tool_result(
-            t, fct_mesh_compare(&t->env, bvhs[0], bvhs[1], *(uint32_t *)options, t->seed, &error));
-    if (code == TOOL_DONE) code = tool_print(t, report_error(&error, tool_seconds() - start));
+    if (code == TOOL_DONE) {
+        samples = choose_samples(options, trees[0], trees[1]);
+        code = tool_result(t, fct_mesh_compare(&t->env, bvhs[0], bvhs[1], samples, t->seed, &error));
+    }
+    if (code == TOOL_DONE) code = tool_print(t, report_error(&error, samples, tool_seconds() - start));
     for (int i = 0; i < 2; ++i) {
         fct_bvh_destroy(bvhs[i]);
         fct_tree_destroy(trees[i]);
@@ -49,28 +72,31 @@ static int run_compare(tool *t, void *options) {
 }
 
 int tool_compare(int argc, char **argv) {
-    static const tool_command command = {.name = "compare",
-                                         .synopsis = "A B",
-                                         .summary = "measure the distance between two meshes",
-                                         .text =
-                                             "Measures the distance from every vertex and from N random "
-                                             "points per face of each mesh to the other mesh.\n\n"
-                                             "e_avg is the mean squared distance and e_max the largest "
-                                             "distance, of both directions; _ab is from A to B, _ba from "
-                                             "B to A. Lengths are in the mesh's unit. e_avg_relative is "
-                                             "e_avg divided by the squared diameter, e_max_relative is "
-                                             "e_max divided by the diameter, where the diameter is the "
-                                             "diagonal of A's bounds. Colours are compared if both "
-                                             "meshes have them on their vertices.\n\n"
-                                             "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, "
-                                             "e_max_ba, e_avg_relative, e_max_relative, diameter, "
-                                             "color_rms, color_max, color_rms_relative, samples, seconds.",
-                                         .options = compare_options_table,
-                                         .parse = parse_compare,
-                                         .run = run_compare,
-                                         .inputs_min = 2,
-                                         .inputs_max = 2,
-                                         .output = TOOL_OUTPUT_UNUSED};
-    uint32_t samples = 100;
-    return tool_main(&command, argc, argv, &samples);
+    static const tool_command command = {
+        .name = "compare",
+        .synopsis = "A B",
+        .summary = "measure the distance between two meshes",
+        .text = "Measures the distance from every vertex and from N random "
+                "points per face of each mesh to the other mesh.\n\n"
+                "e_avg is the mean squared distance and e_max the largest "
+                "distance, of both directions; _ab is from A to B, _ba from "
+                "B to A. Lengths are in the mesh's unit. e_avg_relative is "
+                "e_avg divided by the squared diameter, e_max_relative is "
+                "e_max divided by the diameter, where the diameter is the "
+                "diagonal of A's bounds. Colours are compared if both "
+                "meshes have them on their vertices.\n\n"
+                "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, "
+                "e_max_ba, e_avg_relative, e_max_relative, diameter, "
+                "color_rms, color_max, color_rms_relative, samples, "
+                "samples_per_face, seconds.",
+        .examples = "  facetree compare bunny.obj bunny-small.ply\n"
+                    "  facetree compare bunny.obj bunny-small.ply --samples 100 --json",
+        .options = compare_options_table,
+        .parse = parse_compare,
+        .run = run_compare,
+        .inputs_min = 2,
+        .inputs_max = 2,
+        .output = TOOL_OUTPUT_UNUSED};
+    compare_options options = {.samples = UINT32_MAX, .budget = 4000000};
+    return tool_main(&command, argc, argv, &options);
 }

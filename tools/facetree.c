@@ -21,6 +21,7 @@ static const struct {
     {"closest", "find the nearest surface points", tool_closest},
     {"bake", "compute the radiosity of a scene as vertex colours", tool_bake},
     {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
+    {"convert", "write a mesh in another format", tool_convert},
     {"compare", "measure the distance between two meshes", tool_compare},
     {"render", "draw a mesh, a scene, its clusters or its boxes", tool_render},
 };
@@ -74,8 +75,67 @@ static int print_overview_page(void) {
     return fflush(stdout) ? TOOL_OUTPUT : TOOL_DONE;
 }
 
-/* help [COMMAND]; the build also calls help --man [COMMAND]. */
+/* Runs a command with one hidden option, such as --man. */
+static int ask_command(int index, const char *option) {
+    char action[8];
+    snprintf(action, sizeof action, "%s", option);
+    char *words[] = {NULL, action, NULL};
+    return run_command(index, 2, words);
+}
+
+static int print_bash_completion(void) {
+    puts("# bash completion of facetree\n"
+         "_facetree() {\n"
+         "    local word=${COMP_WORDS[COMP_CWORD]} options=\n"
+         "    COMPREPLY=()");
+    printf("    local commands='help");
+    for (int i = 0; i < COMMANDS; ++i) printf(" %s", commands[i].name);
+    puts("'\n"
+         "    if [ \"$COMP_CWORD\" = 1 ] || { [ \"$COMP_CWORD\" = 2 ] && [ \"${COMP_WORDS[1]}\" = help ]; }; "
+         "then\n"
+         "        COMPREPLY=($(compgen -W \"$commands --help --version\" -- \"$word\"))\n"
+         "        return\n"
+         "    fi\n"
+         "    case ${COMP_WORDS[1]} in");
+    int code = TOOL_DONE;
+    for (int i = 0; i < COMMANDS && code == TOOL_DONE; ++i) code = ask_command(i, "--bash");
+    puts("    esac\n"
+         "    case $word in\n"
+         "    -*) COMPREPLY=($(compgen -W \"$options\" -- \"$word\")) ;;\n"
+         "    esac\n"
+         "}\n"
+         "complete -o default -F _facetree facetree");
+    return code;
+}
+
+static int print_zsh_completion(void) {
+    puts("#compdef facetree\n"
+         "_facetree() {\n"
+         "    local -a commands\n"
+         "    commands=(");
+    for (int i = 0; i < COMMANDS; ++i) printf("        '%s:%s'\n", commands[i].name, commands[i].summary);
+    puts("        'help:explain a command'\n"
+         "    )\n"
+         "    if ((CURRENT == 2)) || { ((CURRENT == 3)) && [[ $words[2] = help ]]; }; then\n"
+         "        _describe command commands\n"
+         "        return\n"
+         "    fi\n"
+         "    local command=$words[2]\n"
+         "    shift words\n"
+         "    ((CURRENT -= 1))\n"
+         "    case $command in");
+    int code = TOOL_DONE;
+    for (int i = 0; i < COMMANDS && code == TOOL_DONE; ++i) code = ask_command(i, "--zsh");
+    puts("    esac\n"
+         "}\n"
+         "_facetree \"$@\"");
+    return code;
+}
+
+/* help [COMMAND]; the build also calls help --man [COMMAND], help --bash and help --zsh. */
 static int run_help(int argc, char **argv) {
+    if (argc == 2 && !strcmp(argv[1], "--bash")) return print_bash_completion();
+    if (argc == 2 && !strcmp(argv[1], "--zsh")) return print_zsh_completion();
     bool man = argc > 1 && !strcmp(argv[1], "--man");
     const char *name = argc > 1 + man ? argv[1 + man] : NULL;
     if (argc > 2 + man) {
@@ -84,11 +144,7 @@ static int run_help(int argc, char **argv) {
     }
     if (!name) return man ? print_overview_page() : print_overview();
     int index = find_command(name);
-    if (index < 0) return reject_command(name);
-    char action[8];
-    snprintf(action, sizeof action, "%s", man ? "--man" : "--help");
-    char *words[] = {NULL, action, NULL};
-    return run_command(index, 2, words);
+    return index < 0 ? reject_command(name) : ask_command(index, man ? "--man" : "--help");
 }
 
 typedef struct top {

@@ -1,9 +1,13 @@
 /* tools/info.c: facetree info: the contents of a mesh, a hierarchy file or a scene. */
+#define _GNU_SOURCE
 #include "tools/commands.h"
 
+#include <dirent.h>
+#include <errno.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -174,19 +178,18 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     return TOOL_DONE;
 }
 
-static int run_info(tool *t, void *options) {
-    const char *path = t->inputs[0];
-    bool verify = *(bool *)options, tree = tool_ends(path, "fct"), scene = tool_is_scene_name(path);
+static int describe_file(tool *t, const char *path, bool verify, json_t **out) {
+    bool tree = tool_has_format(t, path, "fct"), scene = tool_is_scene(t, path);
     fct_mesh mesh = {0};
     if (verify && !tree)
         return tool_fail(t, TOOL_USAGE, "--verify: expected a hierarchy file (.fct), found '%s'", path);
-    json_t *object = json_pack("{s:s, s:s}", "file", path, "kind",
-                               tree    ? "hierarchy"
-                               : scene ? "scene"
-                                       : "mesh");
+    json_t *object = *out = json_pack("{s:o, s:s}", "file", tool_json_text(path), "kind",
+                                      tree    ? "hierarchy"
+                                      : scene ? "scene"
+                                              : "mesh");
     int code;
     if (!object) {
-        code = tool_fail(t, TOOL_DATA, "the name of the file is not UTF-8");
+        code = tool_fail(t, TOOL_MEMORY, "out of memory for the answer");
     } else if (tree) {
         code = describe_tree(t, path, verify, object);
     } else if (scene) {
@@ -196,6 +199,75 @@ static int run_info(tool *t, void *options) {
         if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
         fct_mesh_release(&t->env, &mesh);
     }
+    return code;
+}
+
+/* --- Folders --- */
+
+static int is_known_entry(const struct dirent *entry) {
+    const char *name = entry->d_name;
+    return name[0] != '.' && (tool_is_mesh_name(name) || tool_ends(name, "fct") || tool_ends(name, "gltf") ||
+                              !strcmp(name, "scene.json"));
+}
+
+/* A line: the file, and its counts or its error. */
+static void say_file(tool *t, const json_t *object) {
+    const char *error = json_string_value(json_object_get(object, "error"));
+    const char *file = json_string_value(json_object_get(object, "file"));
+    if (error)
+        tool_say(t, "%s", error);
+    else
+        tool_say(t, "%s: %s, %.0f faces, %.0f vertices, %.0f components", file,
+                 json_string_value(json_object_get(object, "kind")),
+                 json_number_value(json_object_get(object, "faces")),
+                 json_number_value(json_object_get(object, "vertices")),
+                 json_number_value(json_object_get(object, "components")));
+}
+
+/* Describes a file of a folder. A failure becomes the member "error"; *worst keeps the first exit code. */
+static int add_file(tool *t, const char *path, bool verify, json_t *files, int *worst) {
+    json_t *object = NULL;
+    int code = describe_file(t, path, verify && tool_ends(path, "fct"), &object);
+    if (code == TOOL_CANCELLED || !object) {
+        json_decref(object);
+        return code;
+    }
+    if (code != TOOL_DONE) {
+        json_object_set_new(object, "error", tool_json_text(t->error));
+        t->error[0] = 0;
+        if (*worst == TOOL_DONE) *worst = code;
+    }
+    say_file(t, object);
+    return json_array_append_new(files, object) ? tool_fail(t, TOOL_MEMORY, "out of memory for the answer")
+                                                : TOOL_DONE;
+}
+
+static int describe_folder(tool *t, const char *folder, bool verify) {
+    struct dirent **entries;
+    int count = scandir(folder, &entries, is_known_entry, alphasort), failed, worst = TOOL_DONE;
+    if (count < 0) return tool_fail(t, TOOL_INPUT, "%s: cannot be read: %s", folder, strerror(errno));
+    int code =
+        count ? TOOL_DONE : tool_fail(t, TOOL_INPUT, "%s: expected meshes or scenes, found none", folder);
+    json_t *files = json_array();
+    for (int i = 0; i < count; ++i) {
+        char path[PATH_MAX];
+        snprintf(path, sizeof path, "%s%s%s", folder, folder[strlen(folder) - 1] == '/' ? "" : "/",
+                 entries[i]->d_name);
+        if (code == TOOL_DONE) code = add_file(t, path, verify, files, &worst);
+        free(entries[i]);
+    }
+    free(entries);
+    failed = code == TOOL_DONE && worst != TOOL_DONE;
+    if (code == TOOL_DONE) code = tool_json(t, json_pack("{s:O}", "files", files));
+    json_decref(files);
+    return failed && code == TOOL_DONE ? tool_fail(t, worst, "%s: not every file can be read", folder) : code;
+}
+
+static int run_info(tool *t, void *options) {
+    bool verify = *(bool *)options;
+    json_t *object = NULL;
+    if (tool_is_folder(t->inputs[0])) return describe_folder(t, t->inputs[0], verify);
+    int code = describe_file(t, t->inputs[0], verify, &object);
     if (code == TOOL_DONE) return tool_print(t, object);
     json_decref(object);
     return code;
@@ -206,19 +278,25 @@ int tool_info(int argc, char **argv) {
         .name = "info",
         .synopsis = "FILE",
         .summary = "count what a file holds; check a hierarchy file",
-        .text = "FILE is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf).\n\n"
-                "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
-                "(boundary, non-manifold and "
-                "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
-                "prints the header, which is "
-                "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
-                "bounds, depth, roots, and "
-                "the source and options of the build.\n\n"
-                "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
-                "node it checks that box "
-                "and cone contain the faces, and that area, moment, centroid and plane match them. If a "
-                "check fails, the message says "
-                "which, and the exit code is 65.\n\nJSON keys: as printed.",
+        .text =
+            "FILE is a mesh, a hierarchy file (.fct), a scene (.json, .gltf), or a folder of them: then each "
+            "file has a line, and --json lists the files in files[], with error for one that cannot be "
+            "read.\n\n"
+            "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
+            "(boundary, non-manifold and "
+            "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
+            "prints the header, which is "
+            "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
+            "bounds, depth, roots, and "
+            "the source and options of the build.\n\n"
+            "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
+            "node it checks that box "
+            "and cone contain the faces, and that area, moment, centroid and plane match them. If a "
+            "check fails, the message says "
+            "which, and the exit code is 65.\n\nJSON keys: as printed.",
+        .examples = "  facetree info bunny.obj\n"
+                    "  facetree info meshes/\n"
+                    "  facetree info bunny.fct --verify",
         .options = info_options_table,
         .parse = parse_info,
         .run = run_info,

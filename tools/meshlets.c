@@ -208,6 +208,8 @@ int tool_meshlets(int argc, char **argv) {
             "(shares of the limits), mean_radius, without_cone, culled (share of triangles that cones cull, "
             "mean over all "
             "directions), seconds{meshlets}.",
+        .examples = "  facetree meshlets bunny.fct -o bunny.json\n"
+                    "  facetree meshlets bunny.obj -o colours.ply --vertices 96",
         .options = meshlet_options_table,
         .parse = parse_meshlets,
         .run = run_meshlets,

@@ -366,6 +366,9 @@ int tool_partition(int argc, char **argv) {
             "(degrees), seam_length (of edges between charts) and boundary_length (of edges with one face). "
             "--adjacency adds "
             "pairs. Means are weighted by area; mean_fit and box_area are divided by the squared diagonal.",
+        .examples = "  facetree partition bunny.fct -k 200 -o labels.txt\n"
+                    "  facetree partition bunny.obj -k 200 --refine 4 -o bunny-200.ply\n"
+                    "  facetree partition bunny.fct --charts 45 -o charts.glb",
         .options = partition_options_table,
         .parse = parse_partition,
         .run = run_partition,

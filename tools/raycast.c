@@ -16,10 +16,11 @@ typedef struct ray_options {
     const char *rays;
     fct_backend backend;
     bool backend_given, occlusion, check;
+    uint64_t made;  /* rays to write with --make-rays; 0: none */
     uint64_t count; /* of generated rays; 0: not given */
 } ray_options;
 
-enum { KEY_RAYS = TOOL_KEY, KEY_OCCLUSION, KEY_BACKEND, KEY_CHECK, KEY_COUNT };
+enum { KEY_RAYS = TOOL_KEY, KEY_OCCLUSION, KEY_BACKEND, KEY_CHECK, KEY_COUNT, KEY_MAKE };
 
 static const struct argp_option ray_options_table[] = {
     {"rays", KEY_RAYS, "FILE", 0,
@@ -29,6 +30,8 @@ static const struct argp_option ray_options_table[] = {
     {"check", KEY_CHECK, NULL, 0, "Shoot the rays with both backends and count the differences", 0},
     {"count", KEY_COUNT, "N", 0,
      "With --check and without --rays: generate N rays of several kinds (default 1000000)", 0},
+    {"make-rays", KEY_MAKE, "N", 0,
+     "Write N rays of several kinds instead of shooting any, for --rays; --seed chooses others", 0},
     {0}};
 
 static error_t parse_raycast(int key, char *text, struct argp_state *state) {
@@ -46,6 +49,8 @@ static error_t parse_raycast(int key, char *text, struct argp_state *state) {
     case KEY_CHECK:
         o->check = true;
         return 0;
+    case KEY_MAKE:
+        return tool_parse_count(state, "--make-rays", text, 1, UINT32_MAX, &o->made);
     case KEY_COUNT:
         return tool_parse_count(state, "--count", text, 1, UINT32_MAX, &o->count);
     default:
@@ -54,6 +59,12 @@ static error_t parse_raycast(int key, char *text, struct argp_state *state) {
 }
 
 static int check_ray_options(tool *t, const ray_options *o) {
+    if (o->made && (o->rays || o->check || o->occlusion || o->count))
+        return tool_fail(t, TOOL_USAGE, "--make-rays: expected no --rays, --check, --count or --occlusion");
+    if (o->made && tool_is_scene(t, t->inputs[0]))
+        return tool_fail(t, TOOL_USAGE,
+                         "--make-rays: expected a mesh or a hierarchy file, found the scene '%s'",
+                         t->inputs[0]);
     if (o->check && o->backend_given)
         return tool_fail(t, TOOL_USAGE, "--check uses both backends: remove --backend");
     if (o->check && o->occlusion)
@@ -61,8 +72,9 @@ static int check_ray_options(tool *t, const ray_options *o) {
     if (o->check && t->output) return tool_fail(t, TOOL_USAGE, "--check writes no hits: remove -o");
     if (o->count && (!o->check || o->rays))
         return tool_fail(t, TOOL_USAGE, "--count: expected --check, and no --rays");
-    if (!o->check && !o->rays) return tool_fail(t, TOOL_USAGE, "expected --rays FILE or --check");
-    if (o->check && tool_is_scene_name(t->inputs[0]))
+    if (!o->check && !o->rays && !o->made)
+        return tool_fail(t, TOOL_USAGE, "expected --rays FILE, --check or --make-rays N");
+    if (o->check && tool_is_scene(t, t->inputs[0]))
         return tool_fail(t, TOOL_USAGE, "--check: expected a mesh or a hierarchy file, found the scene '%s'",
                          t->inputs[0]);
     if (o->rays && !strcmp(o->rays, "-") && !strcmp(t->inputs[0], "-"))
@@ -243,6 +255,39 @@ static int check_backends(tool *t, const ray_options *options, fct_ray *rays, si
     return code;
 }
 
+/* --- Rays --- */
+
+static int write_rays(tool *t, const fct_ray *rays, size_t count) {
+    tool_writer writer;
+    int code = open_hits(t, &writer);
+    if (code != TOOL_DONE || !writer.stream) return code;
+    for (size_t i = 0; i < count; ++i) {
+        const fct_ray *r = rays + i;
+        fprintf(writer.stream, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", (double)r->origin[0],
+                (double)r->origin[1], (double)r->origin[2], (double)r->direction[0], (double)r->direction[1],
+                (double)r->direction[2], (double)r->t_min, (double)r->t_max);
+    }
+    return close_hits(t, &writer);
+}
+
+static int make_rays(tool *t, size_t count) {
+    fct_tree *tree;
+    fct_bvh *bvh = NULL;
+    fct_ray *rays = NULL;
+    int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &bvh));
+    if (code == TOOL_DONE && !(rays = tool_allocate(t, count, sizeof *rays))) code = TOOL_MEMORY;
+    if (code == TOOL_DONE) {
+        fct_ray_mix(bvh, t->seed, count, rays);
+        code = write_rays(t, rays, count);
+    }
+    if (code == TOOL_DONE) code = tool_json(t, json_pack("{s:I}", "rays", (json_int_t)count));
+    tool_release(t, rays);
+    fct_bvh_destroy(bvh);
+    fct_tree_destroy(tree);
+    return code;
+}
+
 static int run_raycast(tool *t, void *user) {
     const ray_options *options = user;
     fct_ray *rays = NULL;
@@ -250,9 +295,11 @@ static int run_raycast(tool *t, void *user) {
     int code = check_ray_options(t, options);
     if (code == TOOL_DONE && options->rays) code = read_rays(t, options->rays, &rays, &count);
     if (code == TOOL_DONE) {
-        if (options->check)
+        if (options->made)
+            code = make_rays(t, options->made);
+        else if (options->check)
             code = check_backends(t, options, rays, count);
-        else if (tool_is_scene_name(t->inputs[0]))
+        else if (tool_is_scene(t, t->inputs[0]))
             code = cast_in_scene(t, options, rays, count);
         else
             code = cast_in_model(t, options, rays, count);
@@ -262,31 +309,34 @@ static int run_raycast(tool *t, void *user) {
 }
 
 int tool_raycast(int argc, char **argv) {
-    static const tool_command command = {.name = "raycast",
-                                         .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]",
-                                         .summary = "shoot rays; compare both backends",
-                                         .text =
-                                             "IN is a mesh, a hierarchy file (.fct) or a scene (.json, "
-                                             ".gltf). For each ray the output has one line with the closest "
-                                             "hit for tmin <= t <= tmax: 'face t u v', or 'instance face t u "
-                                             "v' for a scene, or -1 if the ray misses. The hit "
-                                             "point is (1 - u - v) p0 + u p1 + v p2. Without -o the hits go "
-                                             "to standard output; with --json they are only "
-                                             "counted.\n\n"
-                                             "--check decides every difference between the backends in "
-                                             "double precision. The exit code is 1 if a difference "
-                                             "stays unexplained.\n\n"
-                                             "JSON keys: rays, hits, seconds, rays_per_second, peak_bytes. "
-                                             "--check prints rays, hits, differences, explained, "
-                                             "unexplained, occlusion_differences, seconds{obb, embree}.",
-                                         .options = ray_options_table,
-                                         .parse = parse_raycast,
-                                         .run = run_raycast,
-                                         .inputs_min = 1,
-                                         .inputs_max = 1,
-                                         .output = TOOL_OUTPUT_OPTIONAL,
-                                         .endings = "txt csv",
-                                         .other = ""};
+    static const tool_command command = {
+        .name = "raycast",
+        .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]\nIN --make-rays N -o FILE",
+        .summary = "shoot rays; compare both backends",
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, "
+                ".gltf). For each ray the output has one line with the closest "
+                "hit for tmin <= t <= tmax: 'face t u v', or 'instance face t u "
+                "v' for a scene, or -1 if the ray misses. The hit "
+                "point is (1 - u - v) p0 + u p1 + v p2. Without -o the hits go "
+                "to standard output; with --json they are only "
+                "counted.\n\n"
+                "--check decides every difference between the backends in "
+                "double precision. The exit code is 1 if a difference "
+                "stays unexplained.\n\n"
+                "JSON keys: rays, hits, seconds, rays_per_second, peak_bytes. "
+                "--check prints rays, hits, differences, explained, "
+                "unexplained, occlusion_differences, seconds{obb, embree}.",
+        .examples = "  facetree raycast bunny.fct --make-rays 1000 -o rays.txt\n"
+                    "  facetree raycast bunny.fct --rays rays.txt -o hits.txt\n"
+                    "  facetree raycast bunny.fct --check",
+        .options = ray_options_table,
+        .parse = parse_raycast,
+        .run = run_raycast,
+        .inputs_min = 1,
+        .inputs_max = 1,
+        .output = TOOL_OUTPUT_OPTIONAL,
+        .endings = "txt csv",
+        .other = ""};
     ray_options options = {.backend = FCT_BACKEND_OBB};
     return tool_main(&command, argc, argv, &options);
 }

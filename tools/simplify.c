@@ -195,6 +195,8 @@ int tool_simplify(int argc, char **argv) {
                 "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
                 "exhausted), max_cost (the largest "
                 "error of a contraction), seconds{init, contract, refit, total}, peak_bytes.",
+        .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
+                    "  facetree simplify lit.glb --faces 10000 -o small.glb",
         .options = simplify_options_table,
         .parse = parse_simplify,
         .run = run_simplify,

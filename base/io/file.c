@@ -66,6 +66,12 @@ fct_result fct_file_open(const fct_env *env, const char *path, fct_file *out) {
     return result;
 }
 
+const char *fct_file_format(const fct_env *env, const char *path) {
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    if (dot && dot[1]) return dot + 1;
+    return env->input_format ? env->input_format : !strcmp(path, "-") ? "ply" : "";
+}
+
 void fct_file_close(const fct_env *env, fct_file *file) {
     if (!file->mapped)
         fct_release(env, (void *)file->data);

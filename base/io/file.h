@@ -14,6 +14,8 @@ typedef struct fct_file {
 /* Opens `path` for reading. "-" is standard input. Nobody may shorten a mapped file while it is open. Errors:
  * INPUT (missing, a folder, unreadable), MEMORY. On failure *out is all zero. */
 fct_result fct_file_open(const fct_env *env, const char *path, fct_file *out);
+/* The ending of the name without the dot, or the format that env gives to names without one. Never NULL. */
+const char *fct_file_format(const fct_env *env, const char *path);
 /* Closes and zeroes; a zero struct is allowed. */
 void fct_file_close(const fct_env *env, fct_file *file);
 

@@ -65,6 +65,11 @@ typedef struct fct_env {
      * size: its bytes, 0 for a pipe or a device. Runs in the calling thread only. */
     void (*opened)(void *user, const char *path, uint64_t size);
     void *opened_user;
+
+    /* The format of inputs whose name has no ending, such as "-" and /dev/fd/3: "obj", "json" and so on.
+     * NULL:
+     * "-" is a PLY, and other such names are errors. */
+    const char *input_format;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);

@@ -2,6 +2,7 @@
 #include "scene/read/load.h"
 
 #include <string.h>
+#include <strings.h>
 
 #include "base/io/file.h"
 #include "scene/read/gltf.h"
@@ -47,14 +48,16 @@ fct_result fct_scene_parse_json(const fct_env *env, const char *name, const char
 
 static fct_result read_scene_file(fct_scene *scene, const char *path) {
     const fct_env *env = scene->env;
-    bool json = fct_path_ends(path, ".json"), obj = fct_path_ends(path, ".obj"),
-         gltf = fct_path_ends(path, ".gltf") || fct_path_ends(path, ".glb");
+    const char *format = fct_file_format(env, path);
+    bool json = !strcasecmp(format, "json"), obj = !strcasecmp(format, "obj"),
+         gltf = !strcasecmp(format, "gltf") || !strcasecmp(format, "glb");
     if (!json && !obj && !gltf) return add_plain_model(scene, path);
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
     const char *text = (const char *)file.data;
-    bool plain = obj && !fct_scene_obj_names_materials(text, file.size);
+    /* A pipe cannot be read a second time. */
+    bool plain = obj && file.mapped && !fct_scene_obj_names_materials(text, file.size);
     char *base = fct_path_folder(env, path);
     if (!base)
         result = FCT_ERROR_MEMORY;

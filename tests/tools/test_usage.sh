@@ -1,6 +1,6 @@
 # tests/tools/test_usage.sh: help, version, and every kind of wrong command line.
 source "$(dirname "$0")/support.sh"
-commands="bake boxes closest cluster compare info make partition raycast render simplify"
+commands="bake boxes closest cluster compare convert info make partition raycast render simplify"
 
 expect 0 --version
 check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+ \((baseline|avx2)\)$' out

@@ -22,10 +22,19 @@ typedef struct bake_options {
     double exposure;
     const char *also;
     bool two_sided;
+    int quality; /* of qualities */
+    bool error_given, final_given;
 } bake_options;
+
+/* What --quality sets. */
+static const struct bake_quality {
+    double error;
+    fct_final final;
+} qualities[] = {{5e-4, FCT_FINAL_DIRECT}, {2e-5, FCT_FINAL_GATHER}, {5e-6, FCT_FINAL_GATHER}};
 
 enum {
     KEY_METHOD = TOOL_KEY,
+    KEY_QUALITY,
     KEY_ERROR,
     KEY_SAMPLES,
     KEY_VISIBILITY,
@@ -41,6 +50,10 @@ enum {
 static const struct argp_option bake_options_table[] = {
     {"method", KEY_METHOD, "NAME", 0,
      "face: radiosity of face clusters (default); reference: path tracing at every vertex", 0},
+    {"quality", KEY_QUALITY, "NAME", 0,
+     "draft: --error 5e-4 --final direct; normal (default): --error 2e-5 --final gather; fine: --error 5e-6 "
+     "--final gather. These options override it",
+     0},
     {"error", KEY_ERROR, "E", 0,
      "Split links until the uncertainty of each is at most this share of the emitted power (default 2e-5, "
      "from "
@@ -73,6 +86,7 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
                                                                                          "gather", NULL};
     static const fct_bake_method method_values[] = {FCT_BAKE_FACE, FCT_BAKE_REFERENCE};
     static const fct_final final_values[] = {FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER};
+    static const char *const names[] = {"draft", "normal", "fine", NULL};
     bake_options *o = state->input;
     int index = 0;
     error_t error;
@@ -81,11 +95,19 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         error = tool_parse_choice(state, "--method", text, methods, &index);
         o->def.method = method_values[index];
         return error;
+    case KEY_QUALITY:
+        return tool_parse_choice(state, "--quality", text, names, &o->quality);
+    case ARGP_KEY_END:
+        if (!o->error_given) o->def.error = qualities[o->quality].error;
+        if (!o->final_given) o->def.final = qualities[o->quality].final;
+        return 0;
     case KEY_FINAL:
+        o->final_given = true;
         error = tool_parse_choice(state, "--final", text, finals, &index);
         o->def.final = final_values[index];
         return error;
     case KEY_ERROR:
+        o->error_given = true;
         return tool_parse_real(state, "--error", text, 1e-9, 1, &o->def.error);
     case KEY_SAMPLES:
         return tool_parse_count32(state, "--samples", text, 1, 100000000, &o->def.samples);
@@ -257,6 +279,10 @@ int tool_bake(int argc, char **argv) {
             "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
             "name of its model. Powers are sums over "
             "red, green and blue.",
+        .examples = "  facetree bake scene.json -o lit.glb\n"
+                    "  facetree bake room.obj -o lit.glb --quality draft\n"
+                    "  facetree bake scene.json -o lit/ --json\n"
+                    "  facetree bake scene.json --probe points.txt",
         .options = bake_options_table,
         .parse = parse_bake,
         .run = run_bake,
@@ -264,6 +290,6 @@ int tool_bake(int argc, char **argv) {
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,
         .output_folder = true};
-    bake_options options = {.def = fct_bake_def_default(), .exposure = 1};
+    bake_options options = {.def = fct_bake_def_default(), .exposure = 1, .quality = 1};
     return tool_main(&command, argc, argv, &options);
 }

@@ -121,6 +121,10 @@ int tool_cluster(int argc, char **argv) {
                 "JSON keys: faces, vertices, roots, depth, mean_depth, parts, seconds{read, dual, contract, "
                 "boxes, write, total}, "
                 "peak_bytes, file_bytes; for several files their sums, and files[].",
+        .examples = "  facetree cluster bunny.obj -o bunny.fct\n"
+                    "  facetree cluster meshes/ -o trees/\n"
+                    "  facetree cluster terrain.ply -o terrain.fct --max-memory 4G\n"
+                    "  zcat bunny.obj.gz | facetree cluster - --format obj -o bunny.fct",
         .options = cluster_options_table,
         .parse = parse_cluster,
         .run = run_cluster,

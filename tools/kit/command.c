@@ -10,6 +10,7 @@
 
 #include "tools/kit/file.h"
 #include "tools/kit/options.h"
+#include "tools/manual/manual.h"
 
 enum {
     KEY_JSON = 256,
@@ -18,14 +19,22 @@ enum {
     KEY_SEED,
     KEY_MAX_MEMORY,
     KEY_IN_PLACE,
+    KEY_FORMAT,
     KEY_USAGE,
-    KEY_MAN
+    KEY_MAN,
+    KEY_BASH,
+    KEY_ZSH
 };
 
 static const struct argp_option common_options[] = {
     {"output", 'o', "FILE", 0, "Write to FILE; - is standard output", 0},
     {"in-place", KEY_IN_PLACE, NULL, 0, "Allow an output that replaces an input", 0},
     {NULL, 0, NULL, 0, "Common to all commands:", -2},
+    {"format", KEY_FORMAT, "NAME", 0,
+     "Format of an input whose name has no ending, such as - (standard input): ply (default), obj, off, stl, "
+     "om, "
+     "glb, gltf, json or fct",
+     -2},
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on standard output and nothing else there", -2},
     {"progress", KEY_PROGRESS, NULL, 0, "Show progress on standard error, even if it is not a terminal", -2},
     {"quiet", 'q', NULL, 0, "Print only errors", -2},
@@ -37,6 +46,8 @@ static const struct argp_option common_options[] = {
     {"help", 'h', NULL, 0, "Print this help", -1},
     {"usage", KEY_USAGE, NULL, OPTION_HIDDEN, NULL, -1},
     {"man", KEY_MAN, NULL, OPTION_HIDDEN, NULL, -1},
+    {"bash", KEY_BASH, NULL, OPTION_HIDDEN, NULL, -1},
+    {"zsh", KEY_ZSH, NULL, OPTION_HIDDEN, NULL, -1},
     {0}};
 
 enum { OUTPUT_OPTIONS = 2 }; /* the first common options are about -o */
@@ -45,7 +56,7 @@ typedef struct arguments {
     tool *tool;
     const tool_command *command;
     void *options;
-    int action; /* 'h', KEY_USAGE, KEY_MAN, or 0 to run */
+    int action; /* 'h', KEY_USAGE, KEY_MAN, KEY_BASH, KEY_ZSH, or 0 to run */
     int next;   /* index of the word after the one that argp could not parse */
 } arguments;
 
@@ -76,7 +87,11 @@ static error_t check_arguments(const arguments *a, struct argp_state *state) {
 static error_t parse_common(int key, char *text, struct argp_state *state) {
     arguments *a = state->input;
     tool *t = a->tool;
+    static const char *const formats[] = {"ply", "obj",  "off",  "stl", "om",
+                                          "glb", "gltf", "json", "fct", NULL};
     size_t bytes;
+    error_t error;
+    int index = 0;
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = a->options;
@@ -91,6 +106,10 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     case KEY_IN_PLACE:
         t->in_place = true;
         return 0;
+    case KEY_FORMAT:
+        error = tool_parse_choice(state, "--format", text, formats, &index);
+        t->format = formats[index];
+        return error;
     case KEY_JSON:
         t->json = true;
         return 0;
@@ -109,6 +128,8 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     case 'h':
     case KEY_USAGE:
     case KEY_MAN:
+    case KEY_BASH:
+    case KEY_ZSH:
         if (!a->action) a->action = key;
         return 0;
     case ARGP_KEY_ARG:
@@ -204,89 +225,12 @@ static void say_bad_option(const tool_command *command, int next, int argc, char
 /* argp prints the part before \v, then the options, then the rest. Returns memory that the caller frees, or
  * NULL. */
 static char *make_help_text(const tool_command *command) {
-    const char *text = command->text ? command->text : "";
-    size_t size = strlen(command->summary) + strlen(text) + 4;
-    char *doc = malloc(size);
-    if (doc) snprintf(doc, size, "%s\n\v%s", command->summary, text);
-    if (doc) doc[0] = (char)toupper((unsigned char)doc[0]);
+    char *doc = NULL;
+    if (asprintf(&doc, "%s\n\v%s%s%s", command->summary, command->text ? command->text : "",
+                 command->examples ? "\n\nExamples:\n" : "", command->examples ? command->examples : "") < 0)
+        return NULL;
+    doc[0] = (char)toupper((unsigned char)doc[0]);
     return doc;
-}
-
-/* --- Man page --- */
-
-/* Prints text with roff's special characters escaped. start: the text begins a line. */
-static void print_roff(const char *text, bool start) {
-    for (; *text; ++text) {
-        if (start && (*text == '.' || *text == '\'')) fputs("\\&", stdout);
-        start = *text == '\n';
-        if (*text == '\\')
-            fputs("\\e", stdout);
-        else if (*text == '-')
-            fputs("\\-", stdout);
-        else
-            putchar(*text);
-    }
-}
-
-/* An empty line in the text begins a paragraph; a line with leading spaces stays a line of its own. */
-static void print_roff_paragraphs(const char *text) {
-    while (*text) {
-        const char *end = strchr(text, '\n');
-        size_t length = end ? (size_t)(end - text) : strlen(text);
-        char line[512];
-        snprintf(line, sizeof line, "%.*s", (int)length, text);
-        if (!length) {
-            puts(".PP");
-        } else {
-            if (line[0] == ' ') puts(".br");
-            print_roff(line + strspn(line, " "), true);
-            putchar('\n');
-        }
-        text += length + (end != NULL);
-    }
-}
-
-static void print_roff_options(const struct argp_option *options) {
-    for (; options && (options->name || options->key || options->doc); ++options) {
-        if (options->flags & OPTION_HIDDEN) continue;
-        bool letter = options->key > 0 && options->key < 256 && isgraph(options->key);
-        if (!options->name && !letter) continue;
-        fputs(".TP\n\\fB", stdout);
-        if (letter) printf("\\-%c", options->key);
-        if (letter && options->name) fputs("\\fR, \\fB", stdout);
-        if (options->name) {
-            fputs("\\-\\-", stdout);
-            print_roff(options->name, false);
-        }
-        fputs("\\fR", stdout);
-        if (options->arg) {
-            fputs(options->name ? "=\\fI" : " \\fI", stdout);
-            print_roff(options->arg, false);
-            fputs("\\fR", stdout);
-        }
-        putchar('\n');
-        print_roff(options->doc ? options->doc : "", true);
-        putchar('\n');
-    }
-}
-
-static void print_man_page(const tool_command *command) {
-    printf(".TH FACETREE\\-");
-    for (const char *c = command->name; *c; ++c) putchar(toupper((unsigned char)*c));
-    printf(" 1 \"\" \"facetree %s\"\n.SH NAME\nfacetree\\-%s \\- ", fct_version(), command->name);
-    print_roff(command->summary, false);
-    printf("\n.SH SYNOPSIS\n\\fBfacetree %s\\fR [\\fIOPTION\\fR...] ", command->name);
-    print_roff(command->synopsis, false);
-    puts("\n.SH DESCRIPTION");
-    print_roff_paragraphs(command->text ? command->text : command->summary);
-    puts(".SH OPTIONS");
-    print_roff_options(command->options);
-    print_roff_options(common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS));
-    puts(
-        ".SH EXIT STATUS\n0 done; 1 the answer is no; 64 usage; 65 bad data; 66 input missing or unreadable; "
-        "70 internal error; 73 output cannot be written; 75 out of memory or over --max-memory; "
-        "128 + N ended by the signal N.\n"
-        ".SH SEE ALSO\n.BR facetree (1)");
 }
 
 /* --- The command --- */
@@ -296,8 +240,16 @@ static int print_answer(const tool_command *command, const struct argp *argp, in
     char name[64];
     snprintf(name, sizeof name, "facetree %s", command->name);
     setenv("ARGP_HELP_FMT", "no-dup-args-note", 0);
+    const manual_command manual = {
+        command->name,     command->summary,
+        command->synopsis, command->text,
+        command->examples, {command->options, common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS)}};
     if (action == KEY_MAN)
-        print_man_page(command);
+        manual_print_page(&manual, fct_version());
+    else if (action == KEY_BASH)
+        manual_print_bash(&manual);
+    else if (action == KEY_ZSH)
+        manual_print_zsh(&manual);
     else
         argp_help(argp, stdout,
                   action == 'h' ? ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC : ARGP_HELP_USAGE,

@@ -5,7 +5,7 @@
  * 1. reads the shared options itself, and those of the command through its table and parser;
  * 2. opens the environment (tools/kit/env.h) and calls `run`;
  * 3. prints an error as one line on stderr and returns the exit code.
- * --help and the man page come from the same table.
+ * --help, the man page and the completion of command lines come from the same table.
  */
 #ifndef FCT_TOOLS_COMMAND_H
 #define FCT_TOOLS_COMMAND_H
@@ -22,9 +22,10 @@ typedef enum tool_output_use {
 
 typedef struct tool_command {
     const char *name;
-    const char *synopsis; /* after the name, such as "IN -o OUT" */
+    const char *synopsis; /* after the name, such as "IN -o OUT"; one line per way to call it */
     const char *summary;  /* one sentence without a period, for `facetree help` and the man page */
     const char *text;     /* paragraphs with an empty line between; NULL: none */
+    const char *examples; /* command lines, one per line; NULL: none */
     const struct argp_option
         *options; /* ends with {0}; keys without a letter start at TOOL_KEY; NULL: none */
     /* An argp parser for these options. state->input is the `options` of tool_main. Returns 0,

@@ -392,6 +392,7 @@ void tool_env_open(tool *t) {
         t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */
         limit_data(t);
     }
+    t->env.input_format = t->format;
     t->env.opened = note_opened;
     t->env.opened_user = t;
     snprintf(t->label, sizeof t->label, "facetree %s", t->name);

@@ -28,6 +28,7 @@ typedef struct tool {
     const char *name; /* of the command */
     char **inputs;    /* the arguments that are not options */
     int input_count;
+    const char *format; /* of inputs without an ending, or NULL */
     const char *output; /* the value of -o, or NULL */
     bool json, quiet, progress;
     bool in_place;    /* an output may replace an input */

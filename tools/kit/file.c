@@ -31,8 +31,14 @@ bool tool_is_mesh_name(const char *path) {
     return ends_in_one(path, TOOL_MESHES);
 }
 
-bool tool_is_scene_name(const char *path) {
-    return tool_ends(path, "json") || tool_ends(path, "gltf");
+bool tool_has_format(const tool *t, const char *path, const char *format) {
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    if (dot && dot[1]) return tool_ends(path, format);
+    return t->env.input_format && !strcasecmp(t->env.input_format, format);
+}
+
+bool tool_is_scene(const tool *t, const char *path) {
+    return tool_has_format(t, path, "json") || tool_has_format(t, path, "gltf");
 }
 
 bool tool_is_folder(const char *path) {

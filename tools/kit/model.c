@@ -8,7 +8,7 @@
 
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree) {
     *tree = NULL;
-    if (tool_ends(path, "fct")) return tool_result(t, fct_tree_open(&t->env, path, tree));
+    if (tool_has_format(t, path, "fct")) return tool_result(t, fct_tree_open(&t->env, path, tree));
     fct_tree_def standard = fct_tree_def_default();
     fct_mesh mesh;
     int code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
@@ -35,7 +35,7 @@ double tool_length_of(const fct_tree *tree, tool_length length) {
 }
 
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
-    if (!tool_ends(path, "fct")) return tool_result(t, fct_mesh_load(&t->env, path, mesh));
+    if (!tool_has_format(t, path, "fct")) return tool_result(t, fct_mesh_load(&t->env, path, mesh));
     fct_tree *tree;
     int code = tool_result(t, fct_tree_open(&t->env, path, &tree));
     if (code != TOOL_DONE) return code;
@@ -44,10 +44,14 @@ int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
     return code;
 }
 
+int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def) {
+    int code = tool_refuse_input(t, path);
+    if (code == TOOL_DONE) code = tool_check_inputs(t);
+    return code == TOOL_DONE ? tool_result(t, fct_mesh_save(&t->env, path, mesh, def)) : code;
+}
+
 int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure) {
     fct_mesh_save_def def = fct_mesh_save_def_default();
     def.exposure = (float)exposure;
-    int code = tool_refuse_input(t, path);
-    if (code == TOOL_DONE) code = tool_check_inputs(t);
-    return code == TOOL_DONE ? tool_result(t, fct_mesh_save(&t->env, path, mesh, &def)) : code;
+    return tool_save_mesh_as(t, path, mesh, &def);
 }

@@ -9,6 +9,8 @@
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
 /* The mesh of a mesh file or of a .fct file. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
+/* Saves a mesh. */
+int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def);
 /* Saves a mesh. exposure: a factor on its colours for display. */
 int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure);
 

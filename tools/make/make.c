@@ -202,6 +202,8 @@ int tool_make(int argc, char **argv) {
                 "angles), and the statues torso, knot, gyroid, shell, bust and vase.\n\n"
                 "The same name, count and --seed make the same bytes.\n\n"
                 "JSON keys: name, triangles, files[], seconds.",
+        .examples = "  facetree make museum -o museum --triangles 300000\n"
+                    "  facetree make sphere -o ball.ply --triangles 5000",
         .options = make_options_table,
         .parse = parse_make,
         .run = run_make,

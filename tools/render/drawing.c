@@ -39,7 +39,7 @@ typedef struct loader {
 /* --- Kinds of files --- */
 
 static int find_scene_file(tool *t, const char *path, bool *scene) {
-    *scene = tool_is_scene_name(path);
+    *scene = tool_is_scene(t, path);
     if (!tool_ends(path, "obj")) return TOOL_DONE;
     return tool_result(t, fct_scene_obj_has_library(&t->env, path, scene));
 }
@@ -309,10 +309,11 @@ int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     bool surface = source->subject == DRAWING_SURFACE, scene;
     int code = find_scene_file(t, source->path, &scene);
     if (code != TOOL_DONE) return code;
-    if (surface && !scene && !tool_ends(source->path, "fct")) {
+    if (surface && !scene && !tool_has_format(t, source->path, "fct")) {
         code = tool_load_mesh(t, source->path, &out->mesh);
         /* A glTF file without a bake is a scene with materials. */
-        scene = code == TOOL_DONE && tool_ends(source->path, "glb") && !out->mesh.colors;
+        scene = code == TOOL_DONE && strcmp(source->path, "-") && tool_has_format(t, source->path, "glb") &&
+                !out->mesh.colors;
         if (!scene) return code;
         fct_mesh_release(&t->env, &out->mesh);
     }

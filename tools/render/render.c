@@ -277,6 +277,9 @@ int tool_render(int argc, char **argv) {
                 "some. In a scene, the "
                 "models share the K clusters or boxes by how much their surfaces turn.\n\n"
                 "JSON keys: width, height, faces, seconds{read, draw, write, total}, peak_bytes.",
+        .examples = "  facetree render bunny.obj -o bunny.png\n"
+                    "  facetree render bunny.fct --clusters 200 -o clusters.png\n"
+                    "  facetree render lit.glb --scene scene.json -o lit.png",
         .options = render_options_table,
         .parse = parse_render,
         .run = run_render,
