@@ -46,7 +46,7 @@ for preloaded in '' $preload; do
         ends $name .2 raycast ball.ply --rays pipe -o new.txt
     done
     ends TERM .3 compare ball.ply ground.ply --samples 100000
-    ends HUP .4 make bust -o new.ply --triangles 30000000
+    ends HUP .4 make bust -o new.ply --triangles 4000000
     ends TERM .5 cluster ball.ply ground.ply pipe -o .
     unset LD_PRELOAD
 done

@@ -12,7 +12,7 @@
 
 #include "facetree/base.h"
 
-enum { GRACE = 500, FOLDERS = 8 }; /* GRACE: milliseconds */
+enum { GRACE = 300, FOLDERS = 8 }; /* GRACE: milliseconds */
 
 static volatile sig_atomic_t received;
 static char folders[FOLDERS][PATH_MAX];
