@@ -190,6 +190,7 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
 /* Adds a model of a given tree, and destroys the tree after a failure. */
 static fct_result add_model_of_tree(fct_scene *scene, const char *name, fct_tree *tree) {
     fct_scene_model own = {.tree = tree};
+    memcpy(own.origin, fct_tree_get(tree).origin, sizeof own.origin);
     if (fct_tree_get(tree).root_count <= MOST_ROOTS) return add_model(scene, name, &own);
     fct_mesh mesh;
     fct_result result = fct_tree_mesh(scene->env, tree, &mesh);

@@ -88,6 +88,7 @@ fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out) {
         (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
         (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     fct_result result = fct_mesh_create(s->env, vertices, s->live_faces, arrays, out);
+    if (result == FCT_OK) memcpy(out->origin, mesh->origin, sizeof out->origin);
     if (result == FCT_OK) result = copy_names(s->env, mesh, out);
     uint32_t to = 0;
     for (uint32_t f = 0; f < mesh->face_count && result == FCT_OK; ++f) {

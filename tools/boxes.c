@@ -37,17 +37,26 @@ static error_t parse_boxes(int key, char *text, struct argp_state *state) {
     }
 }
 
-static json_t *describe_boxes(const fct_cluster *clusters, uint32_t count) {
+/* The plane n.x + d = 0 in the user's coordinates: d changes by -n.origin. */
+static json_t *describe_plane(const fct_cluster *cluster, const double origin[3]) {
+    double d = cluster->plane[3];
+    for (int k = 0; k < 3; ++k) d -= (double)cluster->plane[k] * origin[k];
+    json_t *plane = tool_json_floats(cluster->plane, 3);
+    json_array_append_new(plane, json_real(d));
+    return plane;
+}
+
+static json_t *describe_boxes(const fct_cluster *clusters, uint32_t count, const double origin[3]) {
     json_t *list = json_array();
     for (uint32_t i = 0; i < count; ++i) {
         fct_box box;
         const fct_cluster *cluster = &clusters[i];
         fct_cluster_box(cluster, &box);
         json_t *item =
-            json_pack("{s:o, s:[o, o, o], s:o, s:o, s:f, s:I}", "center", tool_json_floats(box.center, 3),
+            json_pack("{s:o, s:[o, o, o], s:o, s:o, s:f, s:I}", "center", tool_json_point(box.center, origin),
                       "axes", tool_json_floats(box.axes[0], 3), tool_json_floats(box.axes[1], 3),
                       tool_json_floats(box.axes[2], 3), "half_extents", tool_json_floats(box.half, 3),
-                      "plane", tool_json_floats(cluster->plane, 4), "area", (double)cluster->area, "faces",
+                      "plane", describe_plane(cluster, origin), "area", (double)cluster->area, "faces",
                       (json_int_t)cluster->count);
         if (!item || json_array_append_new(list, item)) {
             json_decref(list);
@@ -57,11 +66,12 @@ static json_t *describe_boxes(const fct_cluster *clusters, uint32_t count) {
     return json_pack("{s:I, s:o}", "clusters", (json_int_t)count, "boxes", list);
 }
 
-static int write_boxes_json(tool *t, json_t *object) {
+/* digits: 9 for floats, 15 for coordinates relative to an origin. */
+static int write_boxes_json(tool *t, json_t *object, size_t digits) {
     tool_writer writer;
     int code = tool_writer_open(t, t->output ? t->output : "-", &writer);
     if (code == TOOL_DONE) {
-        if (json_dumpf(object, writer.stream, JSON_INDENT(1) | JSON_REAL_PRECISION(9)))
+        if (json_dumpf(object, writer.stream, JSON_INDENT(1) | JSON_REAL_PRECISION(digits)))
             code =
                 tool_fail(t, TOOL_OUTPUT, "%s: cannot be written", t->output ? t->output : "standard output");
         fputc('\n', writer.stream);
@@ -89,7 +99,7 @@ static void add_box(const fct_box *box, uint32_t index, fct_mesh *mesh) {
             mesh->triangles[3 * (12 * (size_t)index + f) + c] = 8 * index + sides[f][c];
 }
 
-static int write_boxes_mesh(tool *t, const fct_cluster *clusters, uint32_t count) {
+static int write_boxes_mesh(tool *t, const fct_cluster *clusters, uint32_t count, const double origin[3]) {
     fct_mesh mesh;
     if (count > FCT_NONE / 48) return tool_fail(t, TOOL_USAGE, "-k %u: too many boxes for one mesh", count);
     int code = tool_result(t, fct_mesh_create(&t->env, 8 * count, 12 * count, FCT_MESH_COLORS, &mesh));
@@ -99,18 +109,21 @@ static int write_boxes_mesh(tool *t, const fct_cluster *clusters, uint32_t count
         fct_cluster_box(&clusters[i], &box);
         add_box(&box, i, &mesh);
     }
+    memcpy(mesh.origin, origin, sizeof mesh.origin);
     code = tool_save_mesh(t, t->output, &mesh, 1);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
 
-static int write_boxes(tool *t, const fct_cluster *clusters, uint32_t count) {
+static int write_boxes(tool *t, const fct_cluster *clusters, uint32_t count, const double origin[3]) {
+    bool far = origin[0] != 0 || origin[1] != 0 || origin[2] != 0;
     bool as_mesh = t->output && tool_is_mesh_name(t->output);
-    int code = as_mesh ? write_boxes_mesh(t, clusters, count) : TOOL_DONE;
-    json_t *object = as_mesh && !t->json ? NULL : describe_boxes(clusters, count);
+    int code = as_mesh ? write_boxes_mesh(t, clusters, count, origin) : TOOL_DONE;
+    json_t *object = as_mesh && !t->json ? NULL : describe_boxes(clusters, count, origin);
     if (code == TOOL_DONE && !object && !as_mesh)
         return tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output");
-    if (code == TOOL_DONE && !as_mesh && (t->output || !t->json)) code = write_boxes_json(t, object);
+    if (code == TOOL_DONE && !as_mesh && (t->output || !t->json))
+        code = write_boxes_json(t, object, far ? 15 : 9);
     if (code == TOOL_DONE && t->json) return tool_json(t, object);
     json_decref(object);
     return code;
@@ -142,7 +155,7 @@ static int run_boxes(tool *t, void *options) {
     if (code == TOOL_DONE && !(clusters = tool_allocate(t, count, sizeof *clusters))) code = TOOL_MEMORY;
     for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)
         code = tool_result(t, fct_tree_cluster(tree, nodes[i], &clusters[i]));
-    if (code == TOOL_DONE) code = write_boxes(t, clusters, count);
+    if (code == TOOL_DONE) code = write_boxes(t, clusters, count, fct_tree_get(tree).origin);
     tool_release(t, nodes);
     tool_release(t, clusters);
     fct_tree_destroy(tree);

@@ -37,50 +37,77 @@ static error_t parse_closest(int key, char *text, struct argp_state *state) {
     }
 }
 
-static void print_closest(FILE *stream, const fct_closest *c) {
-    fprintf(stream, "%u %.9g %.9g %.9g %.9g\n", c->face, (double)c->point[0], (double)c->point[1],
-            (double)c->point[2], (double)c->distance);
+/* The answers, and what turns them into the user's coordinates. */
+typedef struct answers {
+    fct_closest *found;
+    uint32_t *instances; /* of a scene, else NULL */
+    double origin[3];    /* of the mesh or scene */
+} answers;
+
+/* Points relative to an origin need more digits than a float. */
+static void print_closest(FILE *stream, const fct_closest *c, const double origin[3]) {
+    fprintf(stream, "%u", c->face);
+    for (int k = 0; k < 3; ++k) {
+        if (origin[k] != 0)
+            fprintf(stream, " %.15g", origin[k] + (double)c->point[k]);
+        else
+            fprintf(stream, " %.9g", (double)c->point[k]);
+    }
+    fprintf(stream, " %.9g\n", (double)c->distance);
 }
 
-static int find_in_model(tool *t, const closest_options *o, const tool_rows *points, fct_closest *found) {
+/* The points relative to the origin of the answers. The caller releases them. */
+static int place_points(tool *t, const tool_rows *rows, const answers *a, float **points) {
+    *points = tool_allocate(t, rows->count, 3 * sizeof **points);
+    if (!*points) return TOOL_MEMORY;
+    tool_rows_points(rows, 3, 0, a->origin, *points);
+    return TOOL_DONE;
+}
+
+static int find_in_model(tool *t, const closest_options *o, const tool_rows *rows, answers *a) {
     fct_tree *tree;
     fct_bvh *bvh = NULL;
+    float *points = NULL;
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
     if (code != TOOL_DONE) return code;
-    code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &bvh));
-    if (code == TOOL_DONE)
-        fct_bvh_closest_points(bvh, points->count, points->values, (float)o->max_distance, found);
+    memcpy(a->origin, fct_tree_get(tree).origin, sizeof a->origin);
+    code = place_points(t, rows, a, &points);
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &bvh));
+    if (code == TOOL_DONE) fct_bvh_closest_points(bvh, rows->count, points, (float)o->max_distance, a->found);
+    tool_release(t, points);
     fct_bvh_destroy(bvh);
     fct_tree_destroy(tree);
     return code;
 }
 
-static int find_in_scene(tool *t, const closest_options *o, const tool_rows *points, fct_closest *found,
-                         uint32_t *instances) {
+static int find_in_scene(tool *t, const closest_options *o, const tool_rows *rows, answers *a) {
     fct_scene *scene;
+    float *points = NULL;
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], FCT_BACKEND_OBB, &scene));
     if (code != TOOL_DONE) return code;
-    for (size_t i = 0; i < points->count; ++i)
-        if (!fct_scene_closest_point(scene, points->values + 3 * i, (float)o->max_distance, instances + i,
-                                     found + i))
-            found[i].face = FCT_NONE;
+    memcpy(a->origin, fct_scene_get(scene).origin, sizeof a->origin);
+    code = place_points(t, rows, a, &points);
+    for (size_t i = 0; code == TOOL_DONE && i < rows->count; ++i)
+        if (!fct_scene_closest_point(scene, points + 3 * i, (float)o->max_distance, a->instances + i,
+                                     a->found + i))
+            a->found[i].face = FCT_NONE;
+    tool_release(t, points);
     fct_scene_destroy(scene);
     return code;
 }
 
-static int write_found(tool *t, const fct_closest *found, const uint32_t *instances, size_t count,
-                       size_t *hits) {
+static int write_found(tool *t, const answers *a, size_t count, size_t *hits) {
     tool_writer writer = {0};
     bool wanted = !t->json || t->output;
     int code = wanted ? tool_writer_open(t, t->output ? t->output : "-", &writer) : TOOL_DONE;
     if (code != TOOL_DONE) return code;
     for (size_t i = 0; i < count; ++i) {
-        bool hit = found[i].face != FCT_NONE;
+        bool hit = a->found[i].face != FCT_NONE;
         *hits += hit;
         if (!wanted) continue;
-        if (hit && instances) fprintf(writer.stream, "%u ", instances[i]);
+        if (hit && a->instances) fprintf(writer.stream, "%u ", a->instances[i]);
         if (hit)
-            print_closest(writer.stream, found + i);
+            print_closest(writer.stream, a->found + i, a->origin);
         else
             fputs("-1\n", writer.stream);
     }
@@ -97,19 +124,18 @@ static int run_closest(tool *t, void *options) {
     size_t hits = 0;
     int code = tool_rows_read(t, o->points, 3, 3, NULL, &points);
     if (code != TOOL_DONE) return code;
-    fct_closest *found = tool_allocate(t, points.count, sizeof *found);
-    uint32_t *instances = found && scene ? tool_allocate(t, points.count, sizeof *instances) : NULL;
-    if (!found || (scene && !instances)) code = TOOL_MEMORY;
+    answers a = {.found = tool_allocate(t, points.count, sizeof *a.found)};
+    if (a.found && scene) a.instances = tool_allocate(t, points.count, sizeof *a.instances);
+    if (!a.found || (scene && !a.instances)) code = TOOL_MEMORY;
     double start = tool_seconds();
-    if (code == TOOL_DONE)
-        code = scene ? find_in_scene(t, o, &points, found, instances) : find_in_model(t, o, &points, found);
+    if (code == TOOL_DONE) code = scene ? find_in_scene(t, o, &points, &a) : find_in_model(t, o, &points, &a);
     double seconds = tool_seconds() - start;
-    if (code == TOOL_DONE) code = write_found(t, found, instances, points.count, &hits);
+    if (code == TOOL_DONE) code = write_found(t, &a, points.count, &hits);
     if (code == TOOL_DONE)
         code = tool_json(t, json_pack("{s:I, s:I, s:f}", "points", (json_int_t)points.count, "found",
                                       (json_int_t)hits, "seconds", seconds));
-    tool_release(t, instances);
-    tool_release(t, found);
+    tool_release(t, a.instances);
+    tool_release(t, a.found);
     tool_rows_release(t, &points);
     return code;
 }

@@ -1,6 +1,8 @@
 /* tools/compare.c: facetree compare: the distance between two surfaces, and between their colours. */
 #include "tools/commands.h"
 
+#include <string.h>
+
 #include "tools/kit/command.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
@@ -47,17 +49,34 @@ static json_t *report_error(const fct_mesh_error *e, uint32_t samples, double se
                      (json_int_t)e->samples, "samples_per_face", (json_int_t)samples, "seconds", seconds);
 }
 
+/* Builds the second tree again, relative to the origin of the first, if their origins differ. */
+static int share_origin(tool *t, fct_tree *trees[2]) {
+    fct_tree_view a = fct_tree_get(trees[0]), b = fct_tree_get(trees[1]);
+    if (!memcmp(a.origin, b.origin, sizeof a.origin)) return TOOL_DONE;
+    fct_mesh mesh;
+    fct_tree_def def = fct_tree_def_default();
+    int code = tool_result(t, fct_tree_mesh(&t->env, trees[1], &mesh));
+    if (code != TOOL_DONE) return code;
+    for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
+        mesh.positions[i] = (float)(b.origin[i % 3] - a.origin[i % 3] + (double)mesh.positions[i]);
+    memcpy(mesh.origin, a.origin, sizeof mesh.origin);
+    fct_tree_destroy(trees[1]);
+    trees[1] = NULL;
+    code = tool_result(t, fct_tree_build(&t->env, &mesh, &def, NULL, &trees[1]));
+    fct_mesh_release(&t->env, &mesh);
+    return code;
+}
+
 static int run_compare(tool *t, void *options) {
     uint32_t samples = 0;
     fct_tree *trees[2] = {NULL, NULL};
     fct_bvh *bvhs[2] = {NULL, NULL};
     fct_mesh_error error;
     int code = TOOL_DONE;
-    for (int i = 0; i < 2 && code == TOOL_DONE; ++i) {
-        code = tool_open_tree(t, t->inputs[i], NULL, &trees[i]);
-        if (code == TOOL_DONE)
-            code = tool_result(t, fct_bvh_create(&t->env, trees[i], FCT_BACKEND_OBB, &bvhs[i]));
-    }
+    for (int i = 0; i < 2 && code == TOOL_DONE; ++i) code = tool_open_tree(t, t->inputs[i], NULL, &trees[i]);
+    if (code == TOOL_DONE) code = share_origin(t, trees);
+    for (int i = 0; i < 2 && code == TOOL_DONE; ++i)
+        code = tool_result(t, fct_bvh_create(&t->env, trees[i], FCT_BACKEND_OBB, &bvhs[i]));
     double start = tool_seconds();
     if (code == TOOL_DONE) {
         samples = choose_samples(options, trees[0], trees[1]);

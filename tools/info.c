@@ -35,10 +35,13 @@ static void set_count(json_t *object, const char *key, uint64_t value) {
     json_object_set_new(object, key, json_integer((json_int_t)value));
 }
 
-static void set_bounds(json_t *object, const fct_bounds *bounds) {
+/* Bounds relative to an origin. The origin is printed if it is not 0. */
+static void set_bounds(json_t *object, const fct_bounds *bounds, const double origin[3]) {
     json_object_set_new(object, "bounds",
-                        json_pack("{s:o, s:o}", "lower", tool_json_floats(bounds->lower, 3), "upper",
-                                  tool_json_floats(bounds->upper, 3)));
+                        json_pack("{s:o, s:o}", "lower", tool_json_point(bounds->lower, origin), "upper",
+                                  tool_json_point(bounds->upper, origin)));
+    if (origin[0] != 0 || origin[1] != 0 || origin[2] != 0)
+        json_object_set_new(object, "origin", json_pack("[f, f, f]", origin[0], origin[1], origin[2]));
 }
 
 /* The number of polygons in the file: of runs of equal source_faces. */
@@ -72,7 +75,7 @@ static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     json_object_set_new(object, "face_colors", json_boolean(mesh->face_colors != NULL));
     json_object_set_new(object, "normals", json_boolean(mesh->normals != NULL));
     json_object_set_new(object, "texture_coordinates", json_boolean(mesh->texcoords != NULL));
-    if (r.vertices) set_bounds(object, &r.bounds);
+    if (r.vertices) set_bounds(object, &r.bounds, mesh->origin);
     json_object_set_new(object, "area", json_real(r.area));
     json_object_set_new(object, "diagonal", json_real(r.diagonal));
     return TOOL_DONE;
@@ -124,7 +127,7 @@ static int describe_header(tool *t, const fct_tree *tree, json_t *object) {
     set_count(object, "components", view.component_count);
     set_count(object, "materials", view.material_count);
     json_object_set_new(object, "vertex_colors", json_boolean(view.colors != NULL));
-    set_bounds(object, &view.bounds);
+    set_bounds(object, &view.bounds, view.origin);
     json_object_set_new(object, "area", json_real(area));
     json_object_set_new(object, "diagonal", json_real(sqrt(square)));
     set_count(object, "roots", view.root_count);
@@ -173,7 +176,7 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     fct_bounds bounds;
     fct_scene_bounds(scene, lower, upper);
     for (int c = 0; c < 3; ++c) bounds.lower[c] = (float)lower[c], bounds.upper[c] = (float)upper[c];
-    set_bounds(object, &bounds);
+    set_bounds(object, &bounds, view.origin);
     fct_scene_destroy(scene);
     return TOOL_DONE;
 }

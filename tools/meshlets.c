@@ -62,6 +62,7 @@ static int write_binary(tool *t, const fct_meshlets *m, const fct_meshlet_def *d
                            view.vertex_count,
                            def->max_vertices,
                            def->max_triangles};
+    memcpy(header + 8, view.origin, sizeof view.origin);
     tool_writer writer;
     int code = tool_writer_open(t, t->output, &writer);
     if (code != TOOL_DONE) return code;
@@ -83,12 +84,15 @@ static void write_numbers(FILE *stream, const char *name, const float *values, i
 }
 
 /* One line per meshlet. */
-static int write_meshlets_json(tool *t, const fct_meshlets *m) {
+static int write_meshlets_json(tool *t, const fct_meshlets *m, const double origin[3]) {
     tool_writer writer;
     int code = tool_writer_open(t, t->output, &writer);
     if (code != TOOL_DONE) return code;
     FILE *f = writer.stream;
-    fprintf(f, "{\"count\":%u,\"meshlets\":[", m->count);
+    fprintf(f, "{\"count\":%u,", m->count);
+    if (origin[0] != 0 || origin[1] != 0 || origin[2] != 0)
+        fprintf(f, "\"origin\":[%.17g,%.17g,%.17g],", origin[0], origin[1], origin[2]);
+    fputs("\"meshlets\":[", f);
     for (uint32_t i = 0; i < m->count; ++i) {
         const fct_meshlet *x = &m->meshlets[i];
         const fct_meshlet_bounds *b = &m->bounds[i];
@@ -177,7 +181,8 @@ static int run_meshlets(tool *t, void *options) {
     if (code == TOOL_DONE && binary)
         code = write_binary(t, &meshlets, def, fct_tree_get(tree));
     else if (code == TOOL_DONE)
-        code = json ? write_meshlets_json(t, &meshlets) : write_colors(t, tree, &meshlets);
+        code = json ? write_meshlets_json(t, &meshlets, fct_tree_get(tree).origin)
+                    : write_colors(t, tree, &meshlets);
     if (code == TOOL_DONE) code = report_meshlets(t, tree, def, &meshlets, seconds);
     fct_meshlets_release(&t->env, &meshlets);
     fct_tree_destroy(tree);

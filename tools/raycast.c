@@ -82,21 +82,23 @@ static int check_ray_options(tool *t, const ray_options *o) {
     return TOOL_DONE;
 }
 
-static int read_rays(tool *t, const char *path, fct_ray **rays, size_t *count) {
-    static const float usual[2] = {0, INFINITY};
-    tool_rows rows;
-    *rays = NULL;
-    int code = tool_rows_read(t, path, 6, 8, usual, &rows);
-    if (code != TOOL_DONE) return code;
-    *rays = tool_allocate(t, rows.count, sizeof **rays);
-    if (!*rays) code = TOOL_MEMORY;
-    for (size_t i = 0; i < rows.count && *rays; ++i) {
-        const float *r = rows.values + 8 * i;
-        (*rays)[i] = (fct_ray){{r[0], r[1], r[2]}, r[6], {r[3], r[4], r[5]}, r[7]};
+static int read_rays(tool *t, const char *path, tool_rows *rows) {
+    static const double usual[2] = {0, INFINITY};
+    return tool_rows_read(t, path, 6, 8, usual, rows);
+}
+
+/* Rays relative to the origin of the mesh or scene. The caller releases them. */
+static int place_rays(tool *t, const tool_rows *rows, const double origin[3], fct_ray **rays) {
+    *rays = tool_allocate(t, rows->count, sizeof **rays);
+    if (!*rays) return TOOL_MEMORY;
+    for (size_t i = 0; i < rows->count; ++i) {
+        const double *r = rows->values + 8 * i;
+        fct_ray *ray = *rays + i;
+        for (int k = 0; k < 3; ++k)
+            ray->origin[k] = (float)(r[k] - origin[k]), ray->direction[k] = (float)r[3 + k];
+        ray->t_min = (float)r[6], ray->t_max = (float)r[7];
     }
-    *count = rows.count;
-    tool_rows_release(t, &rows);
-    return code;
+    return TOOL_DONE;
 }
 
 /* --- Hits --- */
@@ -164,29 +166,36 @@ static int occlusion_in_model(tool *t, const fct_bvh *bvh, const fct_ray *rays, 
     return code;
 }
 
-static int cast_in_model(tool *t, const ray_options *options, const fct_ray *rays, size_t count) {
+static int cast_in_model(tool *t, const ray_options *options, const tool_rows *rows) {
     fct_tree *tree;
     fct_bvh *bvh = NULL;
+    fct_ray *rays = NULL;
+    size_t count = rows->count;
     outcome o = {0};
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
     if (code != TOOL_DONE) return code;
-    code = tool_result(t, fct_bvh_create(&t->env, tree, options->backend, &bvh));
+    code = place_rays(t, rows, fct_tree_get(tree).origin, &rays);
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, options->backend, &bvh));
     if (code == TOOL_DONE)
         code = options->occlusion ? occlusion_in_model(t, bvh, rays, count, &o)
                                   : closest_in_model(t, bvh, rays, count, &o);
     if (code == TOOL_DONE) code = report_hits(t, count, &o);
+    tool_release(t, rays);
     fct_bvh_destroy(bvh);
     fct_tree_destroy(tree);
     return code;
 }
 
-static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *rays, size_t count) {
+static int cast_in_scene(tool *t, const ray_options *options, const tool_rows *rows) {
     fct_scene *scene;
+    fct_ray *rays = NULL;
+    size_t count = rows->count;
     tool_writer writer;
     outcome o = {0};
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], options->backend, &scene));
     if (code != TOOL_DONE) return code;
-    code = open_hits(t, &writer);
+    code = place_rays(t, rows, fct_scene_get(scene).origin, &rays);
+    if (code == TOOL_DONE) code = open_hits(t, &writer);
     double start = tool_seconds();
     for (size_t i = 0; i < count && code == TOOL_DONE; ++i) {
         fct_scene_hit hit;
@@ -205,6 +214,7 @@ static int cast_in_scene(tool *t, const ray_options *options, const fct_ray *ray
     o.seconds = tool_seconds() - start;
     if (code == TOOL_DONE) code = close_hits(t, &writer);
     if (code == TOOL_DONE) code = report_hits(t, count, &o);
+    tool_release(t, rays);
     fct_scene_destroy(scene);
     return code;
 }
@@ -229,26 +239,29 @@ static int report_check(tool *t, const fct_ray_check *c) {
     return c->unexplained || c->occlusion_differences ? TOOL_NO : TOOL_DONE;
 }
 
-static int check_backends(tool *t, const ray_options *options, fct_ray *rays, size_t count) {
+static int generate_rays(tool *t, const fct_bvh *bvh, size_t count, fct_ray **rays) {
+    *rays = tool_allocate(t, count, sizeof **rays);
+    if (!*rays) return TOOL_MEMORY;
+    fct_ray_mix(bvh, t->seed, count, *rays);
+    return TOOL_DONE;
+}
+
+static int check_backends(tool *t, const ray_options *options, const tool_rows *rows) {
     fct_tree *tree;
     fct_bvh *obb = NULL, *embree = NULL;
-    fct_ray *made = NULL;
+    fct_ray *rays = NULL;
+    size_t count = options->rays ? rows->count : options->count ? options->count : 1000000;
     fct_ray_check counts;
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
     if (code != TOOL_DONE) return code;
     code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &obb));
     if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_EMBREE, &embree));
-    if (code == TOOL_DONE && !options->rays) {
-        count = options->count ? options->count : 1000000;
-        rays = made = tool_allocate(t, count, sizeof *made);
-        if (made)
-            fct_ray_mix(obb, t->seed, count, made);
-        else
-            code = TOOL_MEMORY;
-    }
+    if (code == TOOL_DONE)
+        code = options->rays ? place_rays(t, rows, fct_tree_get(tree).origin, &rays)
+                             : generate_rays(t, obb, count, &rays);
     if (code == TOOL_DONE) code = tool_result(t, fct_bvh_check(&t->env, obb, embree, count, rays, &counts));
     if (code == TOOL_DONE) code = report_check(t, &counts);
-    tool_release(t, made);
+    tool_release(t, rays);
     fct_bvh_destroy(embree);
     fct_bvh_destroy(obb);
     fct_tree_destroy(tree);
@@ -257,14 +270,16 @@ static int check_backends(tool *t, const ray_options *options, fct_ray *rays, si
 
 /* --- Rays --- */
 
-static int write_rays(tool *t, const fct_ray *rays, size_t count) {
+/* In the user's coordinates. Those relative to an origin need more digits than a float. */
+static int write_rays(tool *t, const fct_ray *rays, size_t count, const double origin[3]) {
     tool_writer writer;
     int code = open_hits(t, &writer);
     if (code != TOOL_DONE || !writer.stream) return code;
     for (size_t i = 0; i < count; ++i) {
         const fct_ray *r = rays + i;
-        fprintf(writer.stream, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", (double)r->origin[0],
-                (double)r->origin[1], (double)r->origin[2], (double)r->direction[0], (double)r->direction[1],
+        for (int k = 0; k < 3; ++k)
+            fprintf(writer.stream, "%.*g ", origin[k] != 0 ? 17 : 9, origin[k] + (double)r->origin[k]);
+        fprintf(writer.stream, "%.9g %.9g %.9g %.9g %.9g\n", (double)r->direction[0], (double)r->direction[1],
                 (double)r->direction[2], (double)r->t_min, (double)r->t_max);
     }
     return close_hits(t, &writer);
@@ -279,7 +294,7 @@ static int make_rays(tool *t, size_t count) {
     if (code == TOOL_DONE && !(rays = tool_allocate(t, count, sizeof *rays))) code = TOOL_MEMORY;
     if (code == TOOL_DONE) {
         fct_ray_mix(bvh, t->seed, count, rays);
-        code = write_rays(t, rays, count);
+        code = write_rays(t, rays, count, fct_tree_get(tree).origin);
     }
     if (code == TOOL_DONE) code = tool_json(t, json_pack("{s:I}", "rays", (json_int_t)count));
     tool_release(t, rays);
@@ -290,21 +305,20 @@ static int make_rays(tool *t, size_t count) {
 
 static int run_raycast(tool *t, void *user) {
     const ray_options *options = user;
-    fct_ray *rays = NULL;
-    size_t count = 0;
+    tool_rows rows = {0};
     int code = check_ray_options(t, options);
-    if (code == TOOL_DONE && options->rays) code = read_rays(t, options->rays, &rays, &count);
+    if (code == TOOL_DONE && options->rays) code = read_rays(t, options->rays, &rows);
     if (code == TOOL_DONE) {
         if (options->made)
             code = make_rays(t, options->made);
         else if (options->check)
-            code = check_backends(t, options, rays, count);
+            code = check_backends(t, options, &rows);
         else if (tool_is_scene(t, t->inputs[0]))
-            code = cast_in_scene(t, options, rays, count);
+            code = cast_in_scene(t, options, &rows);
         else
-            code = cast_in_model(t, options, rays, count);
+            code = cast_in_model(t, options, &rows);
     }
-    tool_release(t, rays);
+    tool_rows_release(t, &rows);
     return code;
 }
 

@@ -1,4 +1,4 @@
-/* cluster/file/format.h: header and section table of the hierarchy file, version 2. docs/hierarchy-file.md
+/* cluster/file/format.h: header and section table of the hierarchy file, version 3. docs/hierarchy-file.md
  * describes every byte. The structs are the layout; all numbers are little endian. */
 #ifndef FCT_CLUSTER_FORMAT_H
 #define FCT_CLUSTER_FORMAT_H
@@ -6,7 +6,7 @@
 #include "cluster/file/file.h"
 
 enum {
-    FCT_FORMAT_VERSION = 2,
+    FCT_FORMAT_VERSION = 3,
     FCT_FORMAT_ORDER_MARK = 0x01020304,
     FCT_FORMAT_ALIGNMENT = 64,
     FCT_FORMAT_BLOCK = 1 << 20, /* bytes per hash */
@@ -37,9 +37,10 @@ typedef struct fct_format_header {
     uint64_t source_size, names_size;
     uint32_t cut_count, section_count;
     fct_format_section sections[FCT_SECTION_COUNT];
+    double origin[3];
 } fct_format_header;
 
-_Static_assert(sizeof(fct_format_header) == 512 && sizeof(fct_cluster) == 132,
+_Static_assert(sizeof(fct_format_header) == 536 && sizeof(fct_cluster) == 132,
                "the structs are the layout of the file");
 
 extern const unsigned char fct_format_magic[8];

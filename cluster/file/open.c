@@ -26,6 +26,7 @@ static const char *find_counts_fault(const fct_format_header *h) {
         if (!isfinite(h->bounds.lower[k]) || !isfinite(h->bounds.upper[k]) ||
             h->bounds.lower[k] > h->bounds.upper[k])
             return "bad bounds";
+    if (!isfinite(h->origin[0]) || !isfinite(h->origin[1]) || !isfinite(h->origin[2])) return "bad origin";
     if (h->method > FCT_CLUSTER_ROUNDS || h->cost > FCT_COST_MEAN || h->fit_measure > FCT_FIT_POINTS)
         return "unknown options";
     return NULL;
@@ -83,6 +84,7 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
     view->boundary_edges = h->boundary_edges, view->nonmanifold_edges = h->nonmanifold_edges;
     view->component_count = h->component_count;
     view->bounds = h->bounds;
+    memcpy(view->origin, h->origin, sizeof view->origin);
     view->material_count = h->material_count;
     view->roots = find_section(tree, h, FCT_SECTION_ROOTS);
     tree->nodes = find_section(tree, h, FCT_SECTION_NODES);

@@ -52,6 +52,7 @@ static fct_format_header make_header(const fct_tree_view *view, unsigned arrays)
                            .max_cost = def->max_cost,
                            .source_size = strlen(view->source) + 1};
     memcpy(h.magic, fct_format_magic, sizeof h.magic);
+    memcpy(h.origin, view->origin, sizeof h.origin);
     if (arrays & FCT_MESH_COLORS) h.flags |= FCT_FORMAT_COLORS;
     if (arrays & FCT_MESH_MATERIALS) h.flags |= FCT_FORMAT_MATERIALS;
     if (view->material_names) h.flags |= FCT_FORMAT_NAMES;

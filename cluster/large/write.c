@@ -396,6 +396,7 @@ static void fill_view(assembler *a) {
     a->view.def.direction_weight = (double)metric.direction_weight;
     a->view.def.shape_weight = (double)metric.shape_weight;
     a->view.def.source = NULL;
+    memcpy(a->view.origin, l->info.origin, sizeof a->view.origin);
 }
 
 static fct_result prepare(assembler *a) {

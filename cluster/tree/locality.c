@@ -8,6 +8,7 @@
 #include "cluster/tree/locality.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/parallel.h"
 #include "base/sort.h"
@@ -128,6 +129,7 @@ static fct_result allocate_sorter(const fct_env *env, sorter *s) {
                           .face_count = from->face_count,
                           .material_count = from->material_count,
                           .material_names = from->material_names};
+    memcpy(to->mesh.origin, from->origin, sizeof to->mesh.origin);
     const fct_array arrays[] = {FCT_ARRAY(to->mesh.positions, 3 * vertices),
                                 FCT_ARRAY(to->mesh.triangles, 3 * faces),
                                 FCT_ARRAY_IF(from->colors, to->mesh.colors, 3 * vertices),

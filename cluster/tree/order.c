@@ -252,6 +252,7 @@ static void copy_mesh(const fct_env *env, orderer *o) {
 
 static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_tree *tree) {
     tree->view.material_count = mesh->material_count;
+    memcpy(tree->view.origin, mesh->origin, sizeof tree->view.origin);
     if (!mesh->material_names) return FCT_OK;
     tree->names = fct_allocate_zero(env, mesh->material_count, sizeof *tree->names);
     if (!tree->names) return fct_fail_memory(env, "material names");

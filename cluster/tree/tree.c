@@ -58,6 +58,7 @@ fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out
     if (result != FCT_OK) return result;
     result = fct_mesh_create(env, view->vertex_count, view->face_count, arrays, out);
     if (result != FCT_OK) return result;
+    memcpy(out->origin, view->origin, sizeof out->origin);
     for (size_t v = 0; v < view->vertex_count; ++v) {
         size_t to = 3 * (size_t)view->vertex_ids[v];
         memcpy(out->positions + to, view->positions + 3 * v, 3 * sizeof(float));

@@ -108,6 +108,8 @@ typedef struct fct_tree_view {
     const char *const *material_names; /* material_count strings; or NULL */
     const char *source;                /* name of the mesh; never NULL */
     uint64_t source_hash;
+    double origin[3]; /* of the mesh: a vertex is at origin + position; all coordinates of the tree are
+                         relative */
     fct_tree_def def; /* the options of the build, with the weights that it used; def.source is NULL */
 } fct_tree_view;
 FCT_API fct_tree_view fct_tree_get(const fct_tree *tree);

@@ -246,7 +246,7 @@ static void every_flipped_byte_is_found(void **state) {
             }
             bytes[i] = old;
         }
-        assert_int_equal(refused, 512 + strlen("a sphere") + 1 + 2 * strlen("name 0") + 2);
+        assert_int_equal(refused, 536 + strlen("a sphere") + 1 + 2 * strlen("name 0") + 2);
         free(bytes);
     }
     assert_int_equal(quiet.alive, 0);
@@ -390,7 +390,7 @@ static void the_cut_is_that_of_the_nodes(void **state) {
 
 /* Finds a section in the bytes of a saved tree by its content. */
 static unsigned char *find_bytes(unsigned char *bytes, size_t size, const void *what, size_t length) {
-    for (size_t i = 512; i + length <= size; ++i)
+    for (size_t i = 536; i + length <= size; ++i)
         if (!memcmp(bytes + i, what, length)) return bytes + i;
     return NULL;
 }
@@ -445,9 +445,9 @@ static void errors_are_told(void **state) {
     assert_non_null(strstr(r.text, "there-is-no-such-file.fct"));
     assert_int_equal(fct_tree_parse(&env, "ply", "ply\nformat ascii 1.0", 20, &tree), FCT_ERROR_DATA);
     assert_non_null(strstr(r.text, "no hierarchy file"));
-    unsigned char old[512] = {0x89, 'F', 'C', 'T', '\r', '\n', 0x1A, '\n', 1, 0, 0, 0, 4, 3, 2, 1};
+    unsigned char old[536] = {0x89, 'F', 'C', 'T', '\r', '\n', 0x1A, '\n', 1, 0, 0, 0, 4, 3, 2, 1};
     assert_int_equal(fct_tree_parse(&env, "old.fct", old, sizeof old, &tree), FCT_ERROR_DATA);
-    assert_non_null(strstr(r.text, "old.fct: version 1 of the hierarchy file, expected 2"));
+    assert_non_null(strstr(r.text, "old.fct: version 1 of the hierarchy file, expected 3"));
     fct_mesh mesh;
     tree = build_small(&env, 2, &mesh);
     assert_int_equal(fct_tree_save(&env, tree, "/nowhere/at/all.fct"), FCT_ERROR_OUTPUT);

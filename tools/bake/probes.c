@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "tools/kit/rows.h"
-
 static json_t *describe_probes(const fct_scene_view *scene, const float *points, const fct_probe *probes,
                                size_t count) {
     json_t *list = json_array();
@@ -12,9 +10,9 @@ static json_t *describe_probes(const fct_scene_view *scene, const float *points,
         const fct_probe *p = probes + i;
         bool on_surface = p->instance != FCT_NONE;
         json_t *item = json_pack(
-            "{s:o, s:o, s:o, s:o, s:o, s:o}", "position", tool_json_floats(points + 3 * i, 3), "radiosity",
-            tool_json_floats(p->radiosity, 3), "irradiance", tool_json_floats(p->irradiance, 3), "instance",
-            on_surface ? json_integer(p->instance) : json_null(), "object",
+            "{s:o, s:o, s:o, s:o, s:o, s:o}", "position", tool_json_point(points + 3 * i, scene->origin),
+            "radiosity", tool_json_floats(p->radiosity, 3), "irradiance", tool_json_floats(p->irradiance, 3),
+            "instance", on_surface ? json_integer(p->instance) : json_null(), "object",
             on_surface ? tool_json_text(scene->instances[p->instance].name) : json_null(), "face",
             on_surface ? json_integer(p->face) : json_null());
         if (!item || json_array_append_new(list, item)) {
@@ -26,36 +24,31 @@ static json_t *describe_probes(const fct_scene_view *scene, const float *points,
 }
 
 int bake_read_probes(tool *t, const char *path, bake_probes *set) {
-    tool_rows rows;
-    int code = tool_rows_read(t, path, 6, 6, NULL, &rows);
+    int code = tool_rows_read(t, path, 6, 6, NULL, &set->rows);
     if (code != TOOL_DONE) return code;
-    set->count = rows.count;
-    set->points = tool_allocate(t, rows.count, 6 * sizeof *set->points);
-    if (!set->points) code = TOOL_MEMORY;
-    for (size_t i = 0; i < rows.count && code == TOOL_DONE; ++i) {
-        const float *row = rows.values + 6 * i;
-        double length = sqrt((double)row[3] * row[3] + (double)row[4] * row[4] + (double)row[5] * row[5]);
+    set->count = set->rows.count;
+    set->points = tool_allocate(t, set->count, 3 * sizeof *set->points);
+    set->normals = tool_allocate(t, set->count, 3 * sizeof *set->normals);
+    if (!set->points || !set->normals) code = TOOL_MEMORY;
+    for (size_t i = 0; i < set->count && code == TOOL_DONE; ++i) {
+        const double *row = set->rows.values + 6 * i;
+        double length = sqrt(row[3] * row[3] + row[4] * row[4] + row[5] * row[5]);
         if (!(length > 0)) {
             code = tool_fail(t, TOOL_DATA, "%s: row %zu: expected a normal, found a vector of length 0", path,
                              i + 1);
             break;
         }
-        set->normals = set->points + 3 * rows.count;
-        for (int c = 0; c < 3; ++c) {
-            set->points[3 * i + (size_t)c] = row[c];
-            set->normals[3 * i + (size_t)c] = (float)(row[3 + c] / length);
-        }
+        for (size_t c = 0; c < 3; ++c) set->normals[3 * i + c] = (float)(row[3 + c] / length);
     }
-    tool_rows_release(t, &rows);
     return code;
 }
 
 static void print_probes(tool *t, const bake_probes *set, const fct_probe *probes) {
     for (size_t i = 0; i < set->count; ++i) {
-        const float *p = set->points + 3 * i, *b = probes[i].radiosity, *e = probes[i].irradiance;
-        tool_say(t, "probe %g %g %g: radiosity %.6g %.6g %.6g, irradiance %.6g %.6g %.6g", (double)p[0],
-                 (double)p[1], (double)p[2], (double)b[0], (double)b[1], (double)b[2], (double)e[0],
-                 (double)e[1], (double)e[2]);
+        const double *p = set->rows.values + 6 * i;
+        const float *b = probes[i].radiosity, *e = probes[i].irradiance;
+        tool_say(t, "probe %g %g %g: radiosity %.6g %.6g %.6g, irradiance %.6g %.6g %.6g", p[0], p[1], p[2],
+                 (double)b[0], (double)b[1], (double)b[2], (double)e[0], (double)e[1], (double)e[2]);
     }
 }
 
@@ -63,6 +56,7 @@ int bake_run_probes(tool *t, fct_bake *bake, const fct_scene_view *scene, const 
                     json_t **out) {
     fct_probe *probes = tool_allocate(t, set->count, sizeof *probes);
     if (!probes) return TOOL_MEMORY;
+    tool_rows_points(&set->rows, 6, 0, scene->origin, set->points);
     int code = tool_result(t, fct_bake_probe(bake, set->count, set->points, set->normals, probes));
     if (code == TOOL_DONE) {
         print_probes(t, set, probes);
@@ -74,6 +68,8 @@ int bake_run_probes(tool *t, fct_bake *bake, const fct_scene_view *scene, const 
 }
 
 void bake_release_probes(tool *t, bake_probes *set) {
+    tool_rows_release(t, &set->rows);
     tool_release(t, set->points);
+    tool_release(t, set->normals);
     *set = (bake_probes){0};
 }

@@ -2,11 +2,13 @@
 #ifndef FCT_TOOLS_BAKE_PROBES_H
 #define FCT_TOOLS_BAKE_PROBES_H
 
-#include "tools/kit/env.h"
+#include "tools/kit/rows.h"
 
 typedef struct bake_probes {
     size_t count;
-    float *points, *normals; /* count x 3 each */
+    tool_rows rows; /* x y z nx ny nz */
+    float *points;  /* count x 3, relative to the origin of the scene */
+    float *normals; /* count x 3, unit */
 } bake_probes;
 
 /* Reads rows "x y z nx ny nz"; "-" is standard input. Returns an exit code. */

@@ -343,6 +343,12 @@ json_t *tool_json_text(const char *text) {
     return string;
 }
 
+json_t *tool_json_point(const float *point, const double *origin) {
+    json_t *array = json_array();
+    for (int i = 0; i < 3; ++i) json_array_append_new(array, json_real(origin[i] + (double)point[i]));
+    return array;
+}
+
 json_t *tool_json_floats(const float *values, int count) {
     json_t *array = json_array();
     for (int i = 0; i < count; ++i) json_array_append_new(array, json_real(values[i]));

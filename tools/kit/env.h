@@ -97,6 +97,8 @@ int tool_print(tool *t, json_t *object);
 /* A string; bytes that are no UTF-8 become '?'. */
 json_t *tool_json_text(const char *text);
 json_t *tool_json_floats(const float *values, int count);
+/* origin + point, three numbers. */
+json_t *tool_json_point(const float *point, const double *origin);
 
 /* Memory under --max-memory; NULL after a recorded error. */
 void *tool_allocate(tool *t, size_t count, size_t size);

@@ -22,24 +22,24 @@ typedef struct reader {
     const char *path;
     size_t line;
     int least, columns;
-    const float *missing;
+    const double *missing;
 } reader;
 
 /* Reads the numbers of one line into `row`; *found receives their count. */
-static int parse_row(const reader *r, const char *text, float *row, int *found) {
+static int parse_row(const reader *r, const char *text, double *row, int *found) {
     char word[40];
     *found = 0;
     for (;;) {
         text += strspn(text, " \t\r\n\v\f");
         if (!*text || *text == '#') break;
         char *end;
-        float value = strtof(text, &end);
+        double value = strtod(text, &end);
         if (end == text || !strchr(" \t\r\n\v\f#", *end))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number, found '%s'", r->path, r->line,
                              copy_word(text, word));
         bool must_be_finite = *found < r->least || isnan(value);
         bool written_infinite = strncasecmp(text + strspn(text, "+-"), "inf", 3) == 0;
-        if (!isfinite(value) && (must_be_finite || !written_infinite))
+        if (!isfinite((float)value) && (must_be_finite || !written_infinite))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a finite number, found '%s'", r->path,
                              r->line, copy_word(text, word));
         if (*found == r->columns)
@@ -58,7 +58,7 @@ static int parse_row(const reader *r, const char *text, float *row, int *found) 
 static int reserve_row(tool *t, tool_rows *rows, size_t *capacity, int columns) {
     if (rows->count < *capacity) return TOOL_DONE;
     size_t larger = *capacity ? *capacity + *capacity / 2 : 1024;
-    float *values = tool_allocate(t, larger, (size_t)columns * sizeof *values);
+    double *values = tool_allocate(t, larger, (size_t)columns * sizeof *values);
     if (!values) return TOOL_MEMORY;
     if (rows->values) memcpy(values, rows->values, rows->count * (size_t)columns * sizeof *values);
     tool_release(t, rows->values);
@@ -90,7 +90,8 @@ static int read_rows(reader *r, FILE *file, tool_rows *rows) {
     return code;
 }
 
-int tool_rows_read(tool *t, const char *path, int least, int columns, const float *missing, tool_rows *rows) {
+int tool_rows_read(tool *t, const char *path, int least, int columns, const double *missing,
+                   tool_rows *rows) {
     *rows = (tool_rows){0};
     bool standard = !strcmp(path, "-");
     FILE *file = standard ? stdin : fopen(path, "re");
@@ -101,6 +102,13 @@ int tool_rows_read(tool *t, const char *path, int least, int columns, const floa
     if (!standard) fclose(file);
     if (code != TOOL_DONE) tool_rows_release(t, rows);
     return code;
+}
+
+void tool_rows_points(const tool_rows *rows, int columns, int column, const double origin[3], float *points) {
+    for (size_t i = 0; i < rows->count; ++i)
+        for (int k = 0; k < 3; ++k)
+            points[3 * i + (size_t)k] =
+                (float)(rows->values[i * (size_t)columns + (size_t)(column + k)] - origin[k]);
 }
 
 void tool_rows_release(tool *t, tool_rows *rows) {

@@ -304,6 +304,10 @@ static int draw_parts(tool *t, const drawing_source *source, loader *l, drawing 
     return code;
 }
 
+static void copy_origin(const double origin[3], drawing *out) {
+    memcpy(out->mesh.origin, origin, sizeof out->mesh.origin);
+}
+
 int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     loader l = {0};
     bool surface = source->subject == DRAWING_SURFACE, scene;
@@ -319,6 +323,8 @@ int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     }
     code = scene ? use_scene(t, source->path, &l, out) : use_tree(t, source, &l);
     if (code == TOOL_DONE) code = draw_parts(t, source, &l, out);
+    if (code == TOOL_DONE && l.scene) copy_origin(fct_scene_get(l.scene).origin, out);
+    if (code == TOOL_DONE && l.tree) copy_origin(fct_tree_get(l.tree).origin, out);
     tool_release(t, l.cuts);
     tool_release(t, l.parts);
     fct_scene_destroy(l.scene);

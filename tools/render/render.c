@@ -192,11 +192,13 @@ static int read_camera(tool *t, const char *path, drawing_frame *frame) {
     fct_scene *scene;
     int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &scene));
     if (code != TOOL_DONE) return code;
-    fct_camera camera = fct_scene_get(scene).camera;
-    if (camera.given)
-        drawing_from_scene(&camera, frame);
-    else
+    fct_scene_view view = fct_scene_get(scene);
+    if (view.camera.given) {
+        drawing_from_scene(&view.camera, frame);
+        for (int k = 0; k < 3; ++k) frame->position[k] += view.origin[k], frame->target[k] += view.origin[k];
+    } else {
         code = tool_fail(t, TOOL_DATA, "%s: expected a scene with a camera, found none", path);
+    }
     fct_scene_destroy(scene);
     return code;
 }
@@ -207,9 +209,13 @@ static int choose_frame(tool *t, const render_options *o, const drawing *d, draw
     if (!frame->up && d->camera.given && fabsf(d->camera.up[2]) > fabsf(d->camera.up[1])) up = 2;
     frame->up = up;
     frame->up_vector[0] = 0, frame->up_vector[1] = up == 1, frame->up_vector[2] = up == 2;
-    if (o->scene) return read_camera(t, o->scene, frame);
-    if (d->camera.given && !o->camera && frame->view < 0) drawing_from_scene(&d->camera, frame);
-    return TOOL_DONE;
+    int code = o->scene ? read_camera(t, o->scene, frame) : TOOL_DONE;
+    for (int k = 0; frame->given && k < 3; ++k) { /* relative to the drawing */
+        frame->position[k] -= d->mesh.origin[k];
+        frame->target[k] -= d->mesh.origin[k];
+    }
+    if (!o->scene && d->camera.given && !o->camera && frame->view < 0) drawing_from_scene(&d->camera, frame);
+    return code;
 }
 
 /* Light grey behind surfaces, near black behind light. */
