@@ -4,8 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
-#include "base/io/file.h"
+#include "base/io/beside.h"
 #include "mesh/glb/read.h"
 #include "mesh/obj/read.h"
 #include "mesh/om/read.h"
@@ -26,6 +27,7 @@ static const format *find_format(const char *ending) {
                                      {"off", fct_read_off, FCT_OFF_LAYOUTS},
                                      {"stl", fct_read_stl, 1},
                                      {"glb", fct_read_glb, 1},
+                                     {"gltf", fct_read_glb, 1},
                                      {"om", fct_read_om, 1}};
     for (size_t i = 0; i < sizeof formats / sizeof *formats; ++i)
         if (!strcasecmp(formats[i].ending, ending)) return formats + i;
@@ -34,12 +36,12 @@ static const format *find_format(const char *ending) {
 
 static fct_result fail_format(const fct_env *env, const char *name) {
     return fct_fail(env, FCT_ERROR_DATA,
-                    "%s: unknown kind of file; .obj, .ply, .off, .stl, .om and .glb are known", name);
+                    "%s: unknown kind of file; .obj, .ply, .off, .stl, .om, .glb and .gltf are known", name);
 }
 
 /* Messages of one attempt to read a file, kept until it is known which attempt counts. Beyond MOST, the last
  * message replaces the one before it, because an error comes last. */
-enum { MOST = 12 };
+enum { MOST = 24 };
 typedef struct held {
     int count;
     fct_severity severity[MOST];
@@ -90,35 +92,59 @@ static fct_result read_soup(const format *f, const fct_source *source, fct_soup 
     return result;
 }
 
-fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
-                          const char *ending, fct_mesh *out) {
-    *out = (fct_mesh){0};
-    const format *f = find_format(ending);
-    if (!f) return fail_format(env, name);
-    if (!size) return fct_fail(env, FCT_ERROR_DATA, "%s: the file is empty", name);
+static fct_result parse_source(const fct_source *source, const format *f, fct_mesh *out) {
+    const fct_env *env = source->env;
+    if (!source->size) return fct_fail(env, FCT_ERROR_DATA, "%s: the file is empty", source->name);
     fct_result result = fct_progress(env, "read", 0);
     if (result != FCT_OK) return result;
     held *messages = fct_allocate(env, 2, sizeof *messages);
     if (!messages) return fct_fail_memory(env, "messages");
-    fct_source source = {env, name, data, size};
     fct_soup soup = {0};
-    result = read_soup(f, &source, &soup, messages, messages + 1);
+    result = read_soup(f, source, &soup, messages, messages + 1);
     fct_release(env, messages);
     if (result == FCT_OK) result = fct_progress(env, "read", 1);
-    if (result == FCT_OK) return fct_soup_mesh(env, name, &soup, out);
+    if (result == FCT_OK) return fct_soup_mesh(env, source->name, &soup, out);
     fct_soup_release(env, &soup);
     return result;
+}
+
+fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
+                          const char *ending, fct_mesh *out) {
+    *out = (fct_mesh){0};
+    const format *f = find_format(ending);
+    fct_source source = {env, name, data, size, NULL};
+    return f ? parse_source(&source, f, out) : fail_format(env, name);
 }
 
 fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out) {
     *out = (fct_mesh){0};
     bool standard = !strcmp(path, "-");
+    const format *f = find_format(fct_file_format(env, path));
+    if (!f) return fail_format(env, path);
+    fct_file file;
+    char *folder = fct_file_folder(env, path);
+    if (!folder) return FCT_ERROR_MEMORY;
+    fct_result result = fct_file_open(env, path, &file);
+    if (result == FCT_OK) {
+        fct_source source = {env, standard ? "standard input" : path, file.data, file.size, folder};
+        result = parse_source(&source, f, out);
+    }
+    fct_file_close(env, &file);
+    fct_release(env, folder);
+    return result;
+}
+
+fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool *out) {
     const char *ending = fct_file_format(env, path);
-    if (!find_format(ending)) return fail_format(env, path);
+    struct stat status;
+    *out = false;
+    if (strcasecmp(ending, "glb") != 0 && strcasecmp(ending, "gltf") != 0) return FCT_OK;
+    if (stat(path, &status) || !S_ISREG(status.st_mode)) return FCT_OK;
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
-    result = fct_mesh_parse(env, standard ? "standard input" : path, file.data, file.size, ending, out);
+    fct_source source = {env, path, file.data, file.size, NULL};
+    result = fct_glb_holds_light(&source, out);
     fct_file_close(env, &file);
     return result;
 }

@@ -5,8 +5,9 @@
 #include "base/env.h"
 #include "facetree/mesh.h"
 
-/* `format` is "obj", "ply", "off", "stl", "glb" or "om", in any case. `name` begins every message.
- * Errors: DATA (also for an unknown format), MEMORY, CANCELLED. */
+/* `format` is "obj", "ply", "off", "stl", "glb", "gltf" or "om", in any case. `name` begins every message. A
+ * glTF document in memory may not name other files. Errors: DATA (also for an unknown format), MEMORY,
+ * CANCELLED. */
 fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
                           const char *format, fct_mesh *out);
 

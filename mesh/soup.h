@@ -22,6 +22,7 @@ typedef struct fct_source {
     const char *name; /* begins every message */
     const void *data;
     size_t size;
+    const char *folder; /* where relative paths start, "" or ending in '/'. NULL: no other file may be read */
 } fct_source;
 
 typedef struct fct_soup {

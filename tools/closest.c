@@ -145,7 +145,7 @@ int tool_closest(int argc, char **argv) {
         .name = "closest",
         .synopsis = "IN --points FILE [-o FILE]",
         .summary = "find the nearest surface points",
-        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, .gltf). For each point the output "
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene.json. For each point the output "
                 "has one line: 'face x y z "
                 "distance', or 'instance face x y z distance' for a scene. Without -o the lines go to "
                 "standard output; with "

@@ -70,7 +70,7 @@ static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     set_count(object, "duplicate_faces", r.duplicate_faces);
     set_count(object, "unreferenced_vertices", r.unreferenced_vertices);
     set_count(object, "components", r.components);
-    set_count(object, "materials", mesh->material_count);
+    if (!json_object_get(object, "materials")) set_count(object, "materials", mesh->material_count);
     json_object_set_new(object, "vertex_colors", json_boolean(mesh->colors != NULL));
     json_object_set_new(object, "face_colors", json_boolean(mesh->face_colors != NULL));
     json_object_set_new(object, "normals", json_boolean(mesh->normals != NULL));
@@ -181,9 +181,26 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     return TOOL_DONE;
 }
 
+/* A glTF file is a mesh, and also a scene unless it stores light or has no faces. A pipe
+ * cannot be read again: it is a mesh only. */
+static int describe_mesh_file(tool *t, const char *path, json_t *object) {
+    fct_mesh mesh;
+    struct stat status;
+    bool lit = false, gltf = tool_is_gltf(t, path);
+    int code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
+    if (code != TOOL_DONE) return code;
+    if (gltf) code = tool_result(t, fct_mesh_file_holds_light(&t->env, path, &lit));
+    bool again = stat(path, &status) == 0 && S_ISREG(status.st_mode);
+    bool scene = gltf && again && !lit && mesh.face_count;
+    json_object_set_new(object, "kind", json_string(scene ? "scene" : "mesh"));
+    if (code == TOOL_DONE && scene) code = describe_scene(t, path, object);
+    if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
+    fct_mesh_release(&t->env, &mesh);
+    return code;
+}
+
 static int describe_file(tool *t, const char *path, bool verify, json_t **out) {
     bool tree = tool_has_format(t, path, "fct"), scene = tool_is_scene(t, path);
-    fct_mesh mesh = {0};
     if (verify && !tree)
         return tool_fail(t, TOOL_USAGE, "--verify: expected a hierarchy file (.fct), found '%s'", path);
     json_t *object = *out = json_pack("{s:o, s:s}", "file", tool_json_text(path), "kind",
@@ -198,9 +215,7 @@ static int describe_file(tool *t, const char *path, bool verify, json_t **out) {
     } else if (scene) {
         code = describe_scene(t, path, object);
     } else {
-        code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
-        if (code == TOOL_DONE) code = describe_mesh(t, &mesh, object);
-        fct_mesh_release(&t->env, &mesh);
+        code = describe_mesh_file(t, path, object);
     }
     return code;
 }
@@ -281,22 +296,22 @@ int tool_info(int argc, char **argv) {
         .name = "info",
         .synopsis = "FILE",
         .summary = "count what a file holds; check a hierarchy file",
-        .text =
-            "FILE is a mesh, a hierarchy file (.fct), a scene (.json, .gltf), or a folder of them: then each "
-            "file has a line, and --json lists the files in files[], with error for one that cannot be "
-            "read.\n\n"
-            "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
-            "(boundary, non-manifold and "
-            "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
-            "prints the header, which is "
-            "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
-            "bounds, depth, roots, and "
-            "the source and options of the build.\n\n"
-            "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
-            "node it checks that box "
-            "and cone contain the faces, and that area, moment, centroid and plane match them. If a "
-            "check fails, the message says "
-            "which, and the exit code is 65.\n\nJSON keys: as printed.",
+        .text = "FILE is a mesh, a hierarchy file (.fct), a scene.json, a glTF file (.gltf, .glb), whose "
+                "mesh and scene are both counted, or a folder of them: then each "
+                "file has a line, and --json lists the files in files[], with error for one that cannot be "
+                "read.\n\n"
+                "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
+                "(boundary, non-manifold and "
+                "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
+                "prints the header, which is "
+                "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
+                "bounds, depth, roots, and "
+                "the source and options of the build.\n\n"
+                "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
+                "node it checks that box "
+                "and cone contain the faces, and that area, moment, centroid and plane match them. If a "
+                "check fails, the message says "
+                "which, and the exit code is 65.\n\nJSON keys: as printed.",
         .examples = "  facetree info bunny.obj\n"
                     "  facetree info meshes/\n"
                     "  facetree info bunny.fct --verify",

@@ -327,8 +327,8 @@ int tool_raycast(int argc, char **argv) {
         .name = "raycast",
         .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]\nIN --make-rays N -o FILE",
         .summary = "shoot rays; compare both backends",
-        .text = "IN is a mesh, a hierarchy file (.fct) or a scene (.json, "
-                ".gltf). For each ray the output has one line with the closest "
+        .text = "IN is a mesh, a hierarchy file (.fct) or a scene.json. "
+                "For each ray the output has one line with the closest "
                 "hit for tmin <= t <= tmax: 'face t u v', or 'instance face t u "
                 "v' for a scene, or -1 if the ray misses. The hit "
                 "point is (1 - u - v) p0 + u p1 + v p2. Without -o the hits go "

@@ -70,6 +70,9 @@ typedef struct fct_env {
      * NULL:
      * "-" is a PLY, and other such names are errors. */
     const char *input_format;
+
+    /* Whether a scene file may name buffers outside of its folder. Default: false. */
+    bool allow_outside;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);

@@ -83,10 +83,11 @@ FCT_API fct_result fct_mesh_inspect(const fct_env *env, const fct_mesh *mesh, fc
 FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
 
 /* Reads OBJ, PLY (text, both byte orders, strips), OFF, STL (corners with equal coordinates become one
- * vertex), OM and GLB (meshes placed by their nodes; colours from _RADIOSITY, else COLOR_0). The ending of
- * the name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB and become
- * linear. Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other colours. A
- * mesh without faces is valid. Messages name the data that a mesh cannot store (lines, normals that differ by
+ * vertex), OM and glTF 2.0 (.glb, .gltf: meshes placed by their nodes; colours from _RADIOSITY, else
+ * COLOR_0; buffers in the folder of the file or below, anywhere with env->allow_outside). The ending of the
+ * name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB and become linear.
+ * Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other colours. A mesh
+ * without faces is valid. Messages name the data that a mesh cannot store (lines, normals that differ by
  * corner, ...). docs/mesh.md lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY,
  * CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
@@ -95,6 +96,11 @@ FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh 
  * *known is false for other files. Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bool *known,
                                         uint32_t *face_count, uint32_t *vertex_count);
+
+/* Whether a glTF file stores light at its vertices (_RADIOSITY), as a bake does. Such a file is a lit mesh;
+ * another glTF file is a scene. *out is false for other kinds of files, and for pipes, which can be read only
+ * once. Errors: INPUT, DATA, MEMORY. */
+FCT_API fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool *out);
 
 typedef struct fct_mesh_save_def {
     uint32_t size;

@@ -1,9 +1,10 @@
-/* scene/read/gltf.c: reads glTF 2.0: materials, meshes, nodes and the first perspective camera.
+/* scene/read/gltf.c: reads glTF 2.0 into a scene: materials, meshes as models, nodes as objects, and the
+ * first perspective camera.
  *
- * Source: glTF 2.0 specification, chapters 3.5 to 3.10, and KHR_materials_emissive_strength. Nodes share
- * meshes. When the first node places a mesh, the mesh becomes models, one per material. Points, lines,
- * textures, skins and animations are ignored. A mirroring node reverses the winding, as the specification
- * requires and as instances of a scene do.
+ * Source: glTF 2.0 specification, chapters 3.5 to 3.10, and KHR_materials_emissive_strength. mesh/glb/ reads
+ * the document, its nodes and its triangles. Nodes share meshes: when the first node places a mesh, the mesh
+ * becomes models, one per material. A mirroring node reverses the winding, as the specification requires and
+ * as instances of a scene do.
  */
 #include "scene/read/gltf.h"
 
@@ -11,233 +12,126 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "mesh/glb/glb.h"
-#include "mesh/soup.h"
-#include "scene/read/gltf_pack.h"
+#include "mesh/glb/features.h"
+#include "mesh/glb/primitive.h"
 #include "scene/transform.h"
-
-typedef struct visit {
-    int64_t node;
-    double to_world[12]; /* of the parent node */
-} visit;
 
 typedef struct reader {
     fct_scene *scene;
     const fct_env *env;
-    const char *name;
     fct_glb glb;
-    fct_scene_parts *meshes;        /* per mesh; count 0: not read yet */
-    unsigned char *visited, *empty; /* per node; per mesh: it has been read and has no triangles */
-    size_t mesh_count, node_count, material_count, whitened;
-    visit *stack;
-    size_t stack_count, stack_capacity;
-    fct_soup soup; /* of the mesh that is being read */
-    size_t position_capacity, corner_capacity, label_capacity;
+    fct_glb_builder builder; /* of the mesh that is being read */
+    fct_scene_parts *meshes; /* per mesh; count 0: not read yet */
+    unsigned char *empty;    /* per mesh: it has been read and has no triangles */
+    size_t mesh_count, clamped, flat;
+    uint32_t material_count; /* of the file; the scene has one more, for primitives without a material */
 } reader;
 
-static size_t count_items(const reader *r, const char *name) {
-    return json_array_size(json_object_get(r->glb.root, name));
-}
-
-static fct_result fail_item(const reader *r, const char *what, int64_t index, const char *text) {
-    return fct_fail(r->env, FCT_ERROR_DATA, "%s: %s[%lld]: %s", r->name, what, (long long)index, text);
-}
-
-/* Reads `count` numbers. If the key is absent, *out is unchanged and the result is true. */
-static bool read_numbers(json_t *object, const char *key, size_t count, double *out) {
-    json_t *array = json_object_get(object, key);
-    if (!array) return true;
-    if (json_array_size(array) != count) return false;
-    for (size_t k = 0; k < count; ++k) {
-        if (!json_is_number(json_array_get(array, k))) return false;
-        out[k] = json_number_value(json_array_get(array, k));
-    }
-    return true;
-}
-
+/* Copies the name of an object, or "WHAT NUMBER" if it has none. A long name ends before the first character
+ * that does not fit. */
 static void name_item(json_t *object, const char *what, size_t index, char *out, size_t size) {
     const char *name = json_string_value(json_object_get(object, "name"));
-    if (name && name[0])
-        snprintf(out, size, "%.*s", (int)size - 1, name);
-    else
+    if (!name || !name[0]) {
         snprintf(out, size, "%s %zu", what, index);
+        return;
+    }
+    size_t length = strlen(name);
+    if (length >= size) length = size - 1;
+    while (length && ((unsigned char)name[length] & 0xc0) == 0x80) --length; /* inside a character of UTF-8 */
+    memcpy(out, name, length);
+    out[length] = 0;
 }
 
 /* ---- Materials: those of the file, then one for primitives without a material ---- */
 
-static fct_result read_materials(reader *r) {
-    r->material_count = count_items(r, "materials");
-    for (size_t k = 0; k <= r->material_count; ++k) {
-        json_t *object = json_array_get(json_object_get(r->glb.root, "materials"), k);
-        json_t *surface = json_object_get(object, "pbrMetallicRoughness"),
-               *strong = json_object_get(
-                   json_object_get(json_object_get(object, "extensions"), "KHR_materials_emissive_strength"),
-                   "emissiveStrength");
-        double color[4] = {1, 1, 1, 1}, light[3] = {0, 0, 0},
-               strength = strong ? json_number_value(strong) : 1;
-        fct_material material = {.two_sided = json_is_true(json_object_get(object, "doubleSided"))};
-        name_item(object, "material", k, material.name, sizeof material.name);
-        if (k == r->material_count) {
-            color[0] = color[1] = color[2] = .7;
-            strcpy(material.name, "(none)");
-        } else if (!read_numbers(surface, "baseColorFactor", 4, color) ||
-                   !read_numbers(object, "emissiveFactor", 3, light)) {
-            return fail_item(r, "materials", (int64_t)k,
-                             "expected 4 numbers of baseColorFactor and 3 of emissiveFactor");
-        }
-        bool white = false;
-        for (int c = 0; c < 3; ++c) {
-            if (!(color[c] >= 0 && color[c] <= 1))
-                return fail_item(r, "materials", (int64_t)k, "expected a base colour in [0, 1]");
-            if (!(light[c] >= 0 && strength >= 0))
-                return fail_item(r, "materials", (int64_t)k, "expected an emission >= 0");
-            white |= color[c] > FCT_SCENE_MOST_REFLECTANCE;
-            material.reflectance[c] = fminf((float)color[c], FCT_SCENE_MOST_REFLECTANCE);
-            material.emission[c] = (float)(light[c] * strength);
-        }
-        uint32_t id;
-        r->whitened += white;
-        fct_result result = fct_scene_add_material(r->scene, &material, &id);
-        if (result != FCT_OK) return result;
+static fct_result read_material(reader *r, json_t *object, size_t index, fct_material *out) {
+    json_t *surface = json_object_get(object, "pbrMetallicRoughness"),
+           *strong = json_object_get(fct_glb_extension(object, "KHR_materials_emissive_strength"),
+                                     "emissiveStrength");
+    double color[4] = {1, 1, 1, 1}, light[3] = {0, 0, 0}, strength = strong ? json_number_value(strong) : 1;
+    *out = (fct_material){.two_sided = json_is_true(json_object_get(object, "doubleSided"))};
+    name_item(object, "material", index, out->name, sizeof out->name);
+    fct_result result =
+        fct_glb_numbers(&r->glb, surface, "materials", (int64_t)index, "baseColorFactor", 4, color);
+    if (result == FCT_OK)
+        result = fct_glb_numbers(&r->glb, object, "materials", (int64_t)index, "emissiveFactor", 3, light);
+    if (result != FCT_OK) return result;
+    bool clamped = false;
+    for (int c = 0; c < 3; ++c) {
+        if (!(color[c] >= 0) || !(light[c] >= 0 && strength >= 0))
+            return fct_glb_fail(&r->glb, "materials[%zu]: expected a base colour and an emission >= 0",
+                                index);
+        clamped |= color[c] > FCT_SCENE_MOST_REFLECTANCE;
+        out->reflectance[c] = fminf((float)color[c], FCT_SCENE_MOST_REFLECTANCE);
+        out->emission[c] = (float)(light[c] * strength);
     }
-    if (r->whitened)
-        fct_note(r->env, FCT_MESSAGE_NOTE,
-                 "%s: %zu materials reflect more than %g; their reflectance is reduced to %g", r->name,
-                 r->whitened, (double)FCT_SCENE_MOST_REFLECTANCE, (double)FCT_SCENE_MOST_REFLECTANCE);
+    r->clamped += clamped;
     return FCT_OK;
+}
+
+static fct_result read_materials(reader *r) {
+    json_t *materials = json_object_get(r->glb.root, "materials");
+    r->material_count = (uint32_t)json_array_size(materials);
+    fct_result result = FCT_OK;
+    for (size_t k = 0; k <= r->material_count && result == FCT_OK; ++k) {
+        fct_material material = {.name = "(none)", .reflectance = {.7f, .7f, .7f}};
+        uint32_t id;
+        if (k < r->material_count) result = read_material(r, json_array_get(materials, k), k, &material);
+        if (result == FCT_OK) result = fct_scene_add_material(r->scene, &material, &id);
+    }
+    if (result == FCT_OK && r->clamped)
+        fct_glb_warn(&r->glb, "%zu materials reflect more than %g; their reflectance is reduced to %g",
+                     r->clamped, (double)FCT_SCENE_MOST_REFLECTANCE, (double)FCT_SCENE_MOST_REFLECTANCE);
+    return result;
 }
 
 /* ---- Meshes ---- */
 
-/* Positions in the index list of the corners of triangle k of a list (mode 4), a strip (5) or a fan (6). */
-static void find_triangle_places(int64_t mode, size_t k, size_t places[3]) {
-    size_t odd = k & 1;
-    places[0] = mode == 4 ? 3 * k : mode == 5 ? k : k + 1;
-    places[1] = mode == 4 ? 3 * k + 1 : mode == 5 ? k + 1 + odd : k + 2;
-    places[2] = mode == 4 ? 3 * k + 2 : mode == 5 ? k + 2 - odd : 0;
-}
-
-static fct_result add_positions(reader *r, const fct_glb_array *positions) {
-    fct_soup *soup = &r->soup;
-    size_t total = soup->vertex_count + positions->count;
-    if (total > FCT_MESH_LIMIT) return fct_fail(r->env, FCT_ERROR_DATA, "%s: too many vertices", r->name);
-    fct_result result =
-        fct_grow(r->env, (void **)&soup->positions, &r->position_capacity, total, 3 * sizeof(float));
-    for (size_t v = 0; result == FCT_OK && v < positions->count; ++v)
-        for (int c = 0; c < 3; ++c)
-            soup->positions[3 * (soup->vertex_count + v) + (size_t)c] = (float)fct_glb_value(positions, v, c);
-    return result;
-}
-
-static fct_result add_triangles(reader *r, int64_t mode, const fct_glb_array *indices, size_t vertices,
-                                size_t count, uint32_t label) {
-    fct_soup *soup = &r->soup;
-    size_t triangles = mode == 4   ? count / 3
-                       : count < 3 ? 0
-                                   : count - 2,
-           total = soup->polygon_count + triangles;
-    if (total > FCT_MESH_LIMIT) return fct_fail(r->env, FCT_ERROR_DATA, "%s: too many triangles", r->name);
-    fct_result result =
-        fct_grow(r->env, (void **)&soup->corners, &r->corner_capacity, 3 * total, sizeof *soup->corners);
-    if (result == FCT_OK)
-        result =
-            fct_grow(r->env, (void **)&soup->materials, &r->label_capacity, total, sizeof *soup->materials);
-    for (size_t k = 0; result == FCT_OK && k < triangles; ++k) {
-        size_t places[3];
-        find_triangle_places(mode, k, places);
-        for (int j = 0; j < 3; ++j) {
-            double index = indices ? fct_glb_value(indices, places[j], 0) : (double)places[j];
-            if (!(index >= 0 && index < (double)vertices))
-                return fct_fail(r->env, FCT_ERROR_DATA, "%s: vertex index %.0f is out of range, of %zu",
-                                r->name, index, vertices);
-            soup->corners[soup->corner_count++] = soup->vertex_count + (uint32_t)index;
-        }
-        soup->materials[soup->polygon_count++] = label;
-    }
-    return result;
-}
-
-static fct_result add_primitive(reader *r, json_t *primitive) {
-    int64_t position, index, mode, material;
-    fct_glb_array positions, indices;
-    fct_result result =
-        fct_glb_index(&r->glb, json_object_get(primitive, "attributes"), "POSITION", &position);
-    if (result == FCT_OK) result = fct_glb_index(&r->glb, primitive, "indices", &index);
-    if (result == FCT_OK) result = fct_glb_index(&r->glb, primitive, "mode", &mode);
-    if (result == FCT_OK) result = fct_glb_index(&r->glb, primitive, "material", &material);
-    if (result != FCT_OK || position == FCT_GLB_ABSENT) return result;
-    if (mode == FCT_GLB_ABSENT) mode = 4;
-    if (mode > 6)
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive has mode %lld, expected 0 to 6", r->name,
-                        (long long)mode);
-    if (mode < 4) return FCT_OK;
-    if (material != FCT_GLB_ABSENT && (uint64_t)material >= r->material_count)
-        return fail_item(r, "materials", material, "a primitive uses it, but it does not exist");
-    result = fct_glb_array_of(&r->glb, position, 3, 3, &positions);
-    if (result == FCT_OK && index != FCT_GLB_ABSENT)
-        result = fct_glb_array_of(&r->glb, index, 1, 1, &indices);
-    if (result == FCT_OK) result = add_positions(r, &positions);
-    if (result != FCT_OK) return result;
-    bool indexed = index != FCT_GLB_ABSENT;
-    size_t count = indexed ? indices.count : positions.count;
-    if (mode == 4 && count % 3)
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: a primitive has %zu indices, expected a multiple of 3",
-                        r->name, count);
-    uint32_t label = material == FCT_GLB_ABSENT ? (uint32_t)r->material_count : (uint32_t)material;
-    result = add_triangles(r, mode, indexed ? &indices : NULL, positions.count, count, label);
-    r->soup.vertex_count += (uint32_t)positions.count;
-    return result;
-}
-
-/* Adds the models of a mesh to the scene, unless they are there already. */
-static fct_result need_mesh(reader *r, int64_t index) {
-    json_t *mesh, *primitive;
-    size_t k;
+/* Makes models of the triangles in the soup. Releases the soup. */
+static fct_result add_models(reader *r, json_t *mesh, int64_t index, fct_soup *soup) {
     char name[128];
     fct_mesh made;
-    fct_result result = fct_glb_item(&r->glb, "meshes", index, &mesh);
-    if (result != FCT_OK || r->meshes[index].count || r->empty[index]) return result;
-    r->soup = (fct_soup){0};
-    r->position_capacity = r->corner_capacity = r->label_capacity = 0;
-    json_array_foreach(json_object_get(mesh, "primitives"), k, primitive) {
-        if (result == FCT_OK) result = add_primitive(r, primitive);
-    }
-    if (result != FCT_OK || r->soup.polygon_count == 0) {
-        r->empty[index] = result == FCT_OK;
-        fct_soup_release(r->env, &r->soup);
-        return result;
-    }
-    uint32_t *labels = r->soup.materials; /* face k is triangle k, because nothing is triangulated */
-    r->soup.materials = NULL;
-    result = fct_soup_mesh(r->env, r->name, &r->soup, &made);
+    uint32_t *labels = soup->materials; /* face k is triangle k, because nothing is triangulated */
+    soup->materials = NULL;
+    fct_result result = fct_soup_mesh(r->env, r->glb.source->name, soup, &made);
     name_item(mesh, "mesh", (size_t)index, name, sizeof name);
     if (result == FCT_OK) {
-        result = fct_scene_split(r->scene, name, &made, NULL, labels, (uint32_t)r->material_count + 1,
-                                 r->meshes + index);
+        result =
+            fct_scene_split(r->scene, name, &made, NULL, labels, r->material_count + 1, r->meshes + index);
         fct_mesh_release(r->env, &made);
     }
     fct_release(r->env, labels);
     return result;
 }
 
-/* ---- Nodes ---- */
-
-static fct_result read_local_transform(const reader *r, json_t *node, int64_t index, double out[12]) {
-    double m[16], t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
-    bool matrix = json_object_get(node, "matrix") != NULL;
-    if (!read_numbers(node, "matrix", 16, m) || !read_numbers(node, "translation", 3, t) ||
-        !read_numbers(node, "rotation", 4, q) || !read_numbers(node, "scale", 3, s))
-        return fail_item(r, "nodes", index,
-                         "expected numbers: 16 of matrix, 3 of translation, 4 of rotation, 3 of scale");
-    fct_transform_compose(t, q, s, out);
-    for (int i = 0; matrix && i < 12; ++i) out[i] = m[4 * (i % 4) + i / 4];
-    return FCT_OK;
+/* Adds the models of a mesh to the scene, unless they are there already. */
+static fct_result need_mesh(reader *r, int64_t index) {
+    static const fct_glb_transform identity = {.m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, .identity = true};
+    json_t *mesh;
+    fct_result result = fct_glb_item(&r->glb, "meshes", index, &mesh);
+    if (result != FCT_OK || r->meshes[index].count || r->empty[index]) return result;
+    fct_soup soup = {0};
+    size_t incomplete = r->builder.incomplete;
+    r->builder = (fct_glb_builder){.glb = &r->glb,
+                                   .soup = &soup,
+                                   .has_materials = true,
+                                   .unnamed = r->material_count,
+                                   .incomplete = incomplete};
+    result = fct_glb_append_mesh(&r->builder, index, &identity);
+    fct_glb_end_soup(&r->builder);
+    if (result == FCT_OK && soup.polygon_count) return add_models(r, mesh, index, &soup);
+    r->empty[index] = result == FCT_OK;
+    fct_soup_release(r->env, &soup);
+    return result;
 }
 
-static fct_result read_node_camera(reader *r, json_t *node, int64_t index, const double m[12]) {
+/* ---- Nodes ---- */
+
+static fct_result read_node_camera(reader *r, const fct_glb_place *place) {
     json_t *object;
     int64_t camera;
-    fct_result result = fct_glb_index(&r->glb, node, "camera", &camera);
+    const double *m = place->to_world.m;
+    fct_result result = fct_glb_index(&r->glb, place->node, "camera", &camera);
     if (result != FCT_OK || camera == FCT_GLB_ABSENT || r->scene->camera.given) return result;
     result = fct_glb_item(&r->glb, "cameras", camera, &object);
     if (result != FCT_OK) return result;
@@ -245,111 +139,77 @@ static fct_result read_node_camera(reader *r, json_t *node, int64_t index, const
     fct_camera c = {.vertical_fov = (float)(angle * 180 / 3.14159265358979323846)};
     if (!json_object_get(object, "perspective")) return FCT_OK;
     if (!(c.vertical_fov > 0 && c.vertical_fov < 180))
-        return fail_item(r, "cameras", camera, "expected yfov in (0, pi)");
+        return fct_glb_fail(&r->glb, "cameras[%lld]: expected yfov in (0, pi)", (long long)camera);
     for (int k = 0; k < 3; ++k) {
         c.position[k] = (float)m[4 * k + 3];
         c.target[k] = (float)(m[4 * k + 3] - m[4 * k + 2]);
         c.up[k] = (float)m[4 * k + 1];
         if (!isfinite(c.position[k]) || !isfinite(c.target[k]) || !isfinite(c.up[k]))
-            return fail_item(r, "nodes", index, "the camera's transform is not finite");
+            return fct_glb_fail(&r->glb, "nodes[%lld]: the camera's transform is not finite",
+                                (long long)place->index);
     }
     fct_scene_set_camera(r->scene, &c);
     return FCT_OK;
 }
 
-static fct_result place_node_mesh(reader *r, json_t *node, int64_t index, const double m[12]) {
-    int64_t mesh;
+/* A node that flattens its mesh has no inverse transform: its mesh is left out. */
+static bool is_flat(const float to_world[12]) {
+    fct_instance probe;
+    double inverse[12];
+    return fct_transform_set(to_world, &probe, inverse) == FCT_TRANSFORM_SINGULAR;
+}
+
+static fct_result place_mesh(reader *r, const fct_glb_place *place) {
     char name[128];
     float to_world[12];
-    fct_result result = fct_glb_index(&r->glb, node, "mesh", &mesh);
-    if (result != FCT_OK || mesh == FCT_GLB_ABSENT) return result;
-    result = need_mesh(r, mesh);
-    if (result != FCT_OK || r->empty[mesh]) return result;
-    name_item(node, "node", (size_t)index, name, sizeof name);
-    for (int k = 0; k < 12; ++k) to_world[k] = (float)m[k];
-    const fct_scene_parts *parts = r->meshes + mesh;
+    fct_result result = need_mesh(r, place->mesh);
+    if (result != FCT_OK || r->empty[place->mesh]) return result;
+    for (int k = 0; k < 12; ++k) to_world[k] = (float)place->to_world.m[k];
+    if (is_flat(to_world)) {
+        ++r->flat;
+        return FCT_OK;
+    }
+    if (place->node)
+        name_item(place->node, "node", (size_t)place->index, name, sizeof name);
+    else
+        name_item(json_array_get(json_object_get(r->glb.root, "meshes"), (size_t)place->mesh), "mesh",
+                  (size_t)place->mesh, name, sizeof name);
+    const fct_scene_parts *parts = r->meshes + place->mesh;
     return fct_scene_place(r->scene, name, parts->first, parts->count, parts->labels, to_world);
 }
 
-static fct_result push_nodes(reader *r, json_t *nodes, const double to_world[12]) {
-    fct_result result = FCT_OK;
-    for (size_t k = json_array_size(nodes); k-- > 0 && result == FCT_OK;) {
-        json_t *item = json_array_get(nodes, k);
-        if (!json_is_integer(item))
-            return fct_fail(r->env, FCT_ERROR_DATA,
-                            "%s: a list of nodes holds something else than a whole number", r->name);
-        result =
-            fct_grow(r->env, (void **)&r->stack, &r->stack_capacity, r->stack_count + 1, sizeof *r->stack);
-        if (result != FCT_OK) return result;
-        visit *v = r->stack + r->stack_count++;
-        v->node = json_integer_value(item);
-        memcpy(v->to_world, to_world, sizeof v->to_world);
-    }
-    return result;
+static fct_result visit_node(void *user, const fct_glb_place *place) {
+    reader *r = user;
+    fct_result result = place->node ? read_node_camera(r, place) : FCT_OK;
+    return result == FCT_OK && place->mesh != FCT_GLB_ABSENT ? place_mesh(r, place) : result;
 }
 
-static fct_result visit_node(reader *r, const visit *v) {
-    json_t *node;
-    double local[12], to_world[12];
-    fct_result result = fct_glb_item(&r->glb, "nodes", v->node, &node);
-    if (result != FCT_OK) return result;
-    if (r->visited[v->node]) return fail_item(r, "nodes", v->node, "it has two parents");
-    r->visited[v->node] = 1;
-    result = read_local_transform(r, node, v->node, local);
-    if (result != FCT_OK) return result;
-    fct_transform_multiply(v->to_world, local, to_world);
-    result = read_node_camera(r, node, v->node, to_world);
-    if (result == FCT_OK) result = place_node_mesh(r, node, v->node, to_world);
-    return result == FCT_OK ? push_nodes(r, json_object_get(node, "children"), to_world) : result;
-}
-
-static fct_result visit_all_nodes(reader *r) {
-    double identity[12];
-    int64_t scene;
-    json_t *object;
-    for (int k = 0; k < 12; ++k) identity[k] = fct_transform_identity[k];
-    fct_result result = fct_glb_index(&r->glb, r->glb.root, "scene", &scene);
-    if (result == FCT_OK) result = fct_glb_item(&r->glb, "scenes", scene < 0 ? 0 : scene, &object);
-    if (result == FCT_OK) result = push_nodes(r, json_object_get(object, "nodes"), identity);
-    while (result == FCT_OK && r->stack_count > 0) {
-        visit v = r->stack[--r->stack_count];
-        result = visit_node(r, &v);
-    }
+static fct_result read_nodes(reader *r) {
+    r->mesh_count = fct_glb_count(&r->glb, "meshes");
+    const fct_array arrays[] = {FCT_ARRAY_ZERO(r->meshes, r->mesh_count),
+                                FCT_ARRAY_ZERO(r->empty, r->mesh_count)};
+    fct_result result = fct_allocate_all(r->env, arrays, FCT_LENGTH(arrays), "a glTF scene");
+    if (result == FCT_OK) result = fct_glb_visit_nodes(&r->glb, visit_node, r);
+    for (size_t k = 0; r->meshes && k < r->mesh_count; ++k) fct_release(r->env, r->meshes[k].labels);
+    fct_release_all(r->env, arrays, FCT_LENGTH(arrays));
+    if (r->flat)
+        fct_glb_warn(&r->glb, "%zu nodes have a singular transform; their meshes are left out", r->flat);
     if (result == FCT_OK && r->scene->instance_count == 0)
-        result = fct_fail(r->env, FCT_ERROR_DATA, "%s: a scene needs at least one face, found none", r->name);
-    return result;
-}
-
-static fct_result read_glb(fct_scene *scene, const char *name, const unsigned char *data, size_t size) {
-    reader r = {.scene = scene, .env = scene->env, .name = name};
-    fct_source source = {scene->env, name, data, size};
-    fct_result result = fct_glb_open(&source, &r.glb);
-    if (result == FCT_OK) {
-        r.mesh_count = count_items(&r, "meshes"), r.node_count = count_items(&r, "nodes");
-        r.meshes = fct_allocate_zero(r.env, r.mesh_count, sizeof *r.meshes);
-        r.empty = fct_allocate_zero(r.env, r.mesh_count, 1);
-        r.visited = fct_allocate_zero(r.env, r.node_count, 1);
-        if (!r.meshes || !r.empty || !r.visited) result = fct_fail_memory(r.env, "a glTF scene");
-    }
-    if (result == FCT_OK) result = read_materials(&r);
-    if (result == FCT_OK) result = visit_all_nodes(&r);
-    for (size_t k = 0; r.meshes && k < r.mesh_count; ++k) fct_release(r.env, r.meshes[k].labels);
-    fct_release(r.env, r.meshes);
-    fct_release(r.env, r.empty);
-    fct_release(r.env, r.visited);
-    fct_release(r.env, r.stack);
-    fct_glb_close(&r.glb);
+        return fct_glb_fail(&r->glb, "a scene needs at least one face, found none");
     return result;
 }
 
 fct_result fct_scene_read_gltf(fct_scene *scene, const char *name, const unsigned char *data, size_t size,
                                const char *base) {
-    if (size >= 4 && memcmp(data, "glTF", 4) == 0) return read_glb(scene, name, data, size);
-    unsigned char *packed;
-    size_t packed_size;
-    fct_result result =
-        fct_gltf_pack(scene->env, name, (const char *)data, size, base, &packed, &packed_size);
-    if (result == FCT_OK) result = read_glb(scene, name, packed, packed_size);
-    fct_release(scene->env, packed);
+    fct_source source = {scene->env, name, data, size, base};
+    reader r = {.scene = scene, .env = scene->env};
+    fct_result result = fct_glb_open(&source, &r.glb);
+    if (result == FCT_OK) result = read_materials(&r);
+    if (result == FCT_OK) result = read_nodes(&r);
+    if (result == FCT_OK) {
+        fct_glb_report_builder(&r.builder);
+        fct_glb_report_features(&r.glb);
+    }
+    fct_glb_close(&r.glb);
     return result;
 }

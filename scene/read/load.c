@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/io/file.h"
+#include "base/io/beside.h"
 #include "scene/read/gltf.h"
 #include "scene/read/json/scene_json.h"
 #include "scene/read/model_file.h"
@@ -58,7 +58,7 @@ static fct_result read_scene_file(fct_scene *scene, const char *path) {
     const char *text = (const char *)file.data;
     /* A pipe cannot be read a second time. */
     bool plain = obj && file.mapped && !fct_scene_obj_names_materials(text, file.size);
-    char *base = fct_path_folder(env, path);
+    char *base = fct_file_folder(env, path);
     if (!base)
         result = FCT_ERROR_MEMORY;
     else if (json)

@@ -9,7 +9,7 @@
 #include <jansson.h>
 #include <string.h>
 
-#include "base/io/file.h"
+#include "base/io/beside.h"
 #include "mesh/load.h"
 #include "mesh/mesh.h"
 #include "mesh/obj/text.h"
@@ -241,7 +241,7 @@ fct_result fct_scene_obj_has_library(const fct_env *env, const char *path, bool 
     *found = false;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
-    char *base = fct_path_folder(env, path);
+    char *base = fct_file_folder(env, path);
     result = base ? FCT_OK : FCT_ERROR_MEMORY;
     if (base) result = find_library(env, base, fct_text_begin(env, path, file.data, file.size), &libraries);
     *found = result == FCT_OK && libraries.count;

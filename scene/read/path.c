@@ -12,19 +12,6 @@ bool fct_path_ends(const char *path, const char *ending) {
     return true;
 }
 
-char *fct_path_folder(const fct_env *env, const char *path) {
-    const char *slash = strrchr(path, '/');
-    size_t length = slash ? (size_t)(slash - path) + 1 : 0;
-    char *folder = fct_allocate(env, length + 1, 1);
-    if (!folder) {
-        fct_fail_memory(env, "a path");
-        return NULL;
-    }
-    memcpy(folder, path, length);
-    folder[length] = 0;
-    return folder;
-}
-
 char *fct_path_join(const fct_env *env, const char *base, const char *relative) {
     size_t head = relative[0] == '/' ? 0 : strlen(base), tail = strlen(relative);
     char *path = fct_allocate(env, head + tail + 1, 1);

@@ -4,8 +4,6 @@
 
 #include "base/env.h"
 
-/* "folder/" of a path, or "" if the path has no folder. NULL after a MEMORY error. The caller releases it. */
-char *fct_path_folder(const fct_env *env, const char *path);
 /* base + relative, or `relative` alone if it is absolute. NULL after a MEMORY error. The caller releases it.
  */
 char *fct_path_join(const fct_env *env, const char *base, const char *relative);

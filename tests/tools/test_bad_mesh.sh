@@ -90,7 +90,8 @@ for place in 200 $((size / 3)) $((size / 2)) $((size - 20)); do
     esac
 done
 
-# accepted FILE [CODE]: checks that every command accepts the file; bake returns CODE (default 0).
+# accepted FILE [dark]: checks that every command accepts the file. A bake of it finds no light. Unless `dark` is given, it can
+# be baked in a scene where it emits light.
 accepted() {
     local file=$1 faces
     expect 0 info "$file" --json
@@ -106,7 +107,15 @@ accepted() {
     expect 0 closest odd.fct --points points.txt
     expect 0 simplify "$file" --faces $((faces / 2)) -o odd.ply
     expect 0 compare "$file" odd.fct --samples 3
-    expect "${2:-0}" bake "$file" -o baked.ply
+    run bake "$file" -o baked.ply
+    check "a bake without light is refused" test "$code" = 65
+    [ "${2:-}" != dark ] || { rm -f odd.*; return; }
+    says "nothing emits light"
+    cat >odd.json <<END
+{"models": {"m": "$file"}, "materials": {"lamp": {"emission": 1}},
+ "instances": [{"model": "m", "material": "lamp"}]}
+END
+    expect 0 bake odd.json -o baked.ply
     rm -f odd.* baked.ply
 }
 triangle 0 '1 2 3' >one.obj
@@ -133,7 +142,7 @@ grid 24 >flat.off
 accepted flat.off
 for power in -30 30; do
     sphere 8 | awk -v p=$power 'NF == 3 && NR > 2 { printf "%.9g %.9g %.9g\n", $1 * 10 ^ p, $2 * 10 ^ p, $3 * 10 ^ p; next } { print }' >extent$power.off
-    accepted extent$power.off 65 # areas of such faces are beyond a float: there is no light to speak of
+    accepted extent$power.off dark # areas of such faces are beyond a float: no light is left
 done
 { sphere 6; } >twice.off # every face a second time, turned over
 awk 'NR == 2 { $2 *= 2; print; next } NF == 4 { print; print $1, $3, $2, $4; next } { print }' twice.off >duplicate.off

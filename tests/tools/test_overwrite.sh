@@ -104,7 +104,7 @@ commands() { # of each command that writes: with $1 as the output
     echo "raycast cube.off --rays rays.txt -o $1"
     echo "closest cube.off --points points.txt -o $1"
     echo "meshlets cube.off -o $1"
-    echo "bake cube.off -o $1"
+    echo "bake scene/scene.json --error 1 --final none -o $1"
     echo "make sphere -o $1"
 }
 while read -r line; do expect 0 $line; done < <(commands /dev/null)

@@ -201,13 +201,27 @@ typedef struct bake_answers {
     json_t *probes, *files; /* NULL: none */
 } bake_answers;
 
+/* Refuses a scene in which nothing emits light, because all colours would be black. */
+static int check_light(tool *t, const fct_scene_view *scene) {
+    for (uint32_t i = 0; i < scene->instance_count; ++i) {
+        const float *e = scene->materials[scene->instances[i].material].emission;
+        if (e[0] > 0 || e[1] > 0 || e[2] > 0) return TOOL_DONE;
+    }
+    return tool_fail(
+        t, TOOL_DATA,
+        "%s: nothing emits light; give a material an emission (\"emission\" in scene.json, Ke in "
+        "an MTL file, emissiveFactor in glTF)",
+        t->inputs[0]);
+}
+
 static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, fct_scene *scene, double load,
                        bake_answers *answers) {
     fct_bake *bake = NULL;
     bake_objects objects = {0};
     fct_scene_view view = fct_scene_get(scene);
     bool folder = t->output && is_folder_output(t->output);
-    int code = folder ? bake_plan_objects(t, &view, &objects) : TOOL_DONE;
+    int code = check_light(t, &view);
+    if (code == TOOL_DONE && folder) code = bake_plan_objects(t, &view, &objects);
     if (code == TOOL_DONE) code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
     if (code == TOOL_DONE && folder) {
         answers->files = json_array();
@@ -263,7 +277,8 @@ int tool_bake(int argc, char **argv) {
             "and clamped, "
             "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
             "triangles are divided, so "
-            "that they can carry shadows. The exit code is 1 if the solution has not converged.\n\n"
+            "that they can carry shadows. A scene in which nothing emits light is an error. The exit code is "
+            "1 if the solution has not converged.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
             "that is lit on both sides is written twice: its brighter side, then the other one, each with "

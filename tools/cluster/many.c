@@ -55,7 +55,7 @@ static int add_job(tool *t, job_list *all, const char *folder, const char *name)
 }
 
 static int is_mesh_entry(const struct dirent *entry) {
-    return tool_is_mesh_name(entry->d_name) && entry->d_name[0] != '.';
+    return (tool_is_mesh_name(entry->d_name) || tool_ends(entry->d_name, "gltf")) && entry->d_name[0] != '.';
 }
 
 static int add_folder(tool *t, job_list *all, const char *folder) {

@@ -20,6 +20,7 @@ enum {
     KEY_MAX_MEMORY,
     KEY_IN_PLACE,
     KEY_FORMAT,
+    KEY_OUTSIDE,
     KEY_USAGE,
     KEY_MAN,
     KEY_BASH,
@@ -43,6 +44,8 @@ static const struct argp_option common_options[] = {
     {"seed", KEY_SEED, "N", 0, "Seed of random samples (default 0)", -2},
     {"max-memory", KEY_MAX_MEMORY, "SIZE", 0,
      "Stop with exit code 75 if more memory than SIZE is needed, such as 500M or 2G (default: no limit)", -2},
+    {"allow-outside", KEY_OUTSIDE, NULL, 0,
+     "Also read buffers that a glTF file names outside of its own folder", -2},
     {"help", 'h', NULL, 0, "Print this help", -1},
     {"usage", KEY_USAGE, NULL, OPTION_HIDDEN, NULL, -1},
     {"man", KEY_MAN, NULL, OPTION_HIDDEN, NULL, -1},
@@ -124,6 +127,9 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
         if (!tool_size(text, &bytes) || !bytes)
             return tool_usage(state, "--max-memory: expected a size such as 500M, found '%s'", text);
         t->max_memory = bytes;
+        return 0;
+    case KEY_OUTSIDE:
+        t->allow_outside = true;
         return 0;
     case 'h':
     case KEY_USAGE:

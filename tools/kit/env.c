@@ -207,6 +207,29 @@ int tool_context(tool *t, int code, const char *path) {
 
 static void tool_note(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Adds a warning to the list for --json. False if it is there already. A text that is not UTF-8 becomes
+ * ASCII. */
+static bool keep_warning(tool *t, const char *text) {
+    size_t i;
+    json_t *item, *added = json_string(text);
+    char ascii[1024];
+    if (!added) {
+        snprintf(ascii, sizeof ascii, "%s", text);
+        for (char *c = ascii; *c; ++c)
+            if ((unsigned char)*c > 126) *c = '?';
+        added = json_string(ascii);
+    }
+    if (!t->warnings) t->warnings = json_array();
+    json_array_foreach(t->warnings, i, item) {
+        if (json_equal(item, added)) {
+            json_decref(added);
+            return false;
+        }
+    }
+    json_array_append_new(t->warnings, added);
+    return true;
+}
+
 /* The message hook. Errors are kept until the end, because the library may recover, and because a failed call
  * may send two messages. */
 static void take_message(void *user, fct_severity severity, const char *text) {
@@ -220,23 +243,24 @@ static void take_message(void *user, fct_severity severity, const char *text) {
     }
 }
 
-static void tell_person(tool *t, const char *before, const char *format, va_list values) {
-    if (t->quiet) return;
-    clear_bar(t);
-    print_line(stderr, before, format, values);
-}
-
 void tool_warn(tool *t, const char *format, ...) {
+    char text[1024];
     va_list values;
     va_start(values, format);
-    tell_person(t, "facetree: warning: ", format, values);
+    vsnprintf(text, sizeof text, format, values);
     va_end(values);
+    tool_clean_text(text);
+    if (!keep_warning(t, text) || t->quiet) return;
+    clear_bar(t);
+    fprintf(stderr, "facetree: warning: %s\n", text);
 }
 
 static void tool_note(tool *t, const char *format, ...) {
     va_list values;
+    if (t->quiet) return;
+    clear_bar(t);
     va_start(values, format);
-    tell_person(t, "facetree: ", format, values);
+    print_line(stderr, "facetree: ", format, values);
     va_end(values);
 }
 
@@ -276,6 +300,8 @@ int tool_json(tool *t, json_t *object) {
     if (!object) return t->json ? tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output") : TOOL_DONE;
     if (t->json) {
         clear_bar(t);
+        if (!t->warnings) t->warnings = json_array();
+        json_object_set(object, "warnings", t->warnings);
         if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) ||
             fputc('\n', stdout) == EOF)
             code = tool_fail(t, TOOL_OUTPUT, "standard output cannot be written");
@@ -393,6 +419,7 @@ void tool_env_open(tool *t) {
     t->env.release = limited_release;
     t->env.progress = show_progress;
     t->env.message = take_message;
+    t->env.allow_outside = t->allow_outside;
     t->env.memory_user = t->env.progress_user = t->env.message_user = t;
     if (t->max_memory) {
         t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */
@@ -408,6 +435,8 @@ void tool_env_open(tool *t) {
 int tool_env_close(tool *t, int code) {
     clear_bar(t);
     guard_release_inputs(&t->read);
+    json_decref(t->warnings);
+    t->warnings = NULL;
     if (code == TOOL_DONE || code == TOOL_NO || t->error_told) return code;
     if (guard_signal()) {
         fprintf(stderr, "%s: ended by signal %d (%s)\n", t->label, guard_signal(), strsignal(guard_signal()));

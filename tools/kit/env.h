@@ -30,7 +30,7 @@ typedef struct tool {
     int input_count;
     const char *format; /* of inputs without an ending, or NULL */
     const char *output; /* the value of -o, or NULL */
-    bool json, quiet, progress;
+    bool json, quiet, progress, allow_outside;
     bool in_place;    /* an output may replace an input */
     uint32_t threads; /* 0: all cores */
     uint64_t seed;
@@ -47,7 +47,8 @@ typedef struct tool {
     size_t memory_now, memory_peak;
     bool memory_refused, cancelled;
     char error[1536];
-    bool error_told; /* the error is printed already */
+    bool error_told;  /* the error is printed already */
+    json_t *warnings; /* texts of all warnings, each once */
     char phase[64];
     double phase_start, drawn;
     bool bar_visible, bar_off;
@@ -68,6 +69,8 @@ int tool_result(tool *t, fct_result result);
  * nothing with
  * --quiet or --json. */
 void tool_say(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Prints a warning, and adds it to the `warnings` of --json. A warning with a text that was printed before is
+ * not repeated. */
 void tool_warn(tool *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Prints a line on stderr, with '?' for control characters. */
@@ -90,7 +93,8 @@ double tool_seconds(void);
 /* The largest resident memory of the process so far, in bytes. */
 size_t tool_peak_bytes(void);
 
-/* Prints the one object of --json. Frees the object in any case. Returns an exit code. */
+/* Prints the one object of --json, with the warnings so far as `warnings`. Frees the object in any case.
+ * Returns an exit code. */
 int tool_json(tool *t, json_t *object);
 /* For commands whose answer is the object: like tool_json, but without --json prints lines "key value". */
 int tool_print(tool *t, json_t *object);

@@ -37,8 +37,12 @@ bool tool_has_format(const tool *t, const char *path, const char *format) {
     return t->env.input_format && !strcasecmp(t->env.input_format, format);
 }
 
+bool tool_is_gltf(const tool *t, const char *path) {
+    return tool_has_format(t, path, "glb") || tool_has_format(t, path, "gltf");
+}
+
 bool tool_is_scene(const tool *t, const char *path) {
-    return tool_has_format(t, path, "json") || tool_has_format(t, path, "gltf");
+    return tool_has_format(t, path, "json");
 }
 
 bool tool_is_folder(const char *path) {

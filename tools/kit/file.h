@@ -7,10 +7,12 @@
 
 /* Whether `path` ends in `.ending`, in any case. */
 bool tool_ends(const char *path, const char *ending);
+/* Whether the name is that of a mesh that can be written. */
 bool tool_is_mesh_name(const char *path);
 /* Whether the input has the format "fct", "obj" or another, by its name or by --format. */
 bool tool_has_format(const tool *t, const char *path, const char *format);
-/* Whether the input is a scene: json or gltf. */
+bool tool_is_gltf(const tool *t, const char *path);
+/* Whether the input is a scene.json. A glTF file is a scene where materials matter, else a mesh. */
 bool tool_is_scene(const tool *t, const char *path);
 bool tool_is_folder(const char *path);
 /* The last part of a path without its ending. */

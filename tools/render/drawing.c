@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -38,10 +39,17 @@ typedef struct loader {
 
 /* --- Kinds of files --- */
 
+/* Whether the file is a scene: a scene.json, an OBJ with materials, or a glTF file without baked light. A
+ * glTF file from a pipe cannot be read twice, and is a mesh. */
 static int find_scene_file(tool *t, const char *path, bool *scene) {
+    bool lit = false;
     *scene = tool_is_scene(t, path);
-    if (!tool_ends(path, "obj")) return TOOL_DONE;
-    return tool_result(t, fct_scene_obj_has_library(&t->env, path, scene));
+    if (tool_ends(path, "obj")) return tool_result(t, fct_scene_obj_has_library(&t->env, path, scene));
+    struct stat status;
+    if (!tool_is_gltf(t, path) || stat(path, &status) || !S_ISREG(status.st_mode)) return TOOL_DONE;
+    int code = tool_result(t, fct_mesh_file_holds_light(&t->env, path, &lit));
+    *scene = !lit;
+    return code;
 }
 
 /* --- Parts --- */
@@ -313,14 +321,8 @@ int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     bool surface = source->subject == DRAWING_SURFACE, scene;
     int code = find_scene_file(t, source->path, &scene);
     if (code != TOOL_DONE) return code;
-    if (surface && !scene && !tool_has_format(t, source->path, "fct")) {
-        code = tool_load_mesh(t, source->path, &out->mesh);
-        /* A glTF file without a bake is a scene with materials. */
-        scene = code == TOOL_DONE && strcmp(source->path, "-") && tool_has_format(t, source->path, "glb") &&
-                !out->mesh.colors;
-        if (!scene) return code;
-        fct_mesh_release(&t->env, &out->mesh);
-    }
+    if (surface && !scene && !tool_has_format(t, source->path, "fct"))
+        return tool_load_mesh(t, source->path, &out->mesh);
     code = scene ? use_scene(t, source->path, &l, out) : use_tree(t, source, &l);
     if (code == TOOL_DONE) code = draw_parts(t, source, &l, out);
     if (code == TOOL_DONE && l.scene) copy_origin(fct_scene_get(l.scene).origin, out);

@@ -1,6 +1,6 @@
 /* Nodes of GLB scenes: translation, rotation and scale, matrices and parents against vectors that the test
  * rotates by Rodrigues' formula; normals against the plane of the triangle that comes out. */
-#include "mesh_support.h"
+#include "mesh/mesh_support.h"
 
 static double next(uint64_t *state) {
     *state = *state * 6364136223846793005u + 1442695040888963407u;

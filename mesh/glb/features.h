@@ -1,0 +1,12 @@
+/* mesh/glb/features.h: reports the features of a glTF file that are left out. */
+#ifndef FCT_MESH_GLB_FEATURES_H
+#define FCT_MESH_GLB_FEATURES_H
+
+#include "mesh/glb/document/glb.h"
+
+/* Sends one warning with a count for each feature that the document uses and the readers leave out: lights,
+ * textures, transparency, instancing, animations, skins, morph targets, points and lines, other extensions.
+ */
+void fct_glb_report_features(const fct_glb *glb);
+
+#endif
