@@ -15,7 +15,7 @@
 #include "base/parallel.h"
 #include "base/union_find.h"
 #include "cluster/tree/node.h"
-#include "facetree/dual.h"
+#include "cluster/tree/welded.h"
 #include "facetree/partition.h"
 #include "partition/labels.h"
 
@@ -218,14 +218,16 @@ static fct_result measure_pieces(const fct_env *env, judge *j, fct_partition_qua
 
 fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint32_t *nodes, uint32_t count,
                             fct_partition_quality *out) {
-    const fct_tree_view *view = &tree->view;
+    fct_tree_view welded, *view = &welded;
+    fct_weld weld;
+    fct_result result = fct_tree_check(env, tree);
+    if (result == FCT_OK) result = fct_tree_view_weld(env, &tree->view, view, &weld);
+    if (result != FCT_OK) return result;
     fct_mesh mesh = {.vertex_count = view->vertex_count,
                      .face_count = view->face_count,
                      .positions = (float *)view->positions,
                      .triangles = (uint32_t *)view->triangles};
     judge j = {.mesh = &mesh, .tree = tree, .nodes = nodes, .count = count};
-    fct_result result = fct_tree_check(env, tree);
-    if (result != FCT_OK) return result;
     uint32_t *labels;
     const fct_array arrays[] = {FCT_ARRAY(labels, view->face_count), FCT_ARRAY_ZERO(j.pieces, count)};
     result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "measuring a partition");
@@ -239,6 +241,7 @@ fct_result fct_tree_quality(const fct_env *env, const fct_tree *tree, const uint
         j.labels = labels;
         result = measure_pieces(env, &j, out);
     }
+    fct_weld_release(env, &weld);
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;
 }

@@ -396,14 +396,19 @@ static fct_result units_of_places(const fct_env *env, const fct_tree *tree, cons
     fct_mesh input;
     fct_result result = fct_tree_mesh(env, tree, &input);
     if (result != FCT_OK) return result;
+    fct_weld weld = {0};
+    if (view->def.weld) result = fct_weld_build(env, &input, &weld);
+    fct_mesh welded = input;
+    if (weld.triangles) welded.triangles = weld.triangles;
     uint32_t *place_of = fct_allocate(env, view->face_count, sizeof *place_of);
-    if (place_of) {
+    if (result == FCT_OK && place_of) {
         for (uint32_t place = 0; place < view->face_count; ++place) place_of[view->face_ids[place]] = place;
-        result = fct_units_of_faces(env, &input, place_of, places, out);
-    } else {
+        result = fct_units_of_faces(env, &welded, place_of, places, out);
+    } else if (result == FCT_OK) {
         result = fct_fail_memory(env, "refining a partition");
     }
     fct_release(env, place_of);
+    fct_weld_release(env, &weld);
     fct_mesh_release(env, &input);
     return result;
 }

@@ -178,6 +178,7 @@ int tool_boxes(int argc, char **argv) {
         .options = box_options_table,
         .parse = parse_boxes,
         .run = run_boxes,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

@@ -156,6 +156,7 @@ int tool_closest(int argc, char **argv) {
         .options = closest_options_table,
         .parse = parse_closest,
         .run = run_closest,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

@@ -113,6 +113,7 @@ int tool_compare(int argc, char **argv) {
         .options = compare_options_table,
         .parse = parse_compare,
         .run = run_compare,
+        .builds_tree = true,
         .inputs_min = 2,
         .inputs_max = 2,
         .output = TOOL_OUTPUT_UNUSED};

@@ -205,7 +205,9 @@ int tool_meshlets(int argc, char **argv) {
             "has the axis 0 and the cutoff 1.\n\n"
             "OUT.json: count, meshlets[]{center, radius, cone_apex, cone_axis, cone_cutoff, lower, upper, "
             "box_center, box_axes "
-            "(three unit vectors in a row), box_half_extents, vertices (of the input), triangles (three "
+            "(three unit vectors in a row), box_half_extents, vertices (of the input; one per position, "
+            "unless "
+            "--no-weld is given), triangles (three "
             "positions in `vertices` "
             "each), faces (of the input)}.\n\n"
             "JSON keys: meshlets, faces, vertices (over all meshlets), mean_vertices, mean_triangles, "
@@ -218,6 +220,7 @@ int tool_meshlets(int argc, char **argv) {
         .options = meshlet_options_table,
         .parse = parse_meshlets,
         .run = run_meshlets,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

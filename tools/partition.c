@@ -186,7 +186,7 @@ static void say_quality(tool *t, const char *what, const fct_partition_quality *
 /* Refines the labels, and measures them before and after with the same function. */
 static int refine_labels(tool *t, const fct_refine_def *def, partition *p, refinement *out) {
     fct_mesh mesh;
-    int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
+    int code = tool_tree_mesh(t, p->tree, &mesh);
     if (code != TOOL_DONE) return code;
     code = tool_result(t, fct_labels_quality(&t->env, &mesh, p->labels, p->count, &out->before));
     if (code == TOOL_DONE)
@@ -201,7 +201,7 @@ static int refine_labels(tool *t, const fct_refine_def *def, partition *p, refin
 static int write_adjacency(tool *t, const char *path, partition *p) {
     fct_mesh mesh;
     fct_adjacency neighbours;
-    int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
+    int code = tool_tree_mesh(t, p->tree, &mesh);
     if (code != TOOL_DONE) return code;
     code = tool_result(t, fct_labels_adjacency(&t->env, &mesh, p->labels, p->count, &neighbours));
     fct_mesh_release(&t->env, &mesh);
@@ -253,7 +253,7 @@ static void report_charts(tool *t, const fct_chart_stats *s, json_t *object) {
 static int measure_quality(tool *t, const partition *p, fct_partition_quality *q) {
     if (p->nodes) return tool_result(t, fct_tree_quality(&t->env, p->tree, p->nodes, p->count, q));
     fct_mesh mesh;
-    int code = tool_result(t, fct_tree_mesh(&t->env, p->tree, &mesh));
+    int code = tool_tree_mesh(t, p->tree, &mesh);
     if (code != TOOL_DONE) return code;
     code = tool_result(t, fct_labels_quality(&t->env, &mesh, p->labels, p->count, q));
     fct_mesh_release(&t->env, &mesh);
@@ -372,6 +372,7 @@ int tool_partition(int argc, char **argv) {
         .options = partition_options_table,
         .parse = parse_partition,
         .run = run_partition,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

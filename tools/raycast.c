@@ -346,6 +346,7 @@ int tool_raycast(int argc, char **argv) {
         .options = ray_options_table,
         .parse = parse_raycast,
         .run = run_raycast,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

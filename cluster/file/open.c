@@ -103,6 +103,7 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
                                .direction_weight = h->direction_weight,
                                .shape_weight = h->shape_weight,
                                .root_count = h->wanted_roots,
+                               .weld = h->flags & FCT_FORMAT_WELD,
                                .max_cost = h->max_cost,
                                .source_hash = h->source_hash};
     tree->cut_ids = find_section(tree, h, FCT_SECTION_CUT_IDS);

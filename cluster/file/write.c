@@ -56,6 +56,7 @@ static fct_format_header make_header(const fct_tree_view *view, unsigned arrays)
     if (arrays & FCT_MESH_COLORS) h.flags |= FCT_FORMAT_COLORS;
     if (arrays & FCT_MESH_MATERIALS) h.flags |= FCT_FORMAT_MATERIALS;
     if (view->material_names) h.flags |= FCT_FORMAT_NAMES;
+    if (def->weld) h.flags |= FCT_FORMAT_WELD;
     for (uint32_t i = 0; view->material_names && i < view->material_count; ++i)
         h.names_size += strlen(view->material_names[i]) + 1;
     uint32_t cut = view->face_count / 16 < FCT_FORMAT_CUT ? view->face_count / 16 : FCT_FORMAT_CUT;

@@ -110,6 +110,13 @@ static fct_result build(fct_large *l, const char *mesh_path, const fct_large_def
     return result;
 }
 
+/* Whether the surface has far more open edges than the rim of a square grid of its faces (2.8 per root of the
+ * number of faces), as where vertices are doubled along seams. */
+static bool is_torn(const fct_tree_view *view) {
+    enum { RIMS = 16 };
+    return (double)view->boundary_edges * view->boundary_edges > (double)RIMS * RIMS * view->face_count;
+}
+
 fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const char *tree_path,
                                const fct_tree_def *def, const fct_large_def *large_def,
                                fct_large_stats *stats) {
@@ -125,7 +132,14 @@ fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const 
     if (result != FCT_OK) return result;
     fct_large l = {.env = env, .def = &options, .folder = limits.temporary_folder, .path = tree_path};
     fct_tree_view view = {0};
+    bool weld = options.weld;
+    options.weld = false; /* the vertices of a place can be in different parts */
     result = build(&l, mesh_path, &limits, stats, &view);
+    if (result == FCT_OK && weld && is_torn(&view))
+        fct_note(env, FCT_MESSAGE_WARNING,
+                 "%s: %u edges have one face; vertices of equal position are not joined in a mesh that is "
+                 "clustered in parts",
+                 mesh_path, view.boundary_edges);
     stats->face_count = l.info.face_count, stats->vertex_count = l.info.vertex_count;
     stats->root_count = view.root_count, stats->depth = view.depth, stats->mean_depth = view.mean_depth;
     stats->part_count = (uint32_t)l.part_count, stats->top_count = l.top_count;

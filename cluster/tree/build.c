@@ -1,6 +1,7 @@
 /* cluster/tree/build.c: fct_tree_build.
  *
- * 1. Sort the mesh, if its faces or vertices are in no order (locality.c).
+ * 1. Join vertices of equal position (dual/weld.c), and sort the mesh, if its faces or vertices are in no
+ * order (locality.c).
  * 2. Build the dual graph and contract it (section 8.2; cluster/merge).
  * 3. Number the nodes, place the faces, copy the mesh (order.c).
  * 4. Describe every node (describe/).
@@ -21,6 +22,7 @@
 #include "cluster/tree/describe/describe.h"
 #include "cluster/tree/locality.h"
 #include "cluster/tree/order.h"
+#include "facetree/dual.h"
 
 fct_tree_def fct_tree_def_default(void) {
     return (fct_tree_def){.size = sizeof(fct_tree_def),
@@ -31,6 +33,7 @@ fct_tree_def fct_tree_def_default(void) {
                           .direction_weight = -1,
                           .shape_weight = -1,
                           .root_count = 1,
+                          .weld = true,
                           .max_cost = INFINITY};
 }
 
@@ -122,6 +125,19 @@ static fct_result build_links(const fct_env *env, const fct_env *pool, const fct
     return result;
 }
 
+/* Replaces the triangles of welded vertices by those of the mesh. The vertices that others replace come last
+ * in the tree's order, so `triangles` need not be in order of first use. */
+static fct_result restore_triangles(const fct_env *env, const fct_mesh *mesh, fct_tree *tree) {
+    uint32_t *numbers = fct_allocate(env, mesh->vertex_count, sizeof *numbers);
+    if (!numbers) return fct_fail_memory(env, "the tree");
+    for (uint32_t v = 0; v < mesh->vertex_count; ++v) numbers[tree->vertex_ids[v]] = v;
+    for (size_t place = 0; place < mesh->face_count; ++place)
+        for (size_t k = 0; k < 3; ++k)
+            tree->triangles[3 * place + k] = numbers[mesh->triangles[3 * (size_t)tree->face_ids[place] + k]];
+    fct_release(env, numbers);
+    return FCT_OK;
+}
+
 /* The contraction works in the memory that later holds the records, because the first touch of a page is slow
  * (docs/notes/clustering.md). */
 static fct_result build_tree(const fct_env *env, const fct_mesh *mesh, const fct_tree_def *def,
@@ -131,13 +147,20 @@ static fct_result build_tree(const fct_env *env, const fct_mesh *mesh, const fct
     tree->clusters = fct_allocate(env, mesh->face_count, sizeof *tree->clusters);
     if (!tree->clusters) return fct_fail_memory(env, "the tree");
     fct_pool_create(env, tree->clusters, (size_t)mesh->face_count * sizeof *tree->clusters, &pool);
-    fct_local_mesh local;
-    fct_result result = fct_local_mesh_create(&pool.env, mesh, &local);
+    fct_weld weld = {0};
+    fct_result result = def->weld ? fct_weld_build(&pool.env, mesh, &weld) : FCT_OK;
+    const bool joined = weld.triangles != NULL;
+    fct_mesh welded = *mesh;
+    fct_local_mesh local = {0};
+    if (joined) welded.triangles = weld.triangles;
+    if (result == FCT_OK) result = fct_local_mesh_create(&pool.env, &welded, weld.joined, &local);
     if (result == FCT_OK) result = build_links(env, &pool.env, &local.mesh, def, &dual, tree);
     if (result == FCT_OK) fct_local_mesh_restore(env, &local, tree->face_ids, tree->vertex_ids);
     fct_local_mesh_release(&pool.env, &local);
+    fct_weld_release(&pool.env, &weld);
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
+    if (result == FCT_OK && joined) result = restore_triangles(env, mesh, tree);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};
     return result;
 }

@@ -153,12 +153,13 @@ static fct_result sort_mesh(const fct_env *env, sorter *s) {
     return result;
 }
 
-fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, fct_local_mesh *out) {
+fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, uint32_t joined,
+                                 fct_local_mesh *out) {
     sorter s = {.from = mesh, .to = out};
     *out = (fct_local_mesh){.mesh = *mesh};
     /* With more vertices than faces, faces share few vertices: sorting costs three times as much for no gain.
      */
-    bool loose = mesh->vertex_count > mesh->face_count;
+    bool loose = mesh->vertex_count - joined > mesh->face_count;
     if (loose || mesh->face_count < LEAST_FACES || !is_scattered(&s)) return FCT_OK;
     fct_result result = allocate_sorter(env, &s);
     if (result == FCT_OK) result = sort_mesh(env, &s);

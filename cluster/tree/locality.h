@@ -10,9 +10,11 @@ typedef struct fct_local_mesh {
     uint32_t *faces, *vertices; /* ids in the original mesh; NULL: the same */
 } fct_local_mesh;
 
-/* *out is a sorted copy, or the mesh itself if it is small, loose, or already in a good order. The mesh must
- * outlive *out. Errors: MEMORY; then *out needs no release. */
-fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, fct_local_mesh *out);
+/* *out is a sorted copy, or the mesh itself if it is small, loose, or already in a good order. joined: the
+ * number of vertices that other vertices replace in the dual graph. The mesh must outlive *out. Errors:
+ * MEMORY; then *out needs no release. */
+fct_result fct_local_mesh_create(const fct_env *env, const fct_mesh *mesh, uint32_t joined,
+                                 fct_local_mesh *out);
 /* Replaces ids of the copy by ids of the mesh. */
 void fct_local_mesh_restore(const fct_env *env, const fct_local_mesh *local, uint32_t *face_ids,
                             uint32_t *vertex_ids);

@@ -66,7 +66,8 @@ typedef struct fct_tree_def {
     fct_cluster_cost cost;
     fct_fit_measure fit_measure;
     double fit_weight, direction_weight, shape_weight; /* at most 1e30; negative: the default of the cost */
-    uint32_t root_count;  /* merging stops at this many clusters; default 1; 0 means 1 */
+    uint32_t root_count; /* merging stops at this many clusters; default 1; 0 means 1 */
+    bool weld; /* vertices of equal position count as one for the dual graph (fct_weld_build); default true */
     double max_cost;      /* no merge costs more; default INFINITY; clusters that cannot merge become roots */
     const char *source;   /* name of the mesh, recorded in the file; NULL: none */
     uint64_t source_hash; /* XXH3-64 of the mesh file, recorded in the file; 0: unknown */
@@ -101,7 +102,7 @@ typedef struct fct_tree_view {
     const uint32_t *face_ids;   /* face_count: place -> input face */
     const uint32_t *vertex_ids; /* vertex_count: tree vertex -> input vertex */
     const float *positions;     /* vertex_count x 3, by tree vertex */
-    const uint32_t *triangles;  /* face_count x 3, by place: tree vertices */
+    const uint32_t *triangles;  /* face_count x 3, by place: tree vertices, those of the input */
     const float *colors;        /* vertex_count x 3, by tree vertex; or NULL */
     const uint32_t *materials;  /* face_count, by place; or NULL */
     uint32_t material_count;

@@ -34,6 +34,20 @@ typedef struct fct_dual {
 FCT_API fct_result fct_dual_build(const fct_env *env, const fct_mesh *mesh, fct_dual *out);
 FCT_API void fct_dual_release(const fct_env *env, fct_dual *dual);
 
+/* Triangles in which vertices of equal position are one vertex. Files double vertices where normals, colours
+ * or texture coordinates differ, or at every corner (a soup). The dual graph joins faces by vertices, so such
+ * a mesh falls apart in it; with these triangles it does not. */
+typedef struct fct_weld {
+    uint32_t *triangles; /* face_count x 3; NULL if no vertex is replaced: those of the mesh are right */
+    uint32_t joined;     /* vertices that another vertex replaces */
+} fct_weld;
+
+/* Only ends of open sides (sides that no other face has) are joined: each becomes the first of them with its
+ * position. So closed bodies that touch stay apart. The mesh must be valid. O(V), plus a sort if several
+ * vertices have one position. Errors: MEMORY, CANCELLED. On failure *out is all zero. */
+FCT_API fct_result fct_weld_build(const fct_env *env, const fct_mesh *mesh, fct_weld *out);
+FCT_API void fct_weld_release(const fct_env *env, fct_weld *weld);
+
 #ifdef __cplusplus
 }
 #endif

@@ -185,8 +185,10 @@ typedef struct fct_meshlets {
 /* Cuts the mesh into meshlets. They grow over the surface in the order of the tree and at the size that it
  * suggests; then small meshlets merge with neighbours, or their faces are given to neighbours, until nothing
  * fits. The faces of a meshlet have one material. Every input face is in exactly one meshlet, also a face
- * that uses a vertex twice. The caller releases the arrays with fct_meshlets_release. Errors: DATA (limits
- * out of range, damaged file), MEMORY, CANCELLED; then *out is all zero. */
+ * that uses a vertex twice. In a welded tree vertices of equal position are one: a meshlet names the first in
+ * the tree's order, with a warning if there are others, because their attributes may differ. The caller
+ * releases the arrays with fct_meshlets_release. Errors: DATA (limits out of range, damaged file), MEMORY,
+ * CANCELLED; then *out is all zero. */
 FCT_API fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct_meshlet_def *def,
                                      fct_meshlets *out);
 FCT_API void fct_meshlets_release(const fct_env *env, fct_meshlets *meshlets);

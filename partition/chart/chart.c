@@ -8,6 +8,7 @@
  */
 #include "base/parallel.h"
 #include "base/union_find.h"
+#include "cluster/tree/welded.h"
 #include "partition/chart/audit.h"
 #include "partition/chart/charter.h"
 #include "partition/chart/merge.h"
@@ -152,15 +153,19 @@ static fct_result check_def(const fct_env *env, const fct_chart_def *def) {
 
 fct_result fct_tree_charts(const fct_env *env, const fct_tree *tree, const fct_chart_def *def,
                            uint32_t *labels, fct_chart_stats *stats) {
-    const fct_tree_view *view = &tree->view;
+    fct_tree_view welded;
+    const fct_tree_view *view = &welded;
     fct_charter c = {.tree = tree, .view = view, .def = def ? *def : fct_chart_def_default()};
     fct_chart_stats found = {0};
+    fct_weld weld = {0};
     fct_result result = check_def(env, &c.def);
     if (result == FCT_OK) result = fct_tree_check(env, tree);
+    if (result == FCT_OK) result = fct_tree_view_weld(env, &tree->view, &welded, &weld);
     if (result != FCT_OK) return result;
     c.labels = fct_allocate(env, view->face_count, sizeof *c.labels);
-    if (!c.labels) return fct_fail_memory(env, "charts");
-    result = fct_sides_build(env, view->triangles, view->face_count, view->vertex_count, &c.sides);
+    if (!c.labels) result = fct_fail_memory(env, "charts");
+    if (result == FCT_OK)
+        result = fct_sides_build(env, view->triangles, view->face_count, view->vertex_count, &c.sides);
     if (result == FCT_OK) result = open_nodes(env, tree, &c, &found);
     uint32_t cut = c.count;
     if (result == FCT_OK && !c.def.keep_cuts) result = fct_charts_merge(env, &c);
@@ -171,6 +176,7 @@ fct_result fct_tree_charts(const fct_env *env, const fct_tree *tree, const fct_c
         if (stats) *stats = found;
     }
     fct_sides_release(env, &c.sides);
+    fct_weld_release(env, &weld);
     fct_release(env, c.labels);
     return result;
 }

@@ -10,6 +10,7 @@
 
 #include "base/math/vec.h"
 #include "base/parallel.h"
+#include "cluster/tree/welded.h"
 #include "partition/cut.h"
 #include "partition/meshlet/bounds.h"
 #include "partition/meshlet/grow.h"
@@ -265,16 +266,26 @@ static fct_result check_def(const fct_env *env, const fct_meshlet_def *def) {
 
 fct_result fct_tree_meshlets(const fct_env *env, const fct_tree *tree, const fct_meshlet_def *def,
                              fct_meshlets *out) {
-    fct_packer p = {.tree = tree, .view = &tree->view, .def = def ? *def : fct_meshlet_def_default()};
+    fct_tree_view welded = {0};
+    fct_packer p = {.tree = tree, .view = &welded, .def = def ? *def : fct_meshlet_def_default()};
+    fct_weld weld = {0};
     *out = (fct_meshlets){0};
     fct_result result = check_def(env, &p.def);
     if (result == FCT_OK) result = fct_tree_check(env, tree);
+    if (result == FCT_OK) result = fct_tree_view_weld(env, &tree->view, &welded, &weld);
+    if (weld.joined)
+        fct_note(
+            env, FCT_MESSAGE_WARNING,
+            "%u vertices have the position of another one; meshlets name one vertex per position, unless the "
+            "tree is built without a weld",
+            weld.joined);
     if (result == FCT_OK) result = make_pieces(env, tree, &p);
     uint32_t *numbers = result == FCT_OK ? fct_allocate(env, p.count, 2 * sizeof *numbers) : NULL;
     if (result == FCT_OK && !numbers) result = fct_fail_memory(env, "meshlets");
     if (result == FCT_OK) result = write_pieces(env, &p, numbers, numbers + p.count, out);
     fct_release(env, numbers);
     release_packer(env, &p);
+    fct_weld_release(env, &weld);
     if (result != FCT_OK) fct_meshlets_release(env, out);
     return result;
 }

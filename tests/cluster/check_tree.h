@@ -6,6 +6,7 @@
 
 #include "base/math/vec.h"
 #include "cluster/tree/tree.h"
+#include "cluster/tree/welded.h"
 #include "facetree/partition.h"
 
 static inline void check_node_geometry(const fct_tree_view *view, const fct_cluster *c) {
@@ -77,8 +78,13 @@ static inline void check_links(const fct_tree *tree) {
     free(parents);
 }
 
-/* The permutations are valid, and the mesh of the tree is the input. */
+/* The permutations are valid, and the mesh of the tree is the input. Vertices are in order of first use in
+ * the triangles that connect the faces. */
 static inline void check_mesh(const fct_tree_view *view, const fct_mesh *mesh) {
+    fct_env env = fct_env_default();
+    fct_tree_view welded;
+    fct_weld weld;
+    assert_int_equal(fct_tree_view_weld(&env, view, &welded, &weld), FCT_OK);
     assert_int_equal(view->face_count, mesh->face_count);
     assert_int_equal(view->vertex_count, mesh->vertex_count);
     uint8_t *seen = calloc((size_t)mesh->vertex_count + mesh->face_count, 1);
@@ -87,8 +93,8 @@ static inline void check_mesh(const fct_tree_view *view, const fct_mesh *mesh) {
         assert_int_equal(seen[view->face_ids[p]]++, 0);
         for (size_t k = 0; k < 3; ++k) {
             uint32_t v = view->triangles[3 * p + k];
-            assert_true(v <= used);
-            if (v == used) ++used;
+            assert_true(welded.triangles[3 * p + k] <= used);
+            if (welded.triangles[3 * p + k] == used) ++used;
             assert_int_equal(view->vertex_ids[v], mesh->triangles[3 * (size_t)view->face_ids[p] + k]);
         }
     }
@@ -96,6 +102,7 @@ static inline void check_mesh(const fct_tree_view *view, const fct_mesh *mesh) {
         assert_int_equal(seen[mesh->face_count + view->vertex_ids[v]]++, 0);
         assert_memory_equal(view->positions + 3 * v, mesh->positions + 3 * (size_t)view->vertex_ids[v], 12);
     }
+    fct_weld_release(&env, &weld);
     free(seen);
 }
 

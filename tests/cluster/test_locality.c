@@ -74,7 +74,7 @@ static void only_what_is_scattered_is_sorted(void **state) {
     for (int which = 0; which < 4; ++which) {
         fct_mesh mesh = make_shuffled(&env, which & 1, which & 2);
         fct_local_mesh local;
-        assert_int_equal(fct_local_mesh_create(&env, &mesh, &local), FCT_OK);
+        assert_int_equal(fct_local_mesh_create(&env, &mesh, 0, &local), FCT_OK);
         assert_true((local.faces != NULL) == (which > 0) && (local.vertices != NULL) == (which > 0));
         assert_true((local.mesh.triangles == mesh.triangles) == (which == 0));
         assert_true(mean_gap(&local.mesh) < 0.05);
@@ -91,7 +91,7 @@ static void survives_no_memory(void **state) {
         recorder r = {.fail_at = nth};
         fct_env env = recorder_env(&r);
         fct_local_mesh local;
-        fct_result result = fct_local_mesh_create(&env, &mesh, &local);
+        fct_result result = fct_local_mesh_create(&env, &mesh, 0, &local);
         if (result == FCT_OK) fct_local_mesh_release(&env, &local);
         assert_int_equal(r.alive, 0);
         if (result == FCT_OK) {

@@ -98,6 +98,31 @@ says "expected a name"
 expect 64 meshlets sphere.fct
 expect 66 meshlets missing.fct -o x.json
 
+# --- doubled vertices: the same clusters as with single ones ---
+expect 0 make sphere --triangles 800 -o single.off
+awk 'NR == 2 { n = $1; f = $2 } NR > 2 && NR <= n + 2 { p[NR - 3] = $0 }
+    NR > n + 2 { for (i = 2; i <= 4; ++i) q[c++] = p[$i] }
+    END { print "OFF"; print c, f, 0; for (i = 0; i < c; ++i) print q[i]; for (i = 0; i < f; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }' \
+    single.off >doubled.off
+for how in '-k 20' '--charts 50' '-k 9 --refine 2'; do
+    for mesh in single doubled; do
+        # shellcheck disable=SC2086 # several words
+        expect 0 partition $mesh.off $how -o $mesh.txt --adjacency $mesh-pairs.txt
+    done
+    check "$how: labels of doubled vertices" cmp single.txt doubled.txt
+    check "$how: neighbours of doubled vertices" cmp single-pairs.txt doubled-pairs.txt
+done
+expect 0 meshlets single.off -o single.json --json
+meshlets=$(value meshlets)
+expect 0 meshlets doubled.off -o doubled.json --json
+check "meshlets of doubled vertices" test "$(value meshlets)" = "$meshlets"
+says "name one vertex per position"
+expect 0 cluster doubled.off --no-weld -o doubled.fct
+expect 0 partition doubled.fct --charts 50 -o labels.txt --json
+check "--no-weld: each face is a chart" test "$(value charts)" = "$(sed -n 2p doubled.off | cut -d ' ' -f 2)"
+expect 0 info doubled.fct --verify
+expect 64 info doubled.off --no-weld
+
 # --- odd meshes: every face gets an answer ---
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >one.off
 printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 0\n3 0 1 2\n3 0 1 2\n3 0 1 1\n3 0 3 1\n' >odd.off
@@ -114,6 +139,8 @@ for mesh in one odd book; do
     check "$mesh: every face in a meshlet" test "$(value faces)" = "$faces"
 done
 expect 0 partition odd.off --charts 30 -o labels.txt --json
+check "a face with two corners at one place is no disk" test "$(value non_disks)" = 2
+expect 0 partition odd.off --charts 30 -o labels.txt --json --no-weld
 check "a face with a vertex twice is no disk" test "$(value non_disks)" = 1
 head -c 5000 sphere.fct >cut.fct
 for command in 'partition cut.fct --charts 30 -o x.txt' 'partition cut.fct --max-distance 1 -o x.txt' 'meshlets cut.fct -o x.json'; do

@@ -117,7 +117,7 @@ int tool_cluster(int argc, char **argv) {
                 "of triangles can be "
                 "larger than memory themselves. 100 million triangles need at least 1 GB. More memory makes "
                 "fewer parts, not "
-                "better clusters.\n\n"
+                "better clusters. Vertices of equal position are not joined in parts, as with --no-weld.\n\n"
                 "JSON keys: faces, vertices, roots, depth, mean_depth, parts, seconds{read, dual, contract, "
                 "boxes, write, total}, "
                 "peak_bytes, file_bytes; for several files their sums, and files[].",
@@ -128,6 +128,7 @@ int tool_cluster(int argc, char **argv) {
         .options = cluster_options_table,
         .parse = parse_cluster,
         .run = run_cluster,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = INT_MAX,
         .output = TOOL_OUTPUT_REQUIRED,

@@ -80,6 +80,7 @@ done:
 int tool_cluster_file(tool *t, const cluster_options *options, const char *input, const char *output,
                       json_t **out) {
     fct_tree_def def = options->def;
+    def.weld = !t->no_weld;
     fct_large_stats stats = {0};
     double start = tool_seconds();
     bool standard = strcmp(input, "-") == 0, known = false, large = false;

@@ -21,6 +21,7 @@ enum {
     KEY_IN_PLACE,
     KEY_FORMAT,
     KEY_OUTSIDE,
+    KEY_NO_WELD,
     KEY_USAGE,
     KEY_MAN,
     KEY_BASH,
@@ -52,6 +53,13 @@ static const struct argp_option common_options[] = {
     {"bash", KEY_BASH, NULL, OPTION_HIDDEN, NULL, -1},
     {"zsh", KEY_ZSH, NULL, OPTION_HIDDEN, NULL, -1},
     {0}};
+
+static const struct argp_option tree_options[] = {{"no-weld", KEY_NO_WELD, NULL, 0,
+                                                   "Keep vertices of equal position apart: faces are "
+                                                   "neighbours only if they have the same vertices. A .fct "
+                                                   "file keeps the choice of its build",
+                                                   0},
+                                                  {0}};
 
 enum { OUTPUT_OPTIONS = 2 }; /* the first common options are about -o */
 
@@ -98,6 +106,7 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = a->options;
+        if (a->command->builds_tree) state->child_inputs[1] = a;
         return 0;
     case 'o':
         if (!*text) return tool_usage(state, "-o: expected a file name, found nothing");
@@ -150,6 +159,14 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     }
 }
 
+static error_t parse_tree(int key, char *text, struct argp_state *state) {
+    (void)text;
+    arguments *a = state->input;
+    if (key != KEY_NO_WELD) return ARGP_ERR_UNKNOWN;
+    a->tool->no_weld = true;
+    return 0;
+}
+
 /* --- Messages for words that argp could not parse --- */
 
 /* Options whose long name begins with a word: the exact match, and the last prefix match. */
@@ -182,6 +199,7 @@ static void say_bad_long(const tool_command *command, const char *token) {
     size_t length = equals ? (size_t)(equals - name) : strlen(name);
     lookup found = {0};
     look_up_option(&found, command->options, name, length);
+    if (command->builds_tree) look_up_option(&found, tree_options, name, length);
     look_up_option(&found, common_options, name, length);
     const struct argp_option *option = found.exact ? found.exact : found.prefixes == 1 ? found.prefix : NULL;
     if (option && equals) {
@@ -196,7 +214,9 @@ static void say_bad_long(const tool_command *command, const char *token) {
         const char *names[64];
         char word[64];
         snprintf(word, sizeof word, "%.*s", (int)length, name);
-        add_long_names(common_options, names, add_long_names(command->options, names, 0, 64), 64);
+        int count = add_long_names(command->options, names, 0, 64);
+        if (command->builds_tree) count = add_long_names(tree_options, names, count, 64);
+        add_long_names(common_options, names, count, 64);
         const char *nearest = tool_nearest(word, names);
         tool_complain("facetree %s: unknown option '%.*s'%s%s%s", command->name, (int)length + 2, token,
                       nearest ? "; did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "");
@@ -246,10 +266,13 @@ static int print_answer(const tool_command *command, const struct argp *argp, in
     char name[64];
     snprintf(name, sizeof name, "facetree %s", command->name);
     setenv("ARGP_HELP_FMT", "no-dup-args-note", 0);
-    const manual_command manual = {
-        command->name,     command->summary,
-        command->synopsis, command->text,
-        command->examples, {command->options, common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS)}};
+    const manual_command manual = {command->name,
+                                   command->summary,
+                                   command->synopsis,
+                                   command->text,
+                                   command->examples,
+                                   {command->options, command->builds_tree ? tree_options : NULL,
+                                    common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS)}};
     if (action == KEY_MAN)
         manual_print_page(&manual, fct_version());
     else if (action == KEY_BASH)
@@ -281,7 +304,9 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
     tool t = {.name = command->name, .start = tool_seconds()};
     arguments a = {.tool = &t, .command = command, .options = options};
     const struct argp own = {.options = command->options, .parser = command->parse};
-    const struct argp_child children[] = {{&own, 0, NULL, 0}, {0}};
+    const struct argp tree = {.options = tree_options, .parser = parse_tree};
+    const struct argp_child children[] = {
+        {&own, 0, NULL, 0}, {command->builds_tree ? &tree : NULL, 0, NULL, 0}, {0}};
     char *doc = make_help_text(command);
     t.inputs = malloc(((size_t)argc + 1) * sizeof *t.inputs);
     int code = TOOL_MEMORY;

@@ -4,12 +4,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "facetree/dual.h"
 #include "tools/kit/file.h"
 
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree) {
     *tree = NULL;
     if (tool_has_format(t, path, "fct")) return tool_result(t, fct_tree_open(&t->env, path, tree));
-    fct_tree_def standard = fct_tree_def_default();
+    fct_tree_def used = def ? *def : fct_tree_def_default();
+    used.weld = !t->no_weld;
     fct_mesh mesh;
     int code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
     if (code != TOOL_DONE) return code;
@@ -18,9 +20,20 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
     if (mesh.face_count == 0)
         code = tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", path);
     else
-        code = tool_result(t, fct_tree_build(&t->env, &mesh, def ? def : &standard, NULL, tree));
+        code = tool_result(t, fct_tree_build(&t->env, &mesh, &used, NULL, tree));
     fct_mesh_release(&t->env, &mesh);
     return tool_context(t, code, path);
+}
+
+int tool_tree_mesh(tool *t, const fct_tree *tree, fct_mesh *mesh) {
+    int code = tool_result(t, fct_tree_mesh(&t->env, tree, mesh));
+    if (code != TOOL_DONE || !fct_tree_get(tree).def.weld) return code;
+    fct_weld weld;
+    code = tool_result(t, fct_weld_build(&t->env, mesh, &weld));
+    if (weld.triangles) memcpy(mesh->triangles, weld.triangles, 3 * sizeof(uint32_t) * mesh->face_count);
+    fct_weld_release(&t->env, &weld);
+    if (code != TOOL_DONE) fct_mesh_release(&t->env, mesh);
+    return code;
 }
 
 double tool_diagonal(const fct_tree *tree) {

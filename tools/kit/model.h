@@ -5,8 +5,12 @@
 #include "tools/kit/env.h"
 #include "tools/kit/options.h"
 
-/* The hierarchy of a .fct file, or one built from a mesh file with `def` (NULL: the default). */
+/* The hierarchy of a .fct file, or one built from a mesh file with `def` (NULL: the default), and with
+ * --no-weld if the command got it. */
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
+/* The mesh of a tree with the triangles that connect its faces: with --no-weld those of the input, else
+ * vertices of equal position are one. */
+int tool_tree_mesh(tool *t, const fct_tree *tree, fct_mesh *mesh);
 /* The mesh of a mesh file or of a .fct file. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
 /* Saves a mesh. */

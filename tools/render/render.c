@@ -289,6 +289,7 @@ int tool_render(int argc, char **argv) {
         .options = render_options_table,
         .parse = parse_render,
         .run = run_render,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

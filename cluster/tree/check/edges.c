@@ -6,10 +6,11 @@
  * fit. Memory: 4 bytes per face and 24 per side of a lot.
  */
 #include "cluster/tree/check/edges.h"
-#include "base/key.h"
 
+#include "base/key.h"
 #include "base/sort.h"
 #include "base/union_find.h"
+#include "cluster/tree/welded.h"
 
 typedef struct side_list {
     const fct_tree_view *view;
@@ -73,14 +74,19 @@ static fct_result count_lots(const fct_env *env, side_list *list, size_t most, f
 fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, uint32_t portion,
                                 fct_edge_counts *out) {
     uint64_t sides = 3 * (uint64_t)view->face_count;
-    side_list list = {.view = view, .lots = (uint32_t)(sides / portion + 1)};
+    fct_tree_view welded;
+    fct_weld weld;
+    fct_result result = fct_tree_view_weld(env, view, &welded, &weld);
+    if (result != FCT_OK) return result;
+    side_list list = {.view = &welded, .lots = (uint32_t)(sides / portion + 1)};
     size_t most = 0;
     for (uint32_t lot = 0; lot < list.lots; ++lot) {
         size_t count = list_sides(&list, lot);
         if (count > most) most = count;
     }
     *out = (fct_edge_counts){.components = view->face_count};
-    fct_result result = count_lots(env, &list, most, out);
+    result = count_lots(env, &list, most, out);
+    fct_weld_release(env, &weld);
     fct_release(env, list.keys);
     fct_release(env, list.faces);
     fct_release(env, list.parents);

@@ -12,7 +12,8 @@ typedef struct fct_edge_counts {
 
 enum { FCT_EDGE_PORTION = 1 << 24 };
 
-/* Counts from the triangles of the view, about `portion` sides of faces at a time. Errors: MEMORY, CANCELLED.
+/* Counts from the triangles of the view, welded if the tree is, about `portion` sides of faces at a time.
+ * Errors: MEMORY, CANCELLED.
  */
 fct_result fct_tree_count_edges(const fct_env *env, const fct_tree_view *view, uint32_t portion,
                                 fct_edge_counts *out);

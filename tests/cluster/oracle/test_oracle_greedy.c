@@ -340,6 +340,7 @@ static void check_all(fct_cluster_cost cost, fct_fit_measure measure) {
             char text[128];
             fct_tree_def def = fct_tree_def_default();
             def.method = FCT_CLUSTER_GREEDY, def.cost = cost, def.fit_measure = measure;
+            def.weld = false; /* the oracle goes by vertices */
             def.fit_weight = weights[w][0] * (cost == FCT_COST_MEAN ? 100 : 1);
             def.direction_weight = weights[w][1], def.shape_weight = weights[w][2];
             snprintf(text, sizeof text, "%s, weights %g %g %g", name, def.fit_weight, def.direction_weight,
