@@ -118,7 +118,9 @@ def unwelded(folder, file):
         assert part.code == charts.code == pieces.code == 0, part.errors + charts.errors + pieces.errors
         assert part.connected, name
         figures.append((part.clusters, charts.charts, pieces.meshlets))
-    assert all(f == figures[0] for f in figures[1:]), figures
+    assert figures[:3] == figures[:1] * 3, figures
+    # the OBJ has rounded coordinates
+    assert all(abs(a - b) <= 4 for a, b in zip(figures[3], figures[0])), figures
 
 
 def cad(folder, file):
