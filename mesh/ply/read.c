@@ -147,9 +147,9 @@ static void store_face(const reader *r, const unsigned char *p, const size_t *of
                        size_t first) {
     fct_soup *soup = r->soup;
     ptrdiff_t k = r->target.indices;
-    load_ids(r, p + offsets[k], r->properties[k].type, count, soup->corners + first);
+    if (count) load_ids(r, p + offsets[k], r->properties[k].type, count, soup->corners + first);
     k = r->target.texcoords;
-    if (k != FCT_PLY_NOWHERE)
+    if (count && k != FCT_PLY_NOWHERE)
         load_floats(r, p + offsets[k], r->properties[k].type, 2 * count, soup->texcoords + 2 * first);
     k = r->target.material;
     if (k != FCT_PLY_NOWHERE) load_ids(r, p + offsets[k], r->properties[k].type, 1, soup->materials + i);
