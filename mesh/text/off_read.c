@@ -75,9 +75,10 @@ static fct_result read_attributes(reader *r, const char *what, float *values, si
 
 /* --- Head --- */
 
+/* In any case, but `n` is no N: nOFF has points of n dimensions. */
 static bool take_prefix(const char **word, size_t *length, const char *prefix) {
     size_t count = strlen(prefix);
-    if (*length < count || memcmp(*word, prefix, count)) return false;
+    if (*length < count || **word == 'n' || strncasecmp(*word, prefix, count)) return false;
     *word += count, *length -= count;
     return true;
 }

@@ -179,6 +179,17 @@ static void keeps_bright_colors(void **state) {
     release(&r, &m);
 }
 
+/* The word in any case, but nOFF is another format. */
+static void reads_words_in_any_case(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_mesh m;
+    assert_int_equal(parse_text(&r, "off", "cOff 1 0 0\n0 0 0 255 0 0\n", &m), FCT_OK);
+    assert_true(m.colors && m.colors[0] == 1);
+    release(&r, &m);
+    refuse("off", "nOFF 3\n1 0 0\n0 0 0\n", "expected OFF");
+}
+
 static void leaves_out_small_faces(void **state) {
     (void)state;
     recorder r = {0};
@@ -215,6 +226,7 @@ int main(void) {
         cmocka_unit_test(reads_vertex_values_without_a_prefix),
         cmocka_unit_test(colors_have_one_scale),
         cmocka_unit_test(keeps_bright_colors),
+        cmocka_unit_test(reads_words_in_any_case),
         cmocka_unit_test(leaves_out_small_faces),
         cmocka_unit_test(drops_attributes_that_are_not_finite),
     };

@@ -88,7 +88,7 @@ same_area() {
 }
 same_area far.off
 # Every format with room for the digits keeps them.
-for ending in ply off obj; do
+for ending in ply off obj glb; do
     expect 0 simplify far.off -o "same.$ending" --faces 960
     same_area "same.$ending"
 done
