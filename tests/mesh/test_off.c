@@ -128,6 +128,11 @@ static void reads_vertex_values_without_a_prefix(void **state) {
     assert_null(m.normals);
     release(&r, &m);
     assert_int_equal(
+        parse_text(&r, "off", "OFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n", &m), FCT_OK);
+    assert_memory_equal(m.colors, colors, sizeof colors);
+    assert_null(m.normals);
+    release(&r, &m);
+    assert_int_equal(
         parse_text(&r, "off", "OFF\n3 1 0\n0 0 0 0 0 -1\n1 0 0 0 0 1\n0 1 0 0 1 0\n3 0 1 2\n", &m), FCT_OK);
     const float normals[] = {0, 0, -1, 0, 0, 1, 0, 1, 0};
     assert_memory_equal(m.normals, normals, sizeof normals);
