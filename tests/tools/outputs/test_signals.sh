@@ -1,7 +1,7 @@
-# tests/tools/test_signals.sh: a signal ends a run within a second in every phase, with the status 128 + signal and without a
+# tests/tools/outputs/test_signals.sh: a signal ends a run within a second in every phase, with the status 128 + signal and without a
 # temporary file. A killed run leaves no broken file, and the next run no temporary file. $4 is a library to preload, which
 # takes files without a name away; $5 is the number of kills (default 20).
-source "$(dirname "$0")/support.sh"
+source "$(dirname "$0")/../support.sh"
 preload=${4:-}
 kills=${5:-20}
 count=$((40000 / ${scale:-1}))

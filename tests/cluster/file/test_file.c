@@ -1,6 +1,6 @@
 /* The hierarchy file: a saved tree opens with the same content, each truncated file is refused, each flipped
  * byte is found or harmless, and a failed write leaves the old file. */
-#include "check_tree.h"
+#include "../check_tree.h"
 
 #include <unistd.h>
 

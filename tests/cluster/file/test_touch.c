@@ -1,7 +1,7 @@
 /* Coarse work reads only the beginning of a hierarchy file, on any mesh, also with loose faces. The test
  * drops the file from the page cache, opens it, and counts the pages that are in the cache afterwards. */
 #define _GNU_SOURCE
-#include "check_tree.h"
+#include "../check_tree.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>

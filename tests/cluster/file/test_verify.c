@@ -1,6 +1,6 @@
 /* fct_tree_verify finds every wrong number of a node, on a sphere, with noise and far from the origin, and
  * accepts correct trees. */
-#include "check_tree.h"
+#include "../check_tree.h"
 
 #include <float.h>
 

@@ -1,5 +1,5 @@
-# tests/tools/test_overwrite.sh: an output is never an input by mistake, has the kind of its name, and no message goes into it.
-source "$(dirname "$0")/support.sh"
+# tests/tools/outputs/test_overwrite.sh: an output is never an input by mistake, has the kind of its name, and no message goes into it.
+source "$(dirname "$0")/../support.sh"
 cube 1 >cube.off
 cp cube.off copy.off
 ln copy.off hard.off

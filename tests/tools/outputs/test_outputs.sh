@@ -1,5 +1,5 @@
-# tests/tools/test_outputs.sh: outputs that cannot be written give exit code 73 before long work, and the old file remains.
-source "$(dirname "$0")/support.sh"
+# tests/tools/outputs/test_outputs.sh: outputs that cannot be written give exit code 73 before long work, and the old file remains.
+source "$(dirname "$0")/../support.sh"
 cube 1 >cube.off
 "$program" cluster cube.off -o cube.fct --quiet
 printf '0 0 9 0 0 -1\n' >rays.txt

@@ -1,6 +1,6 @@
 /* The writer of hierarchy files: pieces of any size, with the sections in turns, give the same bytes as
  * fct_tree_save. Every error leaves the old file and no temporary file. */
-#include "check_tree.h"
+#include "../check_tree.h"
 
 #include <dirent.h>
 #include <sys/stat.h>
