@@ -97,17 +97,15 @@ static void check_square(const fct_mesh *mesh) {
     assert_memory_equal(mesh->triangles, triangles, sizeof triangles);
 }
 
+#define SQUARE "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAA"
+
 static void reads_buffers_of_every_kind(void **state) {
     (void)state;
     static const char *const uris[] = {
         "square.bin", "./square.bin", "deep%20er/100%25.bin", "deep er/100%.bin", "deep er\\\\100%.bin",
         /* base64 of the square, once with the other alphabet, blanks and no padding */
-        "data:application/"
-        "octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAA"
-        "AAECAAIDAAA=",
-        "DATA:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAA AAECAAIDAAA",
-        "data:;charset=x;BASE64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAAAAECAAIDAAA%"
-        "3D"};
+        "data:application/octet-stream;base64," SQUARE "AAECAAIDAAA=", "DATA:;base64," SQUARE " AAECAAIDAAA",
+        "data:;charset=x;BASE64," SQUARE "AAECAAIDAAA%3D"};
     for (size_t i = 0; i < sizeof uris / sizeof *uris; ++i) {
         char text[2000];
         messages m;
