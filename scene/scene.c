@@ -10,7 +10,9 @@
 #include "base/math/elementary.h"
 #include "base/math/origin.h"
 #include "base/math/round.h"
+#include "facetree/dual.h"
 #include "scene/transform.h"
+#include "scene/winding.h"
 
 fct_result fct_scene_create(const fct_env *env, fct_backend backend, fct_scene **out) {
     *out = NULL;
@@ -137,8 +139,10 @@ static fct_result center_mesh(const fct_env *env, fct_mesh *mesh, double origin[
 
 static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model *own) {
     const fct_env *env = scene->env;
-    fct_model model = {
-        .tree = own->tree, .source_faces = own->source_faces, .source_vertices = own->source_vertices};
+    fct_model model = {.tree = own->tree,
+                       .source_faces = own->source_faces,
+                       .source_vertices = own->source_vertices,
+                       .inward = own->inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
     if (result == FCT_OK && depth > FCT_SCENE_TREE_DEPTH)
@@ -178,6 +182,7 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     bool moved = false;
     if (result == FCT_OK) result = center_mesh(env, &plain, own.origin, &moved);
     if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
+    if (result == FCT_OK) own.inward = fct_scene_is_inward(&plain, own.tree);
     if (moved) fct_release(env, plain.positions);
     if (faces) fct_mesh_release(env, &part);
     if (result != FCT_OK) {
@@ -216,8 +221,9 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
     const fct_env *env = scene->env;
     fct_result result = FCT_OK;
     uint32_t *starts = fct_allocate(env, (size_t)label_count + 1, sizeof *starts);
-    uint32_t *faces = fct_allocate(env, mesh->face_count, sizeof *faces);
-    if (!starts || !faces) {
+    uint32_t *faces = fct_allocate(env, mesh->face_count, sizeof *faces), bodies = 0;
+    uint8_t *inward = fct_allocate(env, mesh->face_count, sizeof *inward);
+    if (!starts || !faces || !inward) {
         result = fct_fail_memory(env, "a model's parts");
         goto done;
     }
@@ -229,15 +235,35 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
         result = fct_fail_memory(env, "a model's parts");
         goto done;
     }
+    if (used > 1) result = fct_inward_find(env, mesh, &bodies, inward); /* the parts alone are open */
     for (uint32_t k = 0; k < label_count && result == FCT_OK; ++k) {
         uint32_t count = starts[k + 1] - starts[k];
         if (count == 0) continue;
         result = add_model_of_faces(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count);
-        if (result == FCT_OK) parts->labels[parts->count++] = k;
+        if (result != FCT_OK) break;
+        parts->labels[parts->count++] = k;
+        if (bodies > 0 && inward[faces[starts[k]]]) scene->models[scene->model_count - 1].inward = true;
     }
 done:
+    fct_release(env, inward);
     fct_release(env, starts);
     fct_release(env, faces);
+    return result;
+}
+
+/* With env->flip_inward a given tree is replaced by its mesh, and the mesh is turned. */
+static fct_result split_turned(fct_scene *scene, const char *name, const fct_mesh *mesh, fct_tree *tree,
+                               const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts) {
+    const fct_env *env = scene->env;
+    fct_mesh own = {0}, turned = {0};
+    fct_result result = tree ? fct_tree_mesh(env, tree, &own) : FCT_OK;
+    fct_tree_destroy(tree);
+    if (result == FCT_OK) result = fct_scene_turn(env, tree ? &own : mesh, &turned);
+    if (result == FCT_OK)
+        result = labels ? split_by_label(scene, name, &turned, labels, label_count, parts)
+                        : add_model_of_faces(scene, name, &turned, NULL, turned.face_count);
+    fct_release(env, turned.triangles);
+    fct_mesh_release(env, &own);
     return result;
 }
 
@@ -247,15 +273,17 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
     *parts = (fct_scene_parts){.first = scene->model_count};
     fct_result result = FCT_OK;
     if (labels) {
-        result = split_by_label(scene, name, mesh, labels, label_count, parts);
+        result = env->flip_inward ? split_turned(scene, name, mesh, NULL, labels, label_count, parts)
+                                  : split_by_label(scene, name, mesh, labels, label_count, parts);
     } else {
         parts->labels = fct_allocate_zero(env, 1, sizeof *parts->labels);
         if (!parts->labels) {
             if (tree) fct_tree_destroy(tree);
             return fct_fail_memory(env, "a model");
         }
-        result = tree ? add_model_of_tree(scene, name, tree)
-                      : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count);
+        result = env->flip_inward ? split_turned(scene, name, mesh, tree, NULL, 0, parts)
+                 : tree           ? add_model_of_tree(scene, name, tree)
+                                  : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count);
         parts->count = 1;
     }
     if (result != FCT_OK) {

@@ -53,6 +53,7 @@ int tool_convert(int argc, char **argv) {
         .options = convert_options_table,
         .parse = parse_convert,
         .run = run_convert,
+        .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

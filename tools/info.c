@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "facetree/dual.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -55,7 +56,9 @@ static uint32_t count_polygons(const fct_mesh *mesh) {
 
 static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     fct_mesh_report r;
+    uint32_t inward = 0;
     int code = tool_result(t, fct_mesh_inspect(&t->env, mesh, &r));
+    if (code == TOOL_DONE) code = tool_result(t, fct_inward_find(&t->env, mesh, &inward, NULL));
     if (code != TOOL_DONE) return code;
     set_count(object, "vertices", r.vertices);
     set_count(object, "faces", r.faces);
@@ -70,6 +73,7 @@ static int describe_mesh(tool *t, const fct_mesh *mesh, json_t *object) {
     set_count(object, "duplicate_faces", r.duplicate_faces);
     set_count(object, "unreferenced_vertices", r.unreferenced_vertices);
     set_count(object, "components", r.components);
+    set_count(object, "inward_bodies", inward);
     if (!json_object_get(object, "materials")) set_count(object, "materials", mesh->material_count);
     json_object_set_new(object, "vertex_colors", json_boolean(mesh->colors != NULL));
     json_object_set_new(object, "face_colors", json_boolean(mesh->face_colors != NULL));
@@ -159,7 +163,8 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &scene));
     if (code != TOOL_DONE) return code;
     fct_scene_view view = fct_scene_get(scene);
-    uint32_t emitters = 0;
+    uint32_t emitters = 0, inward = 0;
+    for (uint32_t i = 0; i < view.model_count; ++i) inward += view.models[i].inward;
     for (uint32_t i = 0; i < view.instance_count; ++i) {
         const float *e = view.materials[view.instances[i].material].emission;
         emitters += e[0] > 0 || e[1] > 0 || e[2] > 0;
@@ -168,6 +173,7 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     set_count(object, "objects", view.object_count);
     set_count(object, "instances", view.instance_count);
     set_count(object, "models", view.model_count);
+    set_count(object, "inward_models", inward);
     set_count(object, "materials", view.material_count);
     set_count(object, "emitting_instances", emitters);
     set_count(object, "light_groups", view.light_group_count);
@@ -302,7 +308,8 @@ int tool_info(int argc, char **argv) {
                 "read.\n\n"
                 "For a mesh it counts vertices, faces, the polygons that the faces come from, edges "
                 "(boundary, non-manifold and "
-                "misoriented ones), components, and degenerate and duplicate faces. For a hierarchy it "
+                "misoriented ones), components, closed bodies that are wound inwards, and degenerate and "
+                "duplicate faces. For a hierarchy it "
                 "prints the header, which is "
                 "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
                 "bounds, depth, roots, and "

@@ -200,6 +200,7 @@ int tool_simplify(int argc, char **argv) {
         .options = simplify_options_table,
         .parse = parse_simplify,
         .run = run_simplify,
+        .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,

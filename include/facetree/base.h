@@ -73,6 +73,10 @@ typedef struct fct_env {
 
     /* Whether a scene file may name buffers outside of its folder. Default: false. */
     bool allow_outside;
+
+    /* Whether scenes turn the closed bodies of their models that are wound inwards (fct_inward_flip of
+     * dual.h). Default: false. */
+    bool flip_inward;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);

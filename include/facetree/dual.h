@@ -48,6 +48,17 @@ typedef struct fct_weld {
 FCT_API fct_result fct_weld_build(const fct_env *env, const fct_mesh *mesh, fct_weld *out);
 FCT_API void fct_weld_release(const fct_env *env, fct_weld *weld);
 
+/* Counts the closed bodies that are wound inwards: each side has two faces, in opposite directions and in
+ * terms of welded vertices, and the volume is negative. A cavity, inside the bounds of a body that is wound
+ * outwards, does not count (if that is one of the 64 largest). `faces` (face_count, or NULL) receives 1 for
+ * the faces of these bodies, else 0. A closed room that is seen from inside counts too. Errors: MEMORY,
+ * CANCELLED. */
+FCT_API fct_result fct_inward_find(const fct_env *env, const fct_mesh *mesh, uint32_t *count, uint8_t *faces);
+/* Turns these bodies: the last two corners of their faces change places, with texture coordinates, and
+ * normals that then point inwards are negated. *count: the number of bodies. Errors: MEMORY, CANCELLED; the
+ * mesh is then as it was. */
+FCT_API fct_result fct_inward_flip(const fct_env *env, fct_mesh *mesh, uint32_t *count);
+
 #ifdef __cplusplus
 }
 #endif

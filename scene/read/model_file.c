@@ -39,7 +39,7 @@ static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fc
 fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, fct_model_file *out) {
     *out = (fct_model_file){0};
     if (!strcasecmp(fct_file_format(env, path), "fct")) return fct_tree_open(env, path, &out->tree);
-    fct_result result = want_mesh ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
+    fct_result result = want_mesh || env->flip_inward ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
     if (result != FCT_OK || out->tree) return result;
     result = fct_mesh_load(env, path, &out->mesh);
     if (result == FCT_OK && out->mesh.face_count == 0) {

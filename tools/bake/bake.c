@@ -239,12 +239,52 @@ static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, f
     return code;
 }
 
+/* Whether a part of an object is closed and wound inwards with a black outside. An object as large as the
+ * scene is a room. The parts are [begin, end). */
+static bool is_turned_in(const fct_scene_view *view, uint32_t begin, uint32_t end) {
+    fct_bounds bounds = view->instances[begin].bounds;
+    bool inward = false, room = true;
+    for (uint32_t i = begin; i < end; ++i) {
+        const fct_instance *part = &view->instances[i];
+        inward = inward || (view->models[part->model].inward && !view->materials[part->material].two_sided);
+        for (int k = 0; k < 3; ++k) {
+            bounds.lower[k] = fminf(bounds.lower[k], part->bounds.lower[k]);
+            bounds.upper[k] = fmaxf(bounds.upper[k], part->bounds.upper[k]);
+        }
+    }
+    for (int k = 0; k < 3; ++k)
+        room = room && bounds.lower[k] <= view->bounds.lower[k] && bounds.upper[k] >= view->bounds.upper[k];
+    return inward && !room;
+}
+
+static void warn_inward(tool *t, const fct_scene *scene) {
+    fct_scene_view view = fct_scene_get(scene);
+    const char *first = NULL;
+    uint32_t count = 0;
+    for (uint32_t begin = 0, end; begin < view.instance_count; begin = end) {
+        for (end = begin + 1; end < view.instance_count;) {
+            if (view.instances[end].object != view.instances[begin].object) break;
+            ++end;
+        }
+        if (!is_turned_in(&view, begin, end)) continue;
+        if (!first) first = view.instances[begin].name;
+        ++count;
+    }
+    if (count)
+        tool_warn(
+            t,
+            "%u closed object%s wound inwards, such as \"%s\": light falls on the inside; --flip-inward "
+            "turns %s",
+            count, count == 1 ? " is" : "s are", first, count == 1 ? "it" : "them");
+}
+
 static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
     fct_scene *scene;
     bake_answers answers = {0};
     double start = tool_seconds();
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], o->backend, &scene));
     if (code == TOOL_DONE && o->two_sided) fct_scene_make_two_sided(scene);
+    if (code == TOOL_DONE) warn_inward(t, scene);
     if (code == TOOL_DONE && o->also) code = tool_refuse_input(t, o->also);
     if (code == TOOL_DONE) code = solve_scene(t, o, set, scene, tool_seconds() - start, &answers);
     json_decref(answers.probes);
@@ -301,6 +341,7 @@ int tool_bake(int argc, char **argv) {
         .options = bake_options_table,
         .parse = parse_bake,
         .run = run_bake,
+        .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

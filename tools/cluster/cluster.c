@@ -129,6 +129,7 @@ int tool_cluster(int argc, char **argv) {
         .parse = parse_cluster,
         .run = run_cluster,
         .builds_tree = true,
+        .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = INT_MAX,
         .output = TOOL_OUTPUT_REQUIRED,

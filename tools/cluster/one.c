@@ -95,6 +95,8 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
     double hashed = tool_seconds() - start;
     large = known && !fits_memory(t, &def, faces, vertices);
     if (!large) code = cluster_in_memory(t, &def, input, output, &large, &stats);
+    if (large && t->flip_inward)
+        return tool_fail(t, TOOL_MEMORY, "%s: --flip-inward needs the whole mesh in memory", input);
     if (large) {
         fct_large_def limits = fct_large_def_default();
         limits.max_memory = find_memory_left(t);

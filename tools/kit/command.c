@@ -22,6 +22,7 @@ enum {
     KEY_FORMAT,
     KEY_OUTSIDE,
     KEY_NO_WELD,
+    KEY_FLIP_INWARD,
     KEY_USAGE,
     KEY_MAN,
     KEY_BASH,
@@ -60,6 +61,11 @@ static const struct argp_option tree_options[] = {{"no-weld", KEY_NO_WELD, NULL,
                                                    "file keeps the choice of its build",
                                                    0},
                                                   {0}};
+
+static const struct argp_option flip_options[] = {
+    {"flip-inward", KEY_FLIP_INWARD, NULL, 0,
+     "Turn closed bodies that are wound inwards, so that their fronts are outside", 0},
+    {0}};
 
 enum { OUTPUT_OPTIONS = 2 }; /* the first common options are about -o */
 
@@ -106,7 +112,7 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = a->options;
-        if (a->command->builds_tree) state->child_inputs[1] = a;
+        state->child_inputs[1] = state->child_inputs[2] = a;
         return 0;
     case 'o':
         if (!*text) return tool_usage(state, "-o: expected a file name, found nothing");
@@ -159,12 +165,20 @@ static error_t parse_common(int key, char *text, struct argp_state *state) {
     }
 }
 
-static error_t parse_tree(int key, char *text, struct argp_state *state) {
+static error_t parse_shared(int key, char *text, struct argp_state *state) {
     (void)text;
     arguments *a = state->input;
-    if (key != KEY_NO_WELD) return ARGP_ERR_UNKNOWN;
-    a->tool->no_weld = true;
+    if (key != KEY_NO_WELD && key != KEY_FLIP_INWARD) return ARGP_ERR_UNKNOWN;
+    *(key == KEY_NO_WELD ? &a->tool->no_weld : &a->tool->flip_inward) = true;
     return 0;
+}
+
+/* The options of several commands: tables that end with {0}, or NULL. */
+static const struct argp_option *get_tree_options(const tool_command *command) {
+    return command->builds_tree ? tree_options : NULL;
+}
+static const struct argp_option *get_flip_options(const tool_command *command) {
+    return command->turns_bodies ? flip_options : NULL;
 }
 
 /* --- Messages for words that argp could not parse --- */
@@ -199,7 +213,8 @@ static void say_bad_long(const tool_command *command, const char *token) {
     size_t length = equals ? (size_t)(equals - name) : strlen(name);
     lookup found = {0};
     look_up_option(&found, command->options, name, length);
-    if (command->builds_tree) look_up_option(&found, tree_options, name, length);
+    look_up_option(&found, get_tree_options(command), name, length);
+    look_up_option(&found, get_flip_options(command), name, length);
     look_up_option(&found, common_options, name, length);
     const struct argp_option *option = found.exact ? found.exact : found.prefixes == 1 ? found.prefix : NULL;
     if (option && equals) {
@@ -215,7 +230,8 @@ static void say_bad_long(const tool_command *command, const char *token) {
         char word[64];
         snprintf(word, sizeof word, "%.*s", (int)length, name);
         int count = add_long_names(command->options, names, 0, 64);
-        if (command->builds_tree) count = add_long_names(tree_options, names, count, 64);
+        count = add_long_names(get_tree_options(command), names, count, 64);
+        count = add_long_names(get_flip_options(command), names, count, 64);
         add_long_names(common_options, names, count, 64);
         const char *nearest = tool_nearest(word, names);
         tool_complain("facetree %s: unknown option '%.*s'%s%s%s", command->name, (int)length + 2, token,
@@ -271,7 +287,7 @@ static int print_answer(const tool_command *command, const struct argp *argp, in
                                    command->synopsis,
                                    command->text,
                                    command->examples,
-                                   {command->options, command->builds_tree ? tree_options : NULL,
+                                   {command->options, get_tree_options(command), get_flip_options(command),
                                     common_options + (takes_output(command) ? 0 : OUTPUT_OPTIONS)}};
     if (action == KEY_MAN)
         manual_print_page(&manual, fct_version());
@@ -304,9 +320,9 @@ int tool_main(const tool_command *command, int argc, char **argv, void *options)
     tool t = {.name = command->name, .start = tool_seconds()};
     arguments a = {.tool = &t, .command = command, .options = options};
     const struct argp own = {.options = command->options, .parser = command->parse};
-    const struct argp tree = {.options = tree_options, .parser = parse_tree};
-    const struct argp_child children[] = {
-        {&own, 0, NULL, 0}, {command->builds_tree ? &tree : NULL, 0, NULL, 0}, {0}};
+    const struct argp tree = {.options = get_tree_options(command), .parser = parse_shared};
+    const struct argp flip = {.options = get_flip_options(command), .parser = parse_shared};
+    const struct argp_child children[] = {{&own, 0, NULL, 0}, {&tree, 0, NULL, 0}, {&flip, 0, NULL, 0}, {0}};
     char *doc = make_help_text(command);
     t.inputs = malloc(((size_t)argc + 1) * sizeof *t.inputs);
     int code = TOOL_MEMORY;

@@ -36,6 +36,7 @@ typedef struct tool_command {
     tool_output_use output;
     const char *endings; /* of -o, for tool_check_kind of tools/kit/file.h; NULL: the command checks them */
     const char *other;   /* likewise */
+    bool turns_bodies;   /* takes --flip-inward; tool_load_mesh follows it */
     bool builds_tree;    /* takes --no-weld; tool_open_tree follows it */
     bool output_folder;  /* -o may name a folder: the command checks it itself */
 } tool_command;

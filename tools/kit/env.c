@@ -420,6 +420,7 @@ void tool_env_open(tool *t) {
     t->env.progress = show_progress;
     t->env.message = take_message;
     t->env.allow_outside = t->allow_outside;
+    t->env.flip_inward = t->flip_inward;
     t->env.memory_user = t->env.progress_user = t->env.message_user = t;
     if (t->max_memory) {
         t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */

@@ -32,6 +32,7 @@ typedef struct tool {
     const char *output; /* the value of -o, or NULL */
     bool json, quiet, progress, allow_outside;
     bool in_place;    /* an output may replace an input */
+    bool flip_inward; /* loaded meshes turn closed bodies that are wound inwards */
     bool no_weld;     /* trees keep vertices of equal position apart */
     uint32_t threads; /* 0: all cores */
     uint64_t seed;

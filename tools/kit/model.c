@@ -47,13 +47,23 @@ double tool_length_of(const fct_tree *tree, tool_length length) {
     return length.percent ? length.value / 100 * tool_diagonal(tree) : length.value;
 }
 
-int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
+static int load_mesh(tool *t, const char *path, fct_mesh *mesh) {
     if (!tool_has_format(t, path, "fct")) return tool_result(t, fct_mesh_load(&t->env, path, mesh));
     fct_tree *tree;
     int code = tool_result(t, fct_tree_open(&t->env, path, &tree));
     if (code != TOOL_DONE) return code;
     code = tool_result(t, fct_tree_mesh(&t->env, tree, mesh));
     fct_tree_destroy(tree);
+    return code;
+}
+
+int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
+    uint32_t count;
+    int code = load_mesh(t, path, mesh);
+    if (code != TOOL_DONE || !t->flip_inward) return code;
+    code = tool_result(t, fct_inward_flip(&t->env, mesh, &count));
+    if (code == TOOL_DONE) tool_say(t, "%s: turned %u closed bod%s", path, count, count == 1 ? "y" : "ies");
+    if (code != TOOL_DONE) fct_mesh_release(&t->env, mesh);
     return code;
 }
 

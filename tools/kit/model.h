@@ -11,7 +11,7 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
 /* The mesh of a tree with the triangles that connect its faces: with --no-weld those of the input, else
  * vertices of equal position are one. */
 int tool_tree_mesh(tool *t, const fct_tree *tree, fct_mesh *mesh);
-/* The mesh of a mesh file or of a .fct file. */
+/* The mesh of a mesh file or of a .fct file, turned if the command got --flip-inward. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
 /* Saves a mesh. */
 int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def);

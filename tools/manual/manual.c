@@ -118,7 +118,7 @@ void manual_print_page(const manual_command *command, const char *version) {
     puts(".SH DESCRIPTION");
     print_roff_paragraphs(command->text ? command->text : command->summary);
     puts(".SH OPTIONS");
-    for (int i = 0; i < 3; ++i) print_roff_options(command->tables[i]);
+    for (int i = 0; i < 4; ++i) print_roff_options(command->tables[i]);
     print_roff_examples(command->examples);
     puts(
         ".SH EXIT STATUS\n0 done; 1 the answer is no; 64 usage; 65 bad data; 66 input missing or unreadable; "
@@ -139,7 +139,7 @@ static bool find_visible(const struct argp_option **option) {
 
 void manual_print_bash(const manual_command *command) {
     printf("    %s) options='", command->name);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 4; ++i)
         for (const struct argp_option *o = command->tables[i]; find_visible(&o); ++o)
             printf(" --%s", o->name);
     puts("' ;;");
@@ -152,7 +152,7 @@ static void print_zsh_text(const char *text) {
 
 void manual_print_zsh(const manual_command *command) {
     printf("    %s) _arguments", command->name);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 4; ++i)
         for (const struct argp_option *o = command->tables[i]; find_visible(&o); ++o) {
             printf(" \\\n        '--%s%s[", o->name, o->arg ? "=" : "");
             print_zsh_text(o->doc ? o->doc : o->name);

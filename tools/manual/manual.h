@@ -9,7 +9,7 @@ typedef struct manual_command {
     const char *name, *summary;
     const char *synopsis;                /* one line per way to call it */
     const char *text, *examples;         /* NULL: none. examples: one command line per line */
-    const struct argp_option *tables[3]; /* each ends with {0}; NULL: none */
+    const struct argp_option *tables[4]; /* each ends with {0}; NULL: none */
 } manual_command;
 
 void manual_print_page(const manual_command *command, const char *version);
