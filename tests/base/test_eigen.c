@@ -170,11 +170,27 @@ static void eight_are_each_as_one(void **state) {
     }
 }
 
+/* Entries so small that their inverse is infinite. */
+static void denormal_matrices_have_eigenvalues(void **state) {
+    (void)state;
+    const double s = 0x1p-1040, m[6] = {2 * s, s, 0, 2 * s, 0, 4 * s}, expected[3] = {1, 3, 4};
+    double values[3];
+    v3 vectors[3];
+    fct_eigen3(m, values, vectors);
+    for (int i = 0; i < 3; ++i) {
+        assert_true(fabs(values[i] / s - expected[i]) < 1e-3);
+        assert_true(fabs(v3_norm(vectors[i]) - 1) < 1e-12);
+    }
+}
+
 int main(void) {
     skip_unless_variant_runs();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_matrices),       cmocka_unit_test(special_spectra),
-        cmocka_unit_test(huge_and_tiny),         cmocka_unit_test(nearly_diagonal),
-        cmocka_unit_test(eight_are_each_as_one), cmocka_unit_test(diagonal_gives_axes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(denormal_matrices_have_eigenvalues),
+                                       cmocka_unit_test(random_matrices),
+                                       cmocka_unit_test(special_spectra),
+                                       cmocka_unit_test(huge_and_tiny),
+                                       cmocka_unit_test(nearly_diagonal),
+                                       cmocka_unit_test(eight_are_each_as_one),
+                                       cmocka_unit_test(diagonal_gives_axes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -60,8 +60,17 @@ static void logarithms_and_powers(void **state) {
     assert_true(fct_root(0, 3) == 0 && fct_root(0, 5) == 0 && fct_root(27, 3) == 3 && fct_root(32, 5) == 2);
 }
 
+static void large_angles_are_reduced(void **state) {
+    (void)state;
+    for (int i = 0; i < 1000; ++i) {
+        double x = 1e5 + 997.25 * i;
+        assert_true(fabs(fct_sin(x) - sin(x)) < 1e-9 && fabs(fct_cos(-x) - cos(x)) < 1e-9);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(large_angles_are_reduced),
         cmocka_unit_test(sines_and_cosines),
         cmocka_unit_test(arcs),
         cmocka_unit_test(logarithms_and_powers),

@@ -262,13 +262,20 @@ static void play(game *g) {
     assert_true(round > EARLY_ROUNDS && g->mutual > g->patient && g->patient > 0);
 }
 
-static void check_rounds(const char *name, const fct_mesh *mesh, fct_cluster_cost cost) {
+/* across: after rounds within materials, which must merge nothing, those across them are checked. */
+static void check_rounds(const char *name, const fct_mesh *mesh, fct_cluster_cost cost, bool across) {
     fct_env env = fct_env_default();
     fct_tree_def def = fct_tree_def_default();
     fct_work work;
     def.cost = cost, def.fit_weight = cost == FCT_COST_MEAN ? 1e6 : 1e4, def.direction_weight = 1,
     def.shape_weight = 0.002;
     assert_int_equal(fct_work_create(&env, mesh, &def, &work), FCT_OK);
+    fct_mesh bare = *mesh;
+    if (across) {
+        assert_int_equal(fct_work_rounds(&work, false), FCT_OK);
+        assert_int_equal(work.merge_count, 0);
+        bare.materials = NULL, bare.material_count = 0, mesh = &bare;
+    }
     assert_int_equal(fct_work_rounds(&work, !mesh->materials), FCT_OK);
     size_t faces = mesh->face_count;
     game g = {
@@ -304,7 +311,7 @@ static void increment(void **state) {
     (void)state;
     fct_env env = fct_env_default();
     fct_mesh mesh = make_terrain(&env, 120, 0.25, 1);
-    check_rounds("terrain", &mesh, FCT_COST_INCREMENT);
+    check_rounds("terrain", &mesh, FCT_COST_INCREMENT, false);
     fct_mesh_release(&env, &mesh);
 }
 
@@ -313,7 +320,7 @@ static void mean_of_two_materials(void **state) {
     fct_env env = fct_env_default();
     fct_mesh mesh = make_terrain(&env, 110, 0.2, 2);
     paint_stripes(&env, &mesh, 2, 97);
-    check_rounds("two materials", &mesh, FCT_COST_MEAN);
+    check_rounds("two materials", &mesh, FCT_COST_MEAN, false);
     fct_mesh_release(&env, &mesh);
 }
 
@@ -321,12 +328,23 @@ static void pages(void **state) {
     (void)state;
     fct_env env = fct_env_default();
     fct_mesh mesh = make_pages(&env, 5, 50, 50);
-    check_rounds("pages", &mesh, FCT_COST_INCREMENT);
+    check_rounds("pages", &mesh, FCT_COST_INCREMENT, false);
+    fct_mesh_release(&env, &mesh);
+}
+
+/* No two neighbours share a material, so that the rounds across materials begin with edges. */
+static void across_materials(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_terrain(&env, 120, 0.25, 1);
+    mesh.materials = fct_allocate(&env, mesh.face_count, sizeof *mesh.materials), mesh.material_count = 2;
+    for (uint32_t f = 0; f < mesh.face_count; ++f) mesh.materials[f] = f % 2;
+    check_rounds("checkered", &mesh, FCT_COST_INCREMENT, true);
     fct_mesh_release(&env, &mesh);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(increment), cmocka_unit_test(mean_of_two_materials),
-                                       cmocka_unit_test(pages)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(across_materials), cmocka_unit_test(increment),
+                                       cmocka_unit_test(mean_of_two_materials), cmocka_unit_test(pages)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

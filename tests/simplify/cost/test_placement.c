@@ -255,6 +255,11 @@ static void check_edge(fct_simplifier *s, uint32_t e, bool ends_only) {
         assert_int_equal(groups.second[i], p.second[i]);
     }
     check_attributes(s, &p, &got, a, b, &groups);
+    for (int out = 0; out < 2 && !s->steering; ++out) { /* beyond an end: the attributes of that end */
+        fct_candidate beyond = got;
+        beyond.at = v3_mad(a, out ? 1.5 : -.5, v3_sub(b, a));
+        check_attributes(s, &p, &beyond, a, b, &groups);
+    }
 }
 
 /* Rolls the sheet to a part of a cone. All its planes meet in the apex, which is far from every edge. */
@@ -279,7 +284,7 @@ static void candidates_solve_the_dense_system(void **state) {
                 def.placement = (fct_placement)policy;
                 def.regularization = kind == 1 ? .1 : kind == 3 ? 1e-9 : 1e-5;
                 def.boundary_weight = kind == 3 ? 0 : 1;
-                def.color_weight = 1, def.texcoord_weight = kind == 2 ? 0 : 1;
+                def.color_weight = def.texcoord_weight = kind == 2 ? 0 : 1;
                 fct_simplifier *s = open_simplifier(&env, &mesh, &def);
                 for (uint32_t e = 0; e < s->edge_count; ++e) {
                     check_edge(s, e, false);
