@@ -22,7 +22,7 @@ static inline void fct_obj_skip_blanks(fct_text *t) {
     }
 }
 
-/* Skips blanks. Returns whether the line, the file or what is not a comment ends there. */
+/* Skips blanks. Returns whether the statement ends there: at a comment, a line end or the end of the file. */
 static inline bool fct_obj_at_line_end(fct_text *t) {
     fct_obj_skip_blanks(t);
     return t->p == t->end || fct_text_is_line_end(*t->p) || *t->p == '#';

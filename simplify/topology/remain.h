@@ -1,5 +1,5 @@
 /* simplify/topology/remain.h: whether a move of a point leaves good faces: not folded, with an area, each
- * once, and at most two at an edge. What is bad before the move may stay so.
+ * once, and at most two at an edge. A face that is bad before the move may be bad after it.
  */
 #ifndef FCT_SIMPLIFY_REMAIN_H
 #define FCT_SIMPLIFY_REMAIN_H

@@ -1,5 +1,5 @@
-/* tests/scene/test_load.c: scene.json: what is read, what is refused and how it is told, shared
- * models, hierarchies beside meshes, and running out of memory at every allocation. */
+/* tests/scene/test_load.c: scene.json: values that are read, the messages of errors, shared models,
+ * hierarchies beside meshes, and running out of memory at every allocation. */
 #include "support.h"
 
 #include <sys/stat.h>

@@ -47,7 +47,7 @@ typedef struct fct_glb {
     size_t dense_count;                  /* elements of sparse accessors so far */
     uint64_t vertex_count, corner_count; /* of all meshes that were read, also repeated ones */
 
-    /* What has been opened so far. The numbers are those of the document. */
+    /* The buffers, views and accessors that are open. Each has the index that it has in the document. */
     fct_glb_buffer *buffers;
     fct_glb_view *views;
     fct_glb_array *arrays;
