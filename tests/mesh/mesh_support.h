@@ -168,4 +168,16 @@ static inline fct_mesh make_full(const fct_env *env) {
     return mesh;
 }
 
+/* Saves a mesh, loads it, and returns the loaded mesh. */
+static inline fct_mesh there_and_back(const fct_env *env, const fct_mesh *mesh, const char *path,
+                                      bool ascii) {
+    fct_mesh_save_def def = fct_mesh_save_def_default();
+    def.ascii = ascii;
+    fct_mesh back;
+    assert_int_equal(fct_mesh_save(env, path, mesh, &def), FCT_OK);
+    assert_int_equal(fct_mesh_load(env, path, &back), FCT_OK);
+    remove(path);
+    return back;
+}
+
 #endif

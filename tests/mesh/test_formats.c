@@ -89,17 +89,6 @@ static void refuses_glb(void **state) {
     refuse("glb", "glTF", "the file ends after 4 bytes");
 }
 
-/* Saves a mesh, loads it, and returns the loaded mesh. */
-static fct_mesh there_and_back(const fct_env *env, const fct_mesh *mesh, const char *path, bool ascii) {
-    fct_mesh_save_def def = fct_mesh_save_def_default();
-    def.ascii = ascii;
-    fct_mesh back;
-    assert_int_equal(fct_mesh_save(env, path, mesh, &def), FCT_OK);
-    assert_int_equal(fct_mesh_load(env, path, &back), FCT_OK);
-    remove(path);
-    return back;
-}
-
 static void everything_round_trips_through_ply(void **state) {
     (void)state;
     recorder r = {0};

@@ -162,25 +162,13 @@ static void padding_is_no_triangle(void **state) {
     refuse_bytes("stl", b.data, b.size - 1, "3 triangles take 234 bytes, but the file has 233");
 }
 
-/* Saves a mesh, loads it, and returns the loaded mesh. */
-static fct_mesh there_and_back(const fct_env *env, const fct_mesh *mesh, bool ascii) {
-    const char *path = "facetree_test.stl";
-    fct_mesh_save_def def = fct_mesh_save_def_default();
-    def.ascii = ascii;
-    fct_mesh back;
-    assert_int_equal(fct_mesh_save(env, path, mesh, &def), FCT_OK);
-    assert_int_equal(fct_mesh_load(env, path, &back), FCT_OK);
-    remove(path);
-    return back;
-}
-
 static void stl_keeps_triangles(void **state) {
     (void)state;
     recorder r = {0};
     fct_env env = recorder_env(&r);
     fct_mesh m = make_sphere(&env, 5);
     for (int ascii = 0; ascii < 2; ++ascii) {
-        fct_mesh back = there_and_back(&env, &m, ascii);
+        fct_mesh back = there_and_back(&env, &m, "facetree_test.stl", ascii);
         assert_int_equal(back.vertex_count, m.vertex_count);
         for (size_t i = 0; i < 3 * (size_t)m.face_count; ++i)
             assert_memory_equal(m.positions + 3 * (size_t)m.triangles[i],

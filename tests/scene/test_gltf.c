@@ -1,30 +1,17 @@
 /* tests/scene/test_gltf.c: glTF scenes: materials, shared meshes, nodes, cameras, buffers in files and in the
  * text, refused files. */
-#include "support.h"
+#include "files.h"
 
 #include "facetree/scene.h"
 #include "scene/read/load.h"
 #include "scene/transform.h"
 
-static char folder[] = "/tmp/facetree-gltf-XXXXXX";
-
 static int set_up(void **unused) {
     (void)unused;
-    char path[64];
-    assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/six indices.bin", folder);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
     static const unsigned char indices[6] = {0, 1, 2, 0, 2, 3};
-    fwrite(indices, 1, 6, file);
-    return fclose(file);
-}
-
-static int clear(void **unused) {
-    (void)unused;
-    char command[64];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
+    assert_non_null(mkdtemp(folder));
+    write_bytes("six indices.bin", indices, sizeof indices);
+    return 0;
 }
 
 /* Four corners of the unit square, floats: 0 0 0, 1 0 0, 1 1 0, 0 1 0. */
@@ -62,13 +49,8 @@ static int clear(void **unused) {
 #define ASSET "\"asset\": {\"version\": \"2.0\"}}"
 
 static fct_result load(const fct_env *env, const char *text, fct_scene **scene) {
-    char path[64];
-    snprintf(path, sizeof path, "%s/s.gltf", folder);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-    return fct_scene_load(env, path, FCT_BACKEND_OBB, scene);
+    write_text("s.gltf", text);
+    return fct_scene_load(env, path_of("s.gltf"), FCT_BACKEND_OBB, scene);
 }
 
 static void reads_nodes_materials_and_camera(void **unused) {
@@ -110,8 +92,7 @@ static void reads_what_the_mesh_writer_writes(void **unused) {
     (void)unused;
     fct_env env = fct_env_default();
     fct_scene *scene;
-    char path[64];
-    snprintf(path, sizeof path, "%s/sphere.glb", folder);
+    const char *path = path_of("sphere.glb");
     fct_mesh mesh = make_sphere(&env, 6);
     assert_int_equal(fct_mesh_save(&env, path, &mesh, NULL), FCT_OK);
     assert_int_equal(fct_scene_load(&env, path, FCT_BACKEND_OBB, &scene), FCT_OK);
@@ -195,5 +176,5 @@ int main(void) {
         cmocka_unit_test(refuses_bad_files),
         cmocka_unit_test(fails_cleanly_at_every_allocation),
     };
-    return cmocka_run_group_tests(tests, set_up, clear);
+    return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

@@ -1,31 +1,13 @@
 /* tests/scene/test_load.c: scene.json: values that are read, the messages of errors, shared models,
  * hierarchies beside meshes, and running out of memory at every allocation. */
-#include "support.h"
+#include "files.h"
 
 #include <sys/stat.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include "base/io/file.h"
 #include "facetree/scene.h"
 #include "scene/read/load.h"
-
-static char folder[] = "/tmp/facetree-scene-XXXXXX";
-
-static const char *path_of(const char *name) {
-    static char path[4][256];
-    static int turn;
-    char *to = path[turn++ % 4];
-    snprintf(to, sizeof path[0], "%s/%s", folder, name);
-    return to;
-}
-
-static void write_text(const char *name, const char *text) {
-    FILE *file = fopen(path_of(name), "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
 
 static int set_up(void **unused) {
     (void)unused;
@@ -37,13 +19,6 @@ static int set_up(void **unused) {
     write_text("empty.obj", "v 0 0 0\n");
     write_text("broken.obj", "v 0 0 zero\nf 1 1 1\n");
     return 0;
-}
-
-static int clear(void **unused) {
-    (void)unused;
-    char command[256];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
 }
 
 #define HEAD  "{\"materials\": {\"a\": {\"reflectance\": 0.5}, \"b\": {\"reflectance\": [0.1, 0.2, 0.3]}}, "
@@ -404,5 +379,5 @@ int main(void) {
         cmocka_unit_test(missing_files_are_told),
         cmocka_unit_test(scenes_made_by_calls_are_checked),
     };
-    return cmocka_run_group_tests(tests, set_up, clear);
+    return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

@@ -1,39 +1,14 @@
 /* tests/scene/test_obj.c: OBJ + MTL: materials, names, libraries, what becomes grey, and refused files. */
-#include "support.h"
+#include "files.h"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "facetree/scene.h"
-
-static char folder[] = "/tmp/facetree-scene-XXXXXX";
-
-static const char *path_of(const char *name) {
-    static char path[4][256];
-    static int turn;
-    char *to = path[turn++ % 4];
-    snprintf(to, sizeof path[0], "%s/%s", folder, name);
-    return to;
-}
-
-static void write_text(const char *name, const char *text) {
-    FILE *file = fopen(path_of(name), "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
 
 static int set_up(void **unused) {
     (void)unused;
     assert_non_null(mkdtemp(folder));
     return mkdir(path_of("mat"), 0777);
-}
-
-static int clear(void **unused) {
-    (void)unused;
-    char command[256];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
 }
 
 static fct_result load(const fct_env *env, const char *name, fct_scene **scene) {
@@ -352,5 +327,5 @@ int main(void) {
         cmocka_unit_test(refuses_bad_obj_scenes),
         cmocka_unit_test(obj_fails_cleanly_at_every_allocation),
     };
-    return cmocka_run_group_tests(tests, set_up, clear);
+    return cmocka_run_group_tests(tests, set_up, remove_folder);
 }
