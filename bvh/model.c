@@ -47,8 +47,11 @@ void fct_bvh_measure(fct_bvh *bvh) {
     bvh->scale = size > 0 ? ldexp(1, -ilogb(size) - 1) : 1;
     for (int k = 0; k < 3; ++k) {
         double lower = bvh->scale * (double)b.lower[k], upper = bvh->scale * (double)b.upper[k];
-        bvh->center[k] = (float)((lower + upper) / 2);
-        bvh->lower[k] = nextafterf((float)lower - ENTRY_MARGIN, -INFINITY);
-        bvh->upper[k] = nextafterf((float)upper + ENTRY_MARGIN, INFINITY);
+        double center = (lower + upper) / 2;
+        bvh->offset[k] = fabs(center) >= 2 * (double)FCT_REACH ? (float)center : 0;
+        double offset = (double)bvh->offset[k];
+        bvh->center[k] = (float)(center - offset);
+        bvh->lower[k] = nextafterf((float)(lower - offset) - ENTRY_MARGIN, -INFINITY);
+        bvh->upper[k] = nextafterf((float)(upper - offset) + ENTRY_MARGIN, INFINITY);
     }
 }

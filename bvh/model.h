@@ -1,8 +1,10 @@
 /* bvh/model.h: the packed structure of one model, and access to its parts.
  *
  * Every coordinate is multiplied by one power of two, so that the largest half extent of the model lies in
- * [1/2, 1). This multiplication is exact. Tolerances below are absolute numbers in this scaled unit, so they
- * hold for models of every size.
+ * [1/2, 1). On each axis where the centre is then at least 2 FCT_REACH from zero, the centre is subtracted.
+ * Both steps are exact for vertices, and for points within FCT_REACH of the centre: the difference of two
+ * floats within a factor of two is a float (Sterbenz 1974). Tolerances below are absolute numbers in this
+ * scaled space, so they hold for models of every size at every place.
  *
  *     node (8 children) -> node or leaf      nodes: axis boxes or oriented boxes, built over the leaves
  *     leaf -> up to 16 triangles             leaves: face clusters of the tree, in order of place
@@ -105,6 +107,7 @@ struct fct_bvh {
     fct_backend backend;
     fct_bounds bounds;        /* of the vertices that faces use, unscaled */
     double scale;             /* a power of two */
+    float offset[3];          /* a scaled position is scale p - offset */
     float center[3];          /* of the scaled bounds */
     float lower[3], upper[3]; /* scaled bounds plus a margin, see fct_bvh_measure */
     /* FCT_BACKEND_OBB */
@@ -129,10 +132,13 @@ static inline void fct_visits_add(fct_visits *visits, const fct_visits *more) {
     visits->triangles += more->triangles;
 }
 
+/* A point in scaled space. */
+static inline v3 fct_bvh_to_scaled(const fct_bvh *bvh, v3 point) {
+    return v3_sub(v3_scale(point, bvh->scale), v3_load(bvh->offset));
+}
 /* The vertex's position, scaled: exact unless the result is a denormal float. */
 static inline void fct_bvh_position(const fct_bvh *bvh, uint32_t vertex, float out[3]) {
-    const float *p = bvh->view.positions + 3 * (size_t)vertex;
-    for (int i = 0; i < 3; ++i) out[i] = (float)(bvh->scale * (double)p[i]);
+    v3_store(out, fct_bvh_to_scaled(bvh, v3_load(bvh->view.positions + 3 * (size_t)vertex)));
 }
 /* Whether the face at a place has exactly zero area. Rays never hit such a face. */
 bool fct_bvh_degenerate(const fct_bvh *bvh, uint32_t place);

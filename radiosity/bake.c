@@ -32,6 +32,7 @@ enum { PASSES = 5, EARLY_SWEEPS = 4, LAST_SWEEPS = 100, REFERENCE_SAMPLES = 256 
 struct fct_bake {
     fct_solution solution;
     fct_bake_stats stats;
+    double lit_work, whole_work; /* of the instances that fct_bake_instance has lit, and of all */
 };
 
 fct_bake_def fct_bake_def_default(void) {
@@ -104,6 +105,21 @@ static fct_result solve_scene(fct_bake *bake) {
     return FCT_OK;
 }
 
+/* The work of lighting an instance, for the progress. A face of a dense mesh
+ * takes less than one of a large surface. */
+static double estimate_work(const fct_scene_view *view, uint32_t instance, double max_edge) {
+    const fct_instance *i = &view->instances[instance];
+    const fct_tree *tree = view->models[i->model].tree;
+    fct_tree_view tree_view = fct_tree_get(tree);
+    double area = 0, scale2 = 0;
+    for (uint32_t r = 0; r < tree_view.root_count; ++r) {
+        fct_cluster cluster;
+        if (fct_tree_cluster(tree, tree_view.roots[r], &cluster) == FCT_OK) area += (double)cluster.area;
+    }
+    for (int k = 0; k < 9; ++k) scale2 += (double)i->normal_matrix[k] * (double)i->normal_matrix[k] / 3;
+    return tree_view.face_count + 12 * area * sqrt(scale2) / (max_edge * max_edge);
+}
+
 /* Rejects diagonals outside [LEAST_SIZE, MOST_SIZE]. A scene that is a single point is valid and dark. */
 static fct_result check_extents(const fct_env *env, const fct_scene_view *view) {
     for (uint32_t m = 0; m <= view->model_count; ++m) {
@@ -143,6 +159,8 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
         fct_bake_destroy(bake);
         return result;
     }
+    for (uint32_t i = 0; i < view.instance_count; ++i)
+        bake->whole_work += estimate_work(&view, i, s->max_edge);
     *out = bake;
     return FCT_OK;
 }
@@ -291,6 +309,10 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     bake->stats.seconds_push += fct_seconds() - start;
     bake->stats.vertices += out->vertex_count;
     bake->stats.faces += out->face_count;
+    if (result != FCT_OK) return result;
+    bake->lit_work += estimate_work(&bake->solution.elements.view, instance, bake->solution.max_edge);
+    result = fct_progress(env, "objects", fct_min(bake->lit_work / bake->whole_work, 1));
+    if (result != FCT_OK) fct_mesh_release(env, out);
     return result;
 }
 

@@ -163,6 +163,7 @@ static int run_boxes(tool *t, void *options) {
 }
 
 int tool_boxes(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"write", 5}, {0}};
     static const tool_command command = {
         .name = "boxes",
         .synopsis = "IN (-k K | --max-distance D) [-o OUT]",
@@ -178,6 +179,7 @@ int tool_boxes(int argc, char **argv) {
         .options = box_options_table,
         .parse = parse_boxes,
         .run = run_boxes,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

@@ -141,6 +141,7 @@ static int run_closest(tool *t, void *options) {
 }
 
 int tool_closest(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"ray structure", 50}, {0}};
     static const tool_command command = {
         .name = "closest",
         .synopsis = "IN --points FILE [-o FILE]",
@@ -156,6 +157,7 @@ int tool_closest(int argc, char **argv) {
         .options = closest_options_table,
         .parse = parse_closest,
         .run = run_closest,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

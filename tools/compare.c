@@ -91,6 +91,8 @@ static int run_compare(tool *t, void *options) {
 }
 
 int tool_compare(int argc, char **argv) {
+    static const tool_stage stages[] = {
+        TOOL_TREE_STAGES, TOOL_TREE_STAGES, {"ray structure", 80}, {"comparing", 250}, {0}};
     static const tool_command command = {
         .name = "compare",
         .synopsis = "A B",
@@ -113,6 +115,7 @@ int tool_compare(int argc, char **argv) {
         .options = compare_options_table,
         .parse = parse_compare,
         .run = run_compare,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 2,
         .inputs_max = 2,

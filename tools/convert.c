@@ -40,6 +40,7 @@ static int run_convert(tool *t, void *options) {
 }
 
 int tool_convert(int argc, char **argv) {
+    static const tool_stage stages[] = {{"read", 60}, {"write", 40}, {0}};
     static const tool_command command = {
         .name = "convert",
         .synopsis = "IN -o OUT",
@@ -53,6 +54,7 @@ int tool_convert(int argc, char **argv) {
         .options = convert_options_table,
         .parse = parse_convert,
         .run = run_convert,
+        .stages = stages,
         .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,

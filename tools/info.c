@@ -298,6 +298,7 @@ static int run_info(tool *t, void *options) {
 }
 
 int tool_info(int argc, char **argv) {
+    static const tool_stage stages[] = {{"read", 25}, {"inspect", 75}, {0}};
     static const tool_command command = {
         .name = "info",
         .synopsis = "FILE",
@@ -325,6 +326,7 @@ int tool_info(int argc, char **argv) {
         .options = info_options_table,
         .parse = parse_info,
         .run = run_info,
+        .stages = stages,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_UNUSED};

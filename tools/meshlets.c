@@ -190,6 +190,8 @@ static int run_meshlets(tool *t, void *options) {
 }
 
 int tool_meshlets(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"meshlets", 3}, {"sides", 6}, {"growing", 20},
+                                        {"packing", 8},   {"bounds", 10},  {"write", 3}, {0}};
     static const tool_command command = {
         .name = "meshlets",
         .synopsis = "IN -o OUT",
@@ -220,6 +222,7 @@ int tool_meshlets(int argc, char **argv) {
         .options = meshlet_options_table,
         .parse = parse_meshlets,
         .run = run_meshlets,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

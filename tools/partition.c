@@ -321,6 +321,8 @@ static int run_partition(tool *t, void *options) {
 }
 
 int tool_partition(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"sides", 5},      {"refine", 20}, {"charts", 10},
+                                        {"merging", 20},  {"distances", 10}, {"write", 5},   {0}};
     static const tool_command command = {
         .name = "partition",
         .synopsis = "IN (-k K | --max-cost C | --max-distance D | --charts DEGREES) -o OUT",
@@ -372,6 +374,7 @@ int tool_partition(int argc, char **argv) {
         .options = partition_options_table,
         .parse = parse_partition,
         .run = run_partition,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

@@ -323,6 +323,7 @@ static int run_raycast(tool *t, void *user) {
 }
 
 int tool_raycast(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"ray structure", 50}, {"checking rays", 200}, {0}};
     static const tool_command command = {
         .name = "raycast",
         .synopsis = "IN --rays FILE [-o FILE]\nIN --check [--rays FILE]\nIN --make-rays N -o FILE",
@@ -346,6 +347,7 @@ int tool_raycast(int argc, char **argv) {
         .options = ray_options_table,
         .parse = parse_raycast,
         .run = run_raycast,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

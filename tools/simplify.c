@@ -168,8 +168,8 @@ static int run_simplify(tool *t, void *options) {
     int code = tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);
-    t->items = mesh.face_count;
-    t->unit = "faces";
+    t->bar.items = mesh.face_count;
+    t->bar.unit = "faces";
     code = set_attribute_weights(t, o, &mesh);
     if (code == TOOL_DONE) code = tool_result(t, fct_simplify(&t->env, &mesh, &o->def, &simple, &stats));
     if (code == TOOL_DONE) code = tool_save_mesh(t, t->output, &simple, 1);
@@ -183,6 +183,8 @@ static int run_simplify(tool *t, void *options) {
 }
 
 int tool_simplify(int argc, char **argv) {
+    static const tool_stage stages[] = {{"read", 5},   {"costs", 3}, {"contract", 78},
+                                        {"refit", 12}, {"write", 2}, {0}};
     static const tool_command command = {
         .name = "simplify",
         .synopsis = "IN -o OUT",
@@ -200,6 +202,7 @@ int tool_simplify(int argc, char **argv) {
         .options = simplify_options_table,
         .parse = parse_simplify,
         .run = run_simplify,
+        .stages = stages,
         .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,

@@ -198,7 +198,7 @@ static void report_face(const search *s, double distance2, fct_near *out) {
 
 bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
                         fct_visits *visits) {
-    search s = {.bvh = bvh, .point = v3_scale(point, bvh->scale), .place = FCT_NONE, .normal = normal};
+    search s = {.bvh = bvh, .point = fct_bvh_to_scaled(bvh, point), .place = FCT_NONE, .normal = normal};
     double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
     if (bvh->embree || !(size < INFINITY) || !(max_distance >= 0)) return false;
     round_point(&s);

@@ -1,18 +1,21 @@
 /* bvh/ray/check.c: compares two backends on the same rays, and decides their differences in double.
  *
- * A difference is explained unless our answer is wrong. Our answer is wrong in three cases:
- *   1. The point that we report is not on its face.
+ * Each backend prepares the caller's ray in its own way. A difference is explained unless our answer is
+ * wrong. Our answer is wrong in three cases:
+ *   1. t, u, v and the normal do not describe one point of the ray and of the face (describes_hit). This is
+ * checked for every hit, whatever Embree reports.
  *   2. Embree reports a nearer face, and the ray meets it farther from its rim than float rounding.
  *   3. Embree reports a nearer face, the ray meets it within rounding of its rim, and the faces there leave
  * no gap around the ray (surface_covers). One face alone may be missed there, a closed surface may not. It is
  * also correct to miss Embree's face within rounding of t_min or t_max.
  */
+#include <float.h>
 #include <string.h>
 
 #include "base/math/elementary.h"
 #include "bvh/near/triangle.h"
-#include "bvh/ray/embree.h"
-#include "bvh/ray/traverse.h"
+#include "bvh/ray/exact.h"
+#include "bvh/ray/ray.h"
 #include "cluster/tree/node.h"
 
 /* In scaled units, more than the float test can move a triangle (model.h). */
@@ -27,6 +30,7 @@ typedef struct exact_ray {
     double t_min, t_max;
     double start;  /* distance of `origin` from the ray's own origin */
     double length; /* scaled distance per unit of the caller's t */
+    const fct_ray *given;
 } exact_ray;
 
 static exact_ray make_exact_ray(const fct_bvh *bvh, const fct_ray *ray) {
@@ -36,25 +40,38 @@ static exact_ray make_exact_ray(const fct_bvh *bvh, const fct_ray *ray) {
     length = sqrtl(length);
     for (int k = 0; k < 3; ++k) {
         unit[k] = (long double)d[k] / length;
-        far[k] = (long double)bvh->scale * (long double)o[k];
+        far[k] = (long double)bvh->scale * (long double)o[k] - (long double)bvh->offset[k];
         middle += unit[k] * ((long double)bvh->center[k] - far[k]);
     }
     for (int k = 0; k < 3; ++k) far[k] += middle * unit[k];
     exact_ray e = {.origin = v3_make((double)far[0], (double)far[1], (double)far[2]),
                    .direction = v3_make((double)unit[0], (double)unit[1], (double)unit[2]),
                    .start = (double)middle,
-                   .length = bvh->scale * (double)length};
+                   .length = bvh->scale * (double)length,
+                   .given = ray};
     e.t_min = (double)ray->t_min * e.length - e.start;
     e.t_max = (double)ray->t_max * e.length - e.start;
     v3_frame(e.direction, &e.across[0], &e.across[1]);
     return e;
 }
 
+/* Not scaled. */
+static void load_corners(const fct_bvh *bvh, uint32_t place, v3 p[3]) {
+    for (size_t c = 0; c < 3; ++c)
+        p[c] = v3_load(bvh->view.positions + 3 * (size_t)bvh->view.triangles[3 * (size_t)place + c]);
+}
+
 static void face_corners(const fct_bvh *bvh, uint32_t place, v3 p[3]) {
-    for (size_t c = 0; c < 3; ++c) {
-        const float *q = bvh->view.positions + 3 * (size_t)bvh->view.triangles[3 * (size_t)place + c];
-        p[c] = v3_scale(v3_load(q), bvh->scale);
-    }
+    load_corners(bvh, place, p);
+    for (int c = 0; c < 3; ++c) p[c] = fct_bvh_to_scaled(bvh, p[c]);
+}
+
+/* Whether the ray's line crosses a face, by exact arithmetic. */
+static bool crosses_exactly(const fct_bvh *bvh, const exact_ray *e, uint32_t place) {
+    v3 p[3];
+    load_corners(bvh, place, p);
+    for (int c = 0; c < 3; ++c) p[c] = v3_scale(p[c], bvh->scale);
+    return fct_line_crosses(v3_scale(v3_load(e->given->origin), bvh->scale), v3_load(e->given->direction), p);
 }
 
 /* Moves the ray by (x, y) across its direction and returns its distance from the face's rim, as seen along
@@ -88,12 +105,57 @@ typedef struct checker {
     double near;     /* smaller differences of distance do not count */
 } checker;
 
+/* The point of a face with the barycentrics u and v, scaled. */
+static v3 interpolate_face(const fct_bvh *bvh, uint32_t place, double u, double v) {
+    v3 p[3];
+    face_corners(bvh, place, p);
+    return v3_mad(v3_mad(v3_scale(p[0], 1 - u - v), u, p[1]), v, p[2]);
+}
+
+/* How far the rounding of t to a float moves the point at t. */
+static double bound_rounding(const exact_ray *e, double t) {
+    return (0x1p-24 * fabs(t) + (double)FLT_TRUE_MIN) * e->length;
+}
+
+/* Whether t, u, v and the normal of our hit describe one point, up to rounding: the point at t of the exact
+ * ray is the point (u, v) of the face, inside of it and within the limits of t; and the normal is the face's.
+ */
+static bool describes_hit(const checker *c, const exact_ray *e, const fct_hit *hit) {
+    static const double slack = 1e-6; /* of barycentrics and of unit normals */
+    double u = (double)hit->u, v = (double)hit->v, t = (double)hit->t;
+    if (!(u >= -slack && v >= -slack && u + v <= 1 + slack)) return false;
+    if (!(hit->t >= e->given->t_min && hit->t <= e->given->t_max)) return false;
+    v3 on_face = interpolate_face(c->obb, hit->place, u, v);
+    v3 on_ray = v3_mad(e->origin, t * e->length - e->start, e->direction);
+    double rounding = 2 * ROUNDING + bound_rounding(e, t);
+    if (!(v3_norm(v3_sub(on_face, on_ray)) <= rounding)) return false;
+    v3 p[3];
+    face_corners(c->obb, hit->place, p);
+    v3 exact = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))), normal = v3_load(hit->normal);
+    double largest = fmax(fabs(normal.x), fmax(fabs(normal.y), fabs(normal.z)));
+    return largest > 0 && v3_norm(v3_sub(v3_unit(v3_scale(normal, 1 / largest)), exact)) <= slack;
+}
+
+/* Whether two hits are the same point of the same face. Rounding moves the point of a grazing ray farther, by
+ * the cosine of its angle with the normal. */
+static bool same_point(const checker *c, const exact_ray *e, const fct_hit *ours, const fct_hit *theirs) {
+    v3 p[3];
+    face_corners(c->obb, ours->place, p);
+    double cosine = fabs(v3_dot(v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))), e->direction));
+    double t = (double)ours->t, apart = fabs(t - (double)theirs->t) * e->length;
+    double moved = c->near / fmax(cosine, 1e-9);
+    if (!(apart <= moved + 2 * bound_rounding(e, t))) return false;
+    v3 a = interpolate_face(c->obb, ours->place, (double)ours->u, (double)ours->v);
+    v3 b = interpolate_face(c->obb, theirs->place, (double)theirs->u, (double)theirs->v);
+    return v3_norm(v3_sub(a, b)) <= moved;
+}
+
 /* A lower bound of the distance of a scaled point from a cluster's box. */
 static double bound_box_distance(const fct_bvh *bvh, uint32_t node, v3 point) {
     fct_cluster room;
     fct_box box;
     fct_cluster_box(fct_node_cluster(bvh->tree, node, &room), &box);
-    v3 r = v3_sub(point, v3_scale(v3_load(box.center), bvh->scale));
+    v3 r = v3_sub(point, fct_bvh_to_scaled(bvh, v3_load(box.center)));
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
         double beyond = fabs(v3_dot(r, v3_load(box.axes[k]))) - bvh->scale * (double)box.half[k];
@@ -133,8 +195,9 @@ static uint64_t hash_sides_near(v3 point, const v3 p[3]) {
 }
 
 /* Whether the faces near `point` leave no gap around the ray:
- *   1. the ray meets one of them;
- *   2. so does each ray of a ring around it;
+ *   1. the exact ray crosses an odd number of them. It crosses a sharp tip twice, and rounding may move the
+ * tip out of its way;
+ *   2. each ray of a ring around it meets one of them;
  *   3. each side that passes near the point belongs to an even number of faces. Faces that only touch (a
  * corner on another's side, or a face without area between them) may leave a slit after rounding. Only hits
  * before `farthest` count, because at a silhouette the rays of the ring also meet the surface behind. */
@@ -143,7 +206,7 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
     const fct_tree_view *view = &bvh->view;
     uint32_t height = 0, covered = 0;
     uint64_t unpaired = 0;
-    bool met = false;
+    bool odd = false;
     for (uint32_t r = 0; r < view->root_count; ++r) c->stack[height++] = view->roots[r];
     while (height) {
         uint32_t node = c->stack[--height];
@@ -155,33 +218,29 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         }
         v3 p[3];
         double u, v, at;
-        face_corners(bvh, node - view->node_count, p);
-        if (fct_bvh_degenerate(bvh, node - view->node_count)) continue;
+        uint32_t place = node - view->node_count;
+        face_corners(bvh, place, p);
+        if (fct_bvh_degenerate(bvh, place)) continue;
         if (v3_norm(v3_sub(fct_triangle_closest(point, p[0], p[1], p[2], &u, &v), point)) > 4 * ROUNDING)
             continue;
         unpaired ^= hash_sides_near(point, p);
-        met = met || (measure_rim_distance(e, p, 0, 0, &at) >= 0 && at < farthest);
+        measure_rim_distance(e, p, 0, 0, &at);
+        odd ^= at < farthest && crosses_exactly(bvh, e, place);
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
             double rim = measure_rim_distance(e, p, radius * fct_cos(angle), radius * fct_sin(angle), &at);
             if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }
-    return met && !unpaired && covered == (1u << AROUND) - 1;
+    return odd && !unpaired && covered == (1u << AROUND) - 1;
 }
 
-/* Whether our answer is wrong, given Embree's: see the top of this file. A place is FCT_NONE on a miss;
- * distances start at e->origin. */
-static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, double our_distance,
-                          uint32_t theirs, double their_distance) {
+/* Whether we missed a nearer hit of Embree's: cases 2 and 3 at the top of this file. A place is FCT_NONE on a
+ * miss; distances start at e->origin. */
+static bool misses_nearer_face(const checker *c, const exact_ray *e, uint32_t ours, double our_distance,
+                               uint32_t theirs, double their_distance) {
     v3 p[3];
-    double u, v, at;
-    if (ours != FCT_NONE) {
-        face_corners(c->obb, ours, p);
-        v3 point = v3_mad(e->origin, our_distance, e->direction);
-        v3 nearest = fct_triangle_closest(point, p[0], p[1], p[2], &u, &v);
-        if (v3_norm(v3_sub(nearest, point)) > 2 * ROUNDING) return true;
-    }
+    double at;
     if (theirs == FCT_NONE || (ours != FCT_NONE && their_distance >= our_distance)) return false;
     face_corners(c->obb, theirs, p);
     double rim = measure_rim_distance(e, p, 0, 0, &at);
@@ -195,26 +254,37 @@ static bool ours_is_wrong(const checker *c, const exact_ray *e, uint32_t ours, d
     return surface_covers(c, e, v3_mad(e->origin, their_distance, e->direction), farthest);
 }
 
-/* Asks both backends for their unrounded answers and counts the difference. */
-static void settle_difference(const checker *c, const fct_bvh *embree, const fct_ray *ray,
-                              fct_ray_check *out) {
-    fct_prepared_ray prepared;
-    fct_raw_hit ours, theirs;
-    if (!fct_ray_prepare(c->obb, ray, &prepared)) return;
-    if (!fct_traverse_closest(c->obb, &prepared, &ours, NULL)) ours.place = FCT_NONE;
-    if (!fct_embree_closest(embree, &prepared, &theirs)) theirs.place = FCT_NONE;
-    exact_ray e = make_exact_ray(c->obb, ray);
-    double ours_at = 0, theirs_at = 0;
-    if (ours.place != FCT_NONE)
-        ours_at = (prepared.shift + (double)ours.t) * prepared.factor * e.length - e.start;
-    if (theirs.place != FCT_NONE)
-        theirs_at = (prepared.shift + (double)theirs.t) * prepared.factor * e.length - e.start;
-    if (ours.place != FCT_NONE && theirs.place != FCT_NONE && fabs(ours_at - theirs_at) <= c->near) return;
+/* The place of the closest hit, or FCT_NONE. *at receives its distance from e->origin, without the rounding
+ * of t. */
+static uint32_t find_place(const fct_bvh *bvh, const exact_ray *e, double *at) {
+    fct_raw_hit hit;
+    double t = 0;
+    if (!fct_ray_closest(bvh, e->given, &hit, &t, NULL)) hit.place = FCT_NONE;
+    *at = t * e->length - e->start;
+    return hit.place;
+}
+
+/* Counts the difference of a hit and a miss, or of hits of two faces. */
+static void settle_faces(const checker *c, const fct_bvh *embree, const exact_ray *e, bool wrong,
+                         fct_ray_check *out) {
+    double our_distance, their_distance;
+    uint32_t ours = find_place(c->obb, e, &our_distance), theirs = find_place(embree, e, &their_distance);
+    bool both = ours != FCT_NONE && theirs != FCT_NONE;
+    if (!wrong && both && fabs(our_distance - their_distance) <= c->near) return;
     ++out->differences;
-    if (ours_is_wrong(c, &e, ours.place, ours_at, theirs.place, theirs_at))
-        ++out->unexplained;
-    else
-        ++out->explained;
+    out->unexplained += wrong || misses_nearer_face(c, e, ours, our_distance, theirs, their_distance);
+}
+
+static void compare_answers(const checker *c, const fct_bvh *embree, const fct_ray *ray, const fct_hit *ours,
+                            const fct_hit *theirs, fct_ray_check *out) {
+    exact_ray e = make_exact_ray(c->obb, ray);
+    bool hit = ours->face != FCT_NONE, wrong = hit && !describes_hit(c, &e, ours);
+    if (ours->face != theirs->face) {
+        settle_faces(c, embree, &e, wrong, out);
+    } else if (wrong || (hit && !same_point(c, &e, ours, theirs))) {
+        ++out->differences;
+        out->unexplained += wrong;
+    }
 }
 
 /* Seconds of one thread. */
@@ -230,7 +300,7 @@ static void compare_slice(const checker *c, const fct_bvh *embree, size_t count,
         bool hit = ours[i].face != FCT_NONE;
         out->hits += hit;
         out->occlusion_differences += fct_bvh_any_hit(c->obb, &rays[i], NULL) != hit;
-        if (ours[i].face != theirs[i].face) settle_difference(c, embree, &rays[i], out);
+        compare_answers(c, embree, &rays[i], &ours[i], &theirs[i], out);
     }
 }
 
@@ -255,6 +325,7 @@ fct_result fct_bvh_check(const fct_env *env, const fct_bvh *obb, const fct_bvh *
     fct_release(env, ours);
     fct_release(env, theirs);
     fct_release(env, c.stack);
+    total.explained = total.differences - total.unexplained;
     if (result == FCT_OK) *out = total;
     return result;
 }

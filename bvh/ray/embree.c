@@ -120,27 +120,55 @@ size_t fct_embree_bytes(const fct_embree *embree) {
     return embree->own_bytes + (size_t)embree->bytes;
 }
 
-static struct RTCRay make_embree_ray(const fct_prepared_ray *ray) {
-    return (struct RTCRay){.org_x = ray->origin[0],
-                           .org_y = ray->origin[1],
-                           .org_z = ray->origin[2],
-                           .tnear = ray->t_min,
-                           .dir_x = ray->direction[0],
-                           .dir_y = ray->direction[1],
-                           .dir_z = ray->direction[2],
-                           .tfar = ray->t_max,
+/* Distance from the centre of the model at which a far ray starts: outside of the model, whose half diagonal
+ * is below sqrt(3). */
+static const double START = 2;
+
+/* The ray in scaled space: the caller's t is (*shift + t) *unit. A ray that begins far from the model, or at
+ * a negative t, begins START before its point nearest to the centre instead. Returns false for a ray that
+ * hits nothing by the definition of fct_ray. */
+static bool make_embree_ray(const fct_bvh *bvh, const fct_ray *ray, struct RTCRay *out, double *shift,
+                            double *unit) {
+    v3 d = v3_load(ray->direction), to_center;
+    double largest = fmax(fabs(d.x), fmax(fabs(d.y), fabs(d.z)));
+    bool finite = isfinite(ray->origin[0]) && isfinite(ray->origin[1]) && isfinite(ray->origin[2]) &&
+                  isfinite(d.x) && isfinite(d.y) && isfinite(d.z);
+    if (!finite || largest == 0 || !(ray->t_min <= ray->t_max)) return false;
+    double factor = ldexp(1, -ilogb(largest));
+    v3 origin = fct_bvh_to_scaled(bvh, v3_load(ray->origin));
+    d = v3_scale(d, factor);
+    *unit = factor / bvh->scale;
+    double t_min = (double)ray->t_min / *unit, t_max = (double)ray->t_max / *unit;
+    to_center = v3_sub(v3_load(bvh->center), origin);
+    *shift = 0;
+    if (v3_norm(to_center) > 2 * START || t_min < 0) {
+        *shift = fmax(t_min, (v3_dot(to_center, d) - START * v3_norm(d)) / v3_norm2(d));
+        origin = v3_mad(origin, *shift, d);
+    }
+    *out = (struct RTCRay){.org_x = (float)origin.x,
+                           .org_y = (float)origin.y,
+                           .org_z = (float)origin.z,
+                           .tnear = (float)fmax(t_min - *shift, 0),
+                           .dir_x = (float)d.x,
+                           .dir_y = (float)d.y,
+                           .dir_z = (float)d.z,
+                           .tfar = (float)(t_max - *shift),
                            .mask = ~0u};
+    return out->tfar >= 0;
 }
 
-bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit) {
+bool fct_embree_closest(const fct_bvh *bvh, const fct_ray *ray, fct_raw_hit *hit, double *t) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit query = {.ray = make_embree_ray(ray), .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    struct RTCRayHit query = {.hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    double shift, unit;
+    if (!make_embree_ray(bvh, ray, &query.ray, &shift, &unit)) return false;
     float_mode mode = flush_denormals();
     rtcIntersect1(bvh->embree->scene, &context, &query);
     restore_mode(mode);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     *hit = (fct_raw_hit){.t = query.ray.tfar, .u = query.hit.u, .v = query.hit.v, .place = query.hit.primID};
+    *t = (shift + (double)query.ray.tfar) * unit;
     const uint32_t *corner = bvh->embree->triangles + 3 * (size_t)hit->place;
     v3 p[3];
     for (int c = 0; c < 3; ++c) p[c] = v3_load(bvh->embree->positions + 3 * (size_t)corner[c]);
@@ -148,10 +176,12 @@ bool fct_embree_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw
     return true;
 }
 
-bool fct_embree_any(const fct_bvh *bvh, const fct_prepared_ray *ray) {
+bool fct_embree_any(const fct_bvh *bvh, const fct_ray *ray) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRay query = make_embree_ray(ray);
+    struct RTCRay query;
+    double shift, unit;
+    if (!make_embree_ray(bvh, ray, &query, &shift, &unit)) return false;
     float_mode mode = flush_denormals();
     rtcOccluded1(bvh->embree->scene, &context, &query);
     restore_mode(mode);

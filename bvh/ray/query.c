@@ -15,17 +15,24 @@ static void unscale_normal(const fct_bvh *bvh, v3 n, float out[3]) {
     v3_store(out, v3_scale(n, factor));
 }
 
-bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, fct_visits *visits) {
+bool fct_ray_closest(const fct_bvh *bvh, const fct_ray *ray, fct_raw_hit *hit, double *t,
+                     fct_visits *visits) {
+    if (bvh->embree) return fct_embree_closest(bvh, ray, hit, t);
     fct_prepared_ray prepared;
+    if (!fct_ray_prepare(bvh, ray, &prepared) || !fct_traverse_closest(bvh, &prepared, hit, visits))
+        return false;
+    *t = fct_ray_unscale_t(&prepared, hit->t);
+    return true;
+}
+
+bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, fct_visits *visits) {
     fct_raw_hit raw;
-    bool found = fct_ray_prepare(bvh, ray, &prepared) &&
-                 (bvh->embree ? fct_embree_closest(bvh, &prepared, &raw)
-                              : fct_traverse_closest(bvh, &prepared, &raw, visits));
-    if (!found) {
+    double t;
+    if (!fct_ray_closest(bvh, ray, &raw, &t, visits)) {
         *hit = (fct_hit){.t = INFINITY, .face = FCT_NONE, .place = FCT_NONE};
         return false;
     }
-    hit->t = fct_ray_t(&prepared, ray, raw.t);
+    hit->t = fct_ray_clamp_t(ray, t);
     hit->u = raw.u, hit->v = raw.v;
     hit->place = raw.place;
     hit->face = bvh->view.face_ids[raw.place];
@@ -34,9 +41,9 @@ bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, f
 }
 
 bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits) {
+    if (bvh->embree) return fct_embree_any(bvh, ray);
     fct_prepared_ray prepared;
-    return fct_ray_prepare(bvh, ray, &prepared) &&
-           (bvh->embree ? fct_embree_any(bvh, &prepared) : fct_traverse_any(bvh, &prepared, visits));
+    return fct_ray_prepare(bvh, ray, &prepared) && fct_traverse_any(bvh, &prepared, visits);
 }
 
 typedef struct ray_batch {

@@ -1,9 +1,9 @@
 /* bvh/ray/ray.c: prepares rays.
  *
- * Scaling by powers of two is exact, so a prepared ray is the caller's ray in another unit. If the origin is
- * out of FCT_REACH, or t_min is negative, the origin moves along the ray to the bounds, in double. The float
- * tests then see distances of the size of the model. The moved origin is rounded to float, so on models far
- * from the coordinate origin such a ray can miss a face or hit a wrong one.
+ * The change to scaled space is exact (model.h), so a prepared ray is the caller's ray in another unit. If
+ * the origin is out of FCT_REACH, or t_min is negative, the origin moves along the ray to the bounds, in
+ * double. The float tests then see distances of the size of the model. The moved origin is rounded to float,
+ * by less than the padding of a box.
  */
 #include "bvh/ray/ray.h"
 
@@ -60,7 +60,7 @@ bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *o
     double od[3], dd[3];
     bool near = ray->t_min >= 0;
     for (int i = 0; i < 3; ++i) {
-        od[i] = bvh->scale * (double)o[i];
+        od[i] = bvh->scale * (double)o[i] - (double)bvh->offset[i];
         dd[i] = unit * (double)d[i];
         near = near && fabs(od[i] - (double)bvh->center[i]) <= (double)FCT_REACH;
         out->direction[i] = (float)dd[i];
@@ -94,8 +94,12 @@ bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *o
     return true;
 }
 
-float fct_ray_t(const fct_prepared_ray *prepared, const fct_ray *ray, float t) {
-    float result = (float)((prepared->shift + (double)t) * prepared->factor);
+double fct_ray_unscale_t(const fct_prepared_ray *prepared, float t) {
+    return (prepared->shift + (double)t) * prepared->factor;
+}
+
+float fct_ray_clamp_t(const fct_ray *ray, double t) {
+    float result = (float)t;
     if (result < ray->t_min) return ray->t_min;
     return result > ray->t_max ? ray->t_max : result;
 }

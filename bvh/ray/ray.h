@@ -30,7 +30,13 @@ typedef struct fct_raw_hit {
  * FCT_REACH. */
 bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *out);
 
-/* The caller's t of a prepared t, clamped to [ray->t_min, ray->t_max]. */
-float fct_ray_t(const fct_prepared_ray *prepared, const fct_ray *ray, float t);
+/* The caller's t of a prepared t. */
+double fct_ray_unscale_t(const fct_prepared_ray *prepared, float t);
+/* Rounds the caller's t and clamps it to [ray->t_min, ray->t_max]. */
+float fct_ray_clamp_t(const fct_ray *ray, double t);
+
+/* The closest hit with either backend. Returns whether there is one. *t receives the caller's t, unrounded.
+ * visits may be NULL. */
+bool fct_ray_closest(const fct_bvh *bvh, const fct_ray *ray, fct_raw_hit *hit, double *t, fct_visits *visits);
 
 #endif

@@ -64,10 +64,12 @@ FCT_API void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ra
 FCT_API void fct_bvh_any_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, uint64_t *occluded);
 
 /* The answers of two backends to the same rays. A test in double of the faces concerned decides each
- * difference. Times are of one thread. */
+ * difference. Each of our hits is also checked alone: t, u, v and normal describe one point of the ray and of
+ * the face. Times are of one thread. */
 typedef struct fct_ray_check {
     size_t rays, hits;
-    size_t differences; /* different faces whose t differ by over 1e-5 of the extent, or a hit and a miss */
+    size_t differences; /* a hit and a miss, points over 1e-5 of the extent apart, or a hit of ours that
+                           does not describe one point */
     size_t explained;   /* differences where our answer is right, or the ray meets the rim of a triangle
                            within rounding */
     size_t unexplained; /* differences where our answer is wrong */

@@ -23,7 +23,7 @@ typedef struct reader {
     fct_glb_builder builder; /* of the mesh that is being read */
     fct_scene_parts *meshes; /* per mesh; count 0: not read yet */
     unsigned char *empty;    /* per mesh: it has been read and has no triangles */
-    size_t mesh_count, clamped, flat;
+    size_t mesh_count, meshes_read, clamped, flat;
     uint32_t material_count; /* of the file; the scene has one more, for primitives without a material */
 } reader;
 
@@ -119,10 +119,14 @@ static fct_result need_mesh(reader *r, int64_t index) {
                                    .incomplete = incomplete};
     result = fct_glb_append_mesh(&r->builder, index, &identity);
     fct_glb_end_soup(&r->builder);
-    if (result == FCT_OK && soup.polygon_count) return add_models(r, mesh, index, &soup);
-    r->empty[index] = result == FCT_OK;
-    fct_soup_release(r->env, &soup);
-    return result;
+    if (result == FCT_OK && soup.polygon_count) {
+        result = add_models(r, mesh, index, &soup);
+    } else {
+        r->empty[index] = result == FCT_OK;
+        fct_soup_release(r->env, &soup);
+    }
+    if (result != FCT_OK) return result;
+    return fct_progress(r->env, "models", (double)++r->meshes_read / (double)r->mesh_count);
 }
 
 /* ---- Nodes ---- */

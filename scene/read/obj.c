@@ -210,9 +210,11 @@ static fct_result add_objects(reader *r) {
         lists[f] = r->spans[at].object;
     }
     fct_scene_sort_faces(lists, mesh->face_count, count, starts, faces);
-    for (uint32_t k = 0; k < count && result == FCT_OK; ++k)
+    for (uint32_t k = 0; k < count && result == FCT_OK; ++k) {
         if (starts[k + 1] > starts[k])
             result = add_object(r, r->objects[k], faces + starts[k], starts[k + 1] - starts[k]);
+        if (result == FCT_OK) result = fct_progress(r->env, "models", (k + 1.0) / count);
+    }
 done:
     fct_release(r->env, lists);
     fct_release(r->env, starts);

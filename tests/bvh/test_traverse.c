@@ -158,8 +158,10 @@ static void prepared_rays_are_the_same_rays(void **state) {
             assert_true(off < 1e-5);
         }
         float t = (float)(.5 * r.factor);
-        assert_true(fabs((double)fct_ray_t(&r, &ray, (float)(.5 - r.shift)) / (double)t - 1) < 1e-4 * far ||
-                    t < ray.t_min || t > ray.t_max);
+        assert_true(
+            fabs((double)fct_ray_clamp_t(&ray, fct_ray_unscale_t(&r, (float)(.5 - r.shift))) / (double)t -
+                 1) < 1e-4 * far ||
+            t < ray.t_min || t > ray.t_max);
     }
     assert_true(prepared > 2000 && moved > 1000);
     model_release(&env, &m);

@@ -293,7 +293,7 @@ static void memory_that_runs_out_is_told(void **state) {
     int refused = 0, code = TOOL_MEMORY;
     for (size_t limit = 64; code != TOOL_DONE && limit < (size_t)1 << 24; limit += limit / 2) {
         tool limited = {.name = "test", .quiet = true};
-        tool_env_open(&limited);
+        tool_env_open(&limited, NULL);
         limited.max_memory = limit;
         code = raster_draw(&limited, &camera, &mesh, shade_white, NULL, image);
         refused += code == TOOL_MEMORY;
@@ -389,7 +389,7 @@ static void backgrounds_are_parsed(void **state) {
 
 int main(void) {
     test_tool = (tool){.name = "test", .quiet = true};
-    tool_env_open(&test_tool);
+    tool_env_open(&test_tool, NULL);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_on_a_shared_side_belong_to_one_face),
         cmocka_unit_test(a_front_covers_its_own_back),

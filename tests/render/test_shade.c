@@ -168,7 +168,7 @@ static void studio_light_is_a_sum_of_lamps(void **state) {
 
 int main(void) {
     test_tool = (tool){.name = "test", .quiet = true};
-    tool_env_open(&test_tool);
+    tool_env_open(&test_tool, NULL);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_soft_curve_bends_above_the_knee),
         cmocka_unit_test(the_filmic_curve_is_narkowiczs),

@@ -306,6 +306,16 @@ static int run_bake(tool *t, void *options) {
 }
 
 int tool_bake(int argc, char **argv) {
+    static const tool_stage stages[] = {
+        {"models|read|dual graph|clusters|order|boxes|boxes of large clusters|ray structure", 2},
+        {"links", 7},
+        {"direct light", 8},
+        {"gathering", 8},
+        {"iteration", 1},
+        {"objects|surface|anchors|vertices|reference", 72},
+        {"write", 1},
+        {"probes", 1},
+        {0}};
     static const tool_command command = {
         .name = "bake",
         .synopsis = "SCENE -o OUT\nSCENE --probe FILE",
@@ -341,6 +351,7 @@ int tool_bake(int argc, char **argv) {
         .options = bake_options_table,
         .parse = parse_bake,
         .run = run_bake,
+        .stages = stages,
         .turns_bodies = true,
         .inputs_min = 1,
         .inputs_max = 1,

@@ -102,6 +102,7 @@ static int run_cluster(tool *t, void *options) {
 }
 
 int tool_cluster(int argc, char **argv) {
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"write", 18}, {"files", 100}, {0}};
     static const tool_command command = {
         .name = "cluster",
         .synopsis = "IN... -o OUT.fct",
@@ -128,6 +129,7 @@ int tool_cluster(int argc, char **argv) {
         .options = cluster_options_table,
         .parse = parse_cluster,
         .run = run_cluster,
+        .stages = stages,
         .builds_tree = true,
         .turns_bodies = true,
         .inputs_min = 1,

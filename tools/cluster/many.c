@@ -76,7 +76,7 @@ static void work_on_job(tool *t, const cluster_options *options, const cluster_j
                         uint32_t processes) {
     json_t *r = NULL;
     t->env.thread_count = t->threads > processes ? t->threads / processes : 1;
-    t->bar_off = true;
+    t->bar.shown = false;
     if (t->max_memory) t->max_memory = t->max_memory / processes + 1;
     int code = tool_cluster_file(t, options, j->input, j->output, &r);
     if (r && json_dumpfd(r, out, JSON_COMPACT))

@@ -49,8 +49,8 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     *large =
         strcmp(input, "-") != 0 && !fits_memory(t, def, mesh.face_count, 0); /* the mesh is loaded already */
     if (*large) goto done;
-    t->items = mesh.face_count;
-    t->unit = "faces";
+    t->bar.items = mesh.face_count;
+    t->bar.unit = "faces";
     double read = tool_seconds();
     code = tool_result(t, fct_tree_build(&t->env, &mesh, def, &stats, &tree));
     *large = code == TOOL_MEMORY && t->max_memory && strcmp(input, "-") != 0;
@@ -106,8 +106,16 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
                 t, TOOL_MEMORY, "%s: --max-memory %zu: a tree of %u faces needs at least %llu bytes", input,
                 t->max_memory, faces, (unsigned long long)(least + (t->max_memory - limits.max_memory)));
         limits.temporary_folder = options->temporary;
-        t->items = faces;
-        t->unit = "faces";
+        static const tool_stage stages[] = {{"read", 3},
+                                            {"cut", 10},
+                                            {"parts|dual graph|clusters", 60},
+                                            {"boxes of joins", 3},
+                                            {"order", 7},
+                                            {"write", 18},
+                                            {0}};
+        tool_progress_start(&t->bar, stages, t->bar.shown, tool_seconds());
+        t->bar.items = faces;
+        t->bar.unit = "faces";
         code = tool_refuse_input(t, output);
         if (code == TOOL_DONE)
             code = tool_result(t, fct_tree_build_file(&t->env, input, output, &def, &limits, &stats));

@@ -303,7 +303,7 @@ static int print_answer(const tool_command *command, const struct argp *argp, in
 }
 
 static int run_command(tool *t, const tool_command *command, void *options) {
-    tool_env_open(t);
+    tool_env_open(t, command->stages);
     int code = TOOL_DONE;
     if (t->output && tool_is_standard_output(t->output)) t->output = "-";
     for (int i = 0; i < t->input_count && code == TOOL_DONE; ++i) code = tool_note_input(t, t->inputs[i]);

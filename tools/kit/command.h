@@ -39,6 +39,7 @@ typedef struct tool_command {
     bool turns_bodies;   /* takes --flip-inward; tool_load_mesh follows it */
     bool builds_tree;    /* takes --no-weld; tool_open_tree follows it */
     bool output_folder;  /* -o may name a folder: the command checks it itself */
+    const tool_stage *stages; /* of the progress bar; NULL: it shows each phase alone */
 } tool_command;
 
 /* The first key of options without a letter. Every command has the letters -o, -q and -h. */

@@ -99,58 +99,13 @@ size_t tool_peak_bytes(void) {
     return getrusage(RUSAGE_SELF, &usage) ? 0 : (size_t)usage.ru_maxrss * 1024;
 }
 
-/* --- Progress bar --- */
+/* --- Progress --- */
 
-static void clear_bar(tool *t) {
-    if (t->bar_visible) fputs("\r\033[K", stderr);
-    t->bar_visible = false;
-}
-
-static void format_rate(const tool *t, double done, double elapsed, char *text, size_t size) {
-    if (elapsed < 0.05) {
-        *text = 0;
-        return;
-    }
-    double rate = (t->items > 0 ? t->items : 100) * done / elapsed;
-    const char *unit = t->items > 0 ? t->unit : "%";
-    const char *scale = rate >= 1e6 ? "M " : rate >= 1e3 ? "k " : t->items > 0 ? " " : "";
-    rate /= rate >= 1e6 ? 1e6 : rate >= 1e3 ? 1e3 : 1;
-    snprintf(text, size, "%.*f%s%s/s", rate < 10 ? 1 : 0, rate, scale, unit);
-}
-
-static void draw_bar(tool *t, double done, double now, bool terminal) {
-    enum { WIDTH = 28 };
-    char bar[WIDTH + 1], rate[64], left[32] = "";
-    double elapsed = now - t->phase_start;
-    int filled = (int)lround(done * WIDTH);
-    for (int i = 0; i < WIDTH; ++i) bar[i] = i < filled ? '#' : '.';
-    bar[WIDTH] = 0;
-    format_rate(t, done, elapsed, rate, sizeof rate);
-    if (done > 0 && done < 1) {
-        double seconds = elapsed * (1 - done) / done;
-        snprintf(left, sizeof left, "%.0f:%02d left", floor(seconds / 60), (int)fmod(seconds, 60));
-    }
-    fprintf(stderr, "%s%-12s [%s] %3.0f%% %14s  %s%s", terminal ? "\r" : "", t->phase, bar, 100 * done, rate,
-            left, terminal ? "\033[K" : "\n");
-    t->bar_visible = terminal;
-    t->drawn = now;
-}
-
-/* The progress hook. Draws ten times per second on a terminal, once per second elsewhere, and at the end of a
- * phase. False cancels the library call. */
+/* The progress hook. False cancels the library call. */
 static bool show_progress(void *user, const char *phase, double done) {
     tool *t = user;
     if (guard_signal() || t->refused) return false;
-    bool terminal = isatty(STDERR_FILENO);
-    if (t->quiet || t->bar_off || !(terminal || t->progress)) return true;
-    double now = tool_seconds();
-    if (strncmp(phase, t->phase, sizeof t->phase - 1) != 0) {
-        snprintf(t->phase, sizeof t->phase, "%s", phase);
-        t->phase_start = now;
-        if (t->progress && !terminal) t->drawn = 0;
-    }
-    done = done < 0 ? 0 : done > 1 ? 1 : done;
-    if (done >= 1 || now - t->drawn >= (terminal ? 0.1 : 1.0)) draw_bar(t, done, now, terminal);
+    tool_progress_show(&t->bar, phase, done, tool_seconds());
     return true;
 }
 
@@ -251,14 +206,14 @@ void tool_warn(tool *t, const char *format, ...) {
     va_end(values);
     tool_clean_text(text);
     if (!keep_warning(t, text) || t->quiet) return;
-    clear_bar(t);
+    tool_progress_clear(&t->bar);
     fprintf(stderr, "facetree: warning: %s\n", text);
 }
 
 static void tool_note(tool *t, const char *format, ...) {
     va_list values;
     if (t->quiet) return;
-    clear_bar(t);
+    tool_progress_clear(&t->bar);
     va_start(values, format);
     print_line(stderr, "facetree: ", format, values);
     va_end(values);
@@ -266,7 +221,7 @@ static void tool_note(tool *t, const char *format, ...) {
 
 void tool_say(tool *t, const char *format, ...) {
     if (t->quiet || t->json || guard_stdout_was_closed()) return;
-    clear_bar(t);
+    tool_progress_clear(&t->bar);
     va_list values;
     va_start(values, format);
     print_line(t->output && !strcmp(t->output, "-") ? stderr : stdout, "", format, values);
@@ -299,7 +254,7 @@ int tool_json(tool *t, json_t *object) {
     int code = TOOL_DONE;
     if (!object) return t->json ? tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output") : TOOL_DONE;
     if (t->json) {
-        clear_bar(t);
+        tool_progress_clear(&t->bar);
         if (!t->warnings) t->warnings = json_array();
         json_object_set(object, "warnings", t->warnings);
         if (json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) ||
@@ -412,7 +367,9 @@ static void note_opened(void *user, const char *path, uint64_t size) {
 
 /* --- Open and close --- */
 
-void tool_env_open(tool *t) {
+void tool_env_open(tool *t, const tool_stage *stages) {
+    tool_progress_start(&t->bar, stages, t->progress, tool_seconds());
+    if (t->quiet) t->bar.shown = false;
     t->env = fct_env_default();
     t->env.thread_count = t->threads;
     t->env.allocate = limited_allocate;
@@ -434,7 +391,7 @@ void tool_env_open(tool *t) {
 }
 
 int tool_env_close(tool *t, int code) {
-    clear_bar(t);
+    tool_progress_clear(&t->bar);
     guard_release_inputs(&t->read);
     json_decref(t->warnings);
     t->warnings = NULL;

@@ -11,6 +11,7 @@
 
 #include "facetree/facetree.h"
 #include "tools/guard/inputs.h"
+#include "tools/kit/progress.h"
 
 typedef enum tool_exit {
     TOOL_DONE = 0,
@@ -38,9 +39,8 @@ typedef struct tool {
     uint64_t seed;
     size_t max_memory; /* bytes; 0: no limit */
     fct_env env;
-    double start;     /* tool_seconds() at the start of the command */
-    double items;     /* the work that 100 % of a progress bar stands for; 0: unknown */
-    const char *unit; /* of items */
+    double start; /* tool_seconds() at the start of the command */
+    tool_progress bar;
 
     /* Private to env.c. */
     char label[64];    /* "facetree NAME" */
@@ -51,12 +51,10 @@ typedef struct tool {
     char error[1536];
     bool error_told;  /* the error is printed already */
     json_t *warnings; /* texts of all warnings, each once */
-    char phase[64];
-    double phase_start, drawn;
-    bool bar_visible, bar_off;
 } tool;
 
-void tool_env_open(tool *t);
+/* stages: of the progress bar, or NULL. */
+void tool_env_open(tool *t, const tool_stage *stages);
 /* Prints the recorded error if `code` is one. Returns the code. */
 int tool_env_close(tool *t, int code);
 

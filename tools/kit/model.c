@@ -15,8 +15,8 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
     fct_mesh mesh;
     int code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
     if (code != TOOL_DONE) return code;
-    t->items = mesh.face_count;
-    t->unit = "faces";
+    t->bar.items = mesh.face_count;
+    t->bar.unit = "faces";
     if (mesh.face_count == 0)
         code = tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", path);
     else

@@ -273,6 +273,8 @@ static int run_render(tool *t, void *input) {
 }
 
 int tool_render(int argc, char **argv) {
+    static const tool_stage stages[] = {
+        {"read|models|dual graph|clusters|order|boxes|boxes of large clusters", 30}, {"draw", 60}, {0}};
     static const tool_command command = {
         .name = "render",
         .synopsis = "IN -o OUT.png",
@@ -289,6 +291,7 @@ int tool_render(int argc, char **argv) {
         .options = render_options_table,
         .parse = parse_render,
         .run = run_render,
+        .stages = stages,
         .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,

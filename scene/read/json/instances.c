@@ -273,6 +273,8 @@ fct_result fct_document_read_instances(fct_document *d) {
         fct_result result = read_instance(d, json_array_get(instances, k));
         if (result != FCT_OK) return result;
         fct_json_leave(&d->json, inside);
+        result = fct_progress(d->json.env, "models", (double)(k + 1) / (double)json_array_size(instances));
+        if (result != FCT_OK) return result;
     }
     fct_json_leave(&d->json, before);
     return FCT_OK;

@@ -267,7 +267,7 @@ static void statues_are_closed_and_stand_on_the_ground(void **state) {
 
 int main(void) {
     test_tool = (tool){.name = "test", .quiet = true};
-    tool_env_open(&test_tool);
+    tool_env_open(&test_tool, NULL);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_is_round_and_closed),
         cmocka_unit_test(boxes_cylinders_and_turned_shapes_have_their_volumes),
