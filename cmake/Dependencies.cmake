@@ -10,7 +10,7 @@ find_package(PNG REQUIRED)
 # Optional: reads EXT_meshopt_compression of glTF files.
 find_package(meshoptimizer QUIET)
 
-set(FACETREE_base_LIBRARIES PkgConfig::XXHASH)
+set(FACETREE_base_LIBRARIES PkgConfig::JANSSON PkgConfig::XXHASH)
 set(FACETREE_mesh_LIBRARIES OpenMeshCore OpenMeshTools PkgConfig::JANSSON PkgConfig::XXHASH)
 set(FACETREE_cluster_LIBRARIES PkgConfig::XXHASH)
 set(FACETREE_bvh_LIBRARIES embree)

@@ -30,27 +30,31 @@ static bool climbs_out(const char *path) {
     return false;
 }
 
-/* Whether the file is in the folder or below it after all symbolic links are followed. False if either cannot
- * be resolved. */
-static bool lies_within(const char *folder, const char *path) {
-    char *top = realpath(*folder ? folder : ".", NULL), *file = realpath(path, NULL);
+/* *within receives whether the file is in the folder or below it after all symbolic links are followed; false
+ * if either cannot be resolved. Errors: MEMORY. */
+static fct_result find_place(const fct_env *env, const char *folder, const char *path, bool *within) {
+    char *top = realpath(*folder ? folder : ".", NULL);
+    bool starved = !top && errno == ENOMEM;
+    char *file = realpath(path, NULL);
+    starved = starved || (!file && errno == ENOMEM);
     size_t length = top ? strlen(top) : 0;
-    bool within = top && file && !strncmp(top, file, length) && (length == 1 || file[length] == '/');
+    *within = top && file && !strncmp(top, file, length) && (length == 1 || file[length] == '/');
     free(top);
     free(file);
-    return within;
+    return starved ? fct_fail_memory(env, "a path") : FCT_OK;
 }
 
 static fct_result check_place(const fct_env *env, const char *owner, const char *folder, const char *named,
                               const char *path) {
     struct stat status;
-    bool inside = *named != '/' && !climbs_out(named);
+    bool inside = *named != '/' && !climbs_out(named), within = env->allow_outside;
     if (inside || env->allow_outside) {
         if (stat(path, &status))
             return fct_fail(env, FCT_ERROR_INPUT, "%s: %s cannot be read: %s", owner, path, strerror(errno));
         if (!S_ISREG(status.st_mode))
             return fct_fail(env, FCT_ERROR_DATA, "%s: %s is not a regular file", owner, path);
-        if (env->allow_outside || lies_within(folder, path)) return FCT_OK;
+        fct_result result = within ? FCT_OK : find_place(env, folder, path, &within);
+        if (result != FCT_OK || within) return result;
     }
     return fct_fail(env, FCT_ERROR_DATA,
                     "%s: it names \"%s\", which is outside of its folder (--allow-outside permits this)",

@@ -14,7 +14,8 @@
 static const unsigned char empty[1];
 
 static fct_result fail_input(const fct_env *env, const char *path) {
-    return fct_fail(env, FCT_ERROR_INPUT, "%s: cannot be read: %s", path, strerror(errno));
+    fct_result result = errno == ENOMEM ? FCT_ERROR_MEMORY : FCT_ERROR_INPUT;
+    return fct_fail(env, result, "%s: cannot be read: %s", path, strerror(errno));
 }
 
 static fct_result read_stream(const fct_env *env, const char *path, int descriptor, fct_file *out) {

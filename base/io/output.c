@@ -15,7 +15,8 @@
 #define PORTION ((uint64_t)64 << 20)
 
 fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
-    return fct_fail(env, FCT_ERROR_OUTPUT, "%s: cannot be written: %s", path,
+    fct_result result = error == ENOMEM ? FCT_ERROR_MEMORY : FCT_ERROR_OUTPUT;
+    return fct_fail(env, result, "%s: cannot be written: %s", path,
                     error ? strerror(error) : "the stream failed");
 }
 

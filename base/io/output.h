@@ -22,14 +22,16 @@ typedef struct fct_output {
     char temporary[PATH_MAX]; /* empty: the file has no name yet */
 } fct_output;
 
-/* Fails with "PATH: cannot be written: ..." and OUTPUT. error: an errno, or 0 for a stream's error flag. */
+/* Fails with "PATH: cannot be written: ..." and OUTPUT, or MEMORY if error is ENOMEM. error: an errno, or 0
+ * for a stream's error flag. */
 fct_result fct_output_fail(const fct_env *env, const char *path, int error);
 
 /* Opens a new file of `size` zero bytes, and reserves its space if the file system can. "-" is standard
  * output. Symbolic links are followed, also to a file that does not exist. A target that is no regular file
- * is written by fct_output_finish, from a temporary file. Errors: OUTPUT. */
+ * is written by fct_output_finish, from a temporary file. Errors: OUTPUT,
+ * MEMORY. */
 fct_result fct_output_open(const fct_env *env, const char *path, uint64_t size, fct_output *out);
-/* Errors: OUTPUT. */
+/* The functions below may also fail with MEMORY if the system has none. Errors: OUTPUT. */
 fct_result fct_output_write(fct_output *output, uint64_t offset, const void *data, size_t size);
 /* Reads bytes that were written before. Errors: OUTPUT. */
 fct_result fct_output_read(const fct_output *output, uint64_t offset, void *data, size_t size);

@@ -79,16 +79,23 @@ static fct_result build_embree_scene(const fct_bvh *bvh, fct_embree *embree) {
     if (!embree->device) return check_device_error(bvh->env, NULL, false);
     rtcSetDeviceMemoryMonitorFunction(embree->device, count_embree_memory, embree);
     embree->scene = rtcNewScene(embree->device);
+    if (!embree->scene) return check_device_error(bvh->env, embree->device, false);
     RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (!embree->scene || !geometry) return check_device_error(bvh->env, embree->device, false);
+    if (!geometry) return check_device_error(bvh->env, embree->device, false);
     rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, embree->positions, 0,
                                12, bvh->view.vertex_count);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, embree->triangles, 0, 12,
                                bvh->view.face_count);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(embree->scene, geometry, 0);
+    /* A geometry without its buffers must not reach the scene: Embree reads them all the same. */
+    fct_result result = check_device_error(bvh->env, embree->device, true);
+    if (result == FCT_OK) {
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(embree->scene, geometry, 0);
+        result = check_device_error(bvh->env, embree->device, true);
+    }
     rtcReleaseGeometry(geometry);
+    if (result != FCT_OK) return result;
     rtcCommitScene(embree->scene);
     return check_device_error(bvh->env, embree->device, true);
 }

@@ -99,10 +99,11 @@ typedef struct fct_writer fct_writer;
 FCT_API fct_result fct_writer_open(const fct_env *env, const char *path, fct_writer **out);
 /* The stream to write to; the caller may ignore the results of fwrite and fprintf. */
 FCT_API FILE *fct_writer_stream(fct_writer *writer);
-/* Closes the file. If `keep`, it takes its name, else it vanishes. NULL is allowed. Errors: OUTPUT. */
+/* Closes the file. If `keep`, it takes its name, else it vanishes. NULL is allowed. Errors: OUTPUT,
+ * MEMORY. */
 FCT_API fct_result fct_writer_close(fct_writer *writer, bool keep);
 /* Whether a file can be written to `path`. Also removes from its folder the temporary files of programs that
- * were killed. Errors: OUTPUT. */
+ * were killed. Errors: OUTPUT, MEMORY. */
 FCT_API fct_result fct_output_check(const fct_env *env, const char *path);
 /* Removes the temporary files of this process from a folder. Call it before the process ends by a signal; it
  * may be called in a signal handler. */

@@ -302,16 +302,33 @@ static void write_binary(const fct_sink *sink, const layout *l, FILE *stream) {
         for (int k = 0; k < 3; ++k) write_32(stream, corners[3 * (l->order ? l->order[i] : i) + k]);
 }
 
+/* Text that grows. open_memstream is no replacement: with glibc 2.36 it drops text without an error when
+ * memory is exhausted. */
+typedef struct growing_text {
+    const fct_env *env;
+    char *bytes;
+    size_t length, capacity;
+} growing_text;
+
+/* The write function of a stream of stdio: 0 is an error. */
+static ssize_t append_text(void *user, const char *bytes, size_t size) {
+    growing_text *t = user;
+    if (fct_grow(t->env, (void **)&t->bytes, &t->capacity, t->length + size, 1) != FCT_OK) return 0;
+    memcpy(t->bytes + t->length, bytes, size);
+    t->length += size;
+    return (ssize_t)size;
+}
+
 static fct_result write_chunks(const fct_sink *sink, const layout *l, FILE *stream) {
-    char *text = NULL;
-    size_t length = 0;
-    FILE *json = open_memstream(&text, &length);
+    growing_text text = {.env = sink->env};
+    FILE *json = fopencookie(&text, "w", (cookie_io_functions_t){.write = append_text});
     if (!json) return fct_fail_memory(sink->env, "the JSON of a GLB file");
     size_t binary = print_json(sink, l, json);
     bool failed = ferror(json) != 0;
     failed |= fclose(json) != 0;
     fct_result result = FCT_OK;
-    size_t padded = (length + 3) & ~(size_t)3, total = 12 + 8 + padded + (binary ? 8 + binary : 0);
+    size_t length = text.length, padded = (length + 3) & ~(size_t)3;
+    size_t total = 12 + 8 + padded + (binary ? 8 + binary : 0);
     if (failed) {
         result = fct_fail_memory(sink->env, "the JSON of a GLB file");
     } else if (total > UINT32_MAX) {
@@ -322,14 +339,15 @@ static fct_result write_chunks(const fct_sink *sink, const layout *l, FILE *stre
         write_32(stream, (uint32_t)total);
         write_32(stream, (uint32_t)padded);
         fwrite("JSON", 1, 4, stream);
-        fprintf(stream, "%s%.*s", text, (int)(padded - length), "   ");
+        fwrite(text.bytes, 1, length, stream);
+        fwrite("   ", 1, padded - length, stream);
         if (binary) {
             write_32(stream, (uint32_t)binary);
             fwrite("BIN", 1, 4, stream);
             write_binary(sink, l, stream);
         }
     }
-    free(text);
+    fct_release(sink->env, text.bytes);
     return result;
 }
 

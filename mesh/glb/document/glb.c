@@ -35,17 +35,11 @@ static void trim_text(const char **text, size_t *size) {
 }
 
 static fct_result parse_json(fct_glb *glb, const char *text, size_t size) {
-    json_error_t error;
     trim_text(&text, &size);
-    if (size > INT32_MAX) return fct_glb_fail(glb, "its JSON has %zu bytes, expected less than 2^31", size);
-    fct_result result = fct_json_check_memory(glb->source->env, glb->source->name, text, size);
-    if (result != FCT_OK) return result;
-    glb->root = json_loadb(text, size, JSON_ALLOW_NUL, &error);
-    if (glb->root) return json_is_object(glb->root) ? FCT_OK : fct_glb_fail(glb, "its JSON is no object");
-    if (json_error_code(&error) == json_error_out_of_memory)
-        return fct_fail_memory(glb->source->env, "the JSON of a glTF file");
-    return fct_fail(glb->source->env, FCT_ERROR_DATA, "%s:%d:%d: %s", glb->source->name, error.line,
-                    error.column, error.text);
+    fct_result result =
+        fct_json_load(glb->source->env, glb->source->name, text, size, JSON_ALLOW_NUL, &glb->root);
+    if (result != FCT_OK || json_is_object(glb->root)) return result;
+    return fct_glb_fail(glb, "its JSON is no object");
 }
 
 static fct_result fail_version(const fct_glb *glb, const char *found) {

@@ -7,8 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/io/json.h"
-
 size_t fct_json_enter(fct_json *json, const char *key) {
     char clean[64];
     size_t before = json->length, room = sizeof json->path - before;
@@ -78,22 +76,6 @@ fct_result fct_json_expected(const fct_json *json, const char *expected, const j
     char buffer[96];
     return fct_json_fail(json, "expected %s, found %s", expected,
                          describe_value(found, buffer, sizeof buffer));
-}
-
-fct_result fct_json_parse(fct_json *json, const char *text, size_t size, json_t **out) {
-    json_error_t error;
-    *out = NULL;
-    if (size > INT32_MAX) return fct_json_fail(json, "the file has %zu bytes, expected less than 2^31", size);
-    fct_result result = fct_json_check_memory(json->env, json->file, text, size);
-    if (result != FCT_OK) return result;
-    *out = json_loadb(text, size, JSON_REJECT_DUPLICATES, &error);
-    if (*out) return FCT_OK;
-    if (json_error_code(&error) == json_error_out_of_memory)
-        return fct_fail_memory(json->env, "a JSON document");
-    for (char *c = error.text; *c; ++c)
-        if ((unsigned char)*c < ' ') *c = ' ';
-    return fct_fail(json->env, FCT_ERROR_DATA, "%s:%d:%d: %s", json->file, error.line, error.column,
-                    error.text);
 }
 
 fct_result fct_json_check_object(fct_json *json, const json_t *value, const char *const *allowed) {

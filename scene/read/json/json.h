@@ -26,10 +26,6 @@ fct_result fct_json_expected(const fct_json *json, const char *expected, const j
 /* Copies a key for a message: cut to 63 bytes, control characters replaced by '?'. */
 const char *fct_json_clean(const char *text, char out[64]);
 
-/* Parses a document of less than 2^31 bytes. Duplicate keys are errors. The caller calls json_decref(*out).
- * Errors: DATA with line and column, MEMORY. */
-fct_result fct_json_parse(fct_json *json, const char *text, size_t size, json_t **out);
-
 /* Checks that the value is an object and that each key is one of `allowed` (ended by NULL). Errors: DATA. */
 fct_result fct_json_check_object(fct_json *json, const json_t *value, const char *const *allowed);
 /* The values below. Errors: DATA. */

@@ -1,9 +1,11 @@
-/* The bound on jansson's memory holds for texts of every shape, and a text over the budget is refused before
- * jansson parses it. */
+/* The bound on jansson's memory holds for texts of every shape, a text over the budget is refused before
+ * jansson parses it, errors name their place, and tokens of every length survive a malloc that fails. */
 #define _GNU_SOURCE
 #include "support.h"
 
+#include <errno.h>
 #include <jansson.h>
+#include <limits.h>
 #include <malloc.h>
 
 #include "base/io/json.h"
@@ -50,12 +52,15 @@ static void the_bound_holds(void **state) {
                   {"", "[", "", 2000},
                   {"[", "[[[1]]],", "0]", 30000},
                   {"[", "true , null\n,", "0]", 30000}};
+    fct_env env = fct_env_default();
     json_set_alloc_funcs(count_malloc, count_free);
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; ++i) {
         size_t size;
         char *text = make_text(shapes[i].before, shapes[i].part, shapes[i].count, shapes[i].after, &size);
         now = peak = 0;
-        json_decref(json_loadb(text, size, 0, NULL));
+        json_t *root;
+        (void)!fct_json_load(&env, "text", text, size, 0, &root); /* the bound holds for invalid texts, too */
+        json_decref(root);
         size_t need = fct_json_need(text, size);
         assert_in_range(peak, 1, need);
         assert_true(need < 8 * peak + 100000); /* and is not far from it */
@@ -72,8 +77,10 @@ static void the_bound_holds_for_large_objects(void **state) {
     for (int i = 0; i < 100000; ++i) end += sprintf(end, "\"k%d\":%d,", i, i);
     end = stpcpy(end, "\"end\":0}");
     now = peak = 0;
-    json_t *root = json_loadb(text, (size_t)(end - text), JSON_REJECT_DUPLICATES, NULL);
-    assert_non_null(root);
+    fct_env env = fct_env_default();
+    json_t *root;
+    assert_int_equal(fct_json_load(&env, "text", text, (size_t)(end - text), JSON_REJECT_DUPLICATES, &root),
+                     FCT_OK);
     json_decref(root);
     assert_in_range(peak, 1, fct_json_need(text, (size_t)(end - text)));
     free(text);
@@ -95,18 +102,86 @@ static void a_text_over_the_budget_is_refused(void **state) {
     size_t size, limit = 1 << 20;
     env.allocate = refuse_large, env.release = release, env.memory_user = &limit;
     char *text = make_text("[\"", "x", 1000000, "\"]", &size);
-    assert_int_equal(fct_json_check_memory(&env, "text", text, size), FCT_ERROR_MEMORY);
+    json_t *root;
+    assert_int_equal(fct_json_load(&env, "text", text, size, 0, &root), FCT_ERROR_MEMORY);
+    assert_null(root);
     limit = 6000000;
-    assert_int_equal(fct_json_check_memory(&env, "text", text, size), FCT_OK);
-    assert_int_equal(fct_json_check_memory(&env, "text", "", 0), FCT_OK);
-    assert_int_equal(fct_json_check_memory(&env, "text", "\"\\", 2), FCT_OK);
-    assert_int_equal(fct_json_check_memory(&env, "text", "\"", 1), FCT_OK);
+    assert_int_equal(fct_json_load(&env, "text", text, size, 0, &root), FCT_OK);
+    assert_int_equal(json_string_length(json_array_get(root, 0)), 1000000);
+    json_decref(root);
     free(text);
 }
 
+static void errors_name_the_place(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *message;
+    } cases[] = {{"", "text:1:1: unexpected end of the text"},
+                 {"{\"a\": 1", "text:1:8: unexpected end of the text"},
+                 {"{\"a\":\n \"b", "text:2:4: unexpected end of the text"},
+                 {"\"\\", "text:1:3: unexpected end of the text"},
+                 {"[1,\n2 3]", "text:2:3: ']' expected near '3'"},
+                 {"{\"a\": tru}", "text:1:9: invalid token near 'tru'"},
+                 {"{\"a\": 1, \"a\": 2}", "text:1:12: duplicate object key near '\"a\"'"},
+                 {"{}]", "text:1:4: end of file expected near ']'"},
+                 {"{}, {}", "text: found 2 JSON values, expected 1"},
+                 {"[\"\xff\"]", "text:1:2: unable to decode byte 0xff near '\"'"}};
+    for (size_t i = 0; i < FCT_LENGTH(cases); ++i) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        json_t *root;
+        assert_int_equal(
+            fct_json_load(&env, "text", cases[i].text, strlen(cases[i].text), JSON_REJECT_DUPLICATES, &root),
+            FCT_ERROR_DATA);
+        assert_null(root);
+        assert_string_equal(r.text, cases[i].message);
+    }
+}
+
+static long asked, refused_from, refused_to; /* these allocations fail */
+
+static void *refuse_some(size_t size) {
+    ++asked;
+    if (asked < refused_from || asked > refused_to) return malloc(size);
+    errno = ENOMEM;
+    return NULL;
+}
+
+/* Tokens around every size of jansson's buffer: an allocation fails, alone or with all later ones. */
+static void tokens_survive_a_failing_malloc(void **state) {
+    (void)state;
+    static const char *const shapes[][2] = {{"[\"", "\"]"},
+                                            {"{\"k\": \"", "\", \"l\": [true]}"},
+                                            {"[1", "]"},
+                                            {"[1.", "]"},
+                                            {"[\"\\u00e9", "\\\"\"]"}};
+    fct_env env = fct_env_default();
+    json_set_alloc_funcs(refuse_some, free);
+    for (size_t shape = 0; shape < FCT_LENGTH(shapes); ++shape)
+        for (size_t length = 1; length < 140; ++length) {
+            if (shape == 2 && length > 17) break; /* an integer of jansson has 64 bits */
+            size_t size;
+            char *text = make_text(shapes[shape][0], "1", length, shapes[shape][1], &size);
+            for (int lasting = 0; lasting < 2; ++lasting) {
+                fct_result result = FCT_ERROR_MEMORY;
+                for (refused_from = 1; result != FCT_OK; ++refused_from) {
+                    json_t *root;
+                    asked = 0, refused_to = lasting ? LONG_MAX : refused_from;
+                    result = fct_json_load(&env, "text", text, size, 0, &root);
+                    assert_int_equal(result, asked >= refused_from ? FCT_ERROR_MEMORY : FCT_OK);
+                    assert_int_equal(root != NULL, result == FCT_OK);
+                    json_decref(root);
+                }
+            }
+            free(text);
+        }
+    json_set_alloc_funcs(malloc, free);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_bound_holds),
-                                       cmocka_unit_test(the_bound_holds_for_large_objects),
-                                       cmocka_unit_test(a_text_over_the_budget_is_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_bound_holds), cmocka_unit_test(the_bound_holds_for_large_objects),
+        cmocka_unit_test(a_text_over_the_budget_is_refused), cmocka_unit_test(errors_name_the_place),
+        cmocka_unit_test(tokens_survive_a_failing_malloc)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

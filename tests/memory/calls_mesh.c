@@ -1,0 +1,227 @@
+/* tests/memory/calls_mesh.c: calls of base.h, mesh.h, dual.h and simplify.h. */
+#include "tests/memory/calls.h"
+
+static fct_result check_simd(const fct_env *env) {
+    return STARVE(fct_simd_check(env));
+}
+
+static fct_result open_writer(const fct_env *env) {
+    fct_writer *writer;
+    fct_result result = STARVE(fct_writer_open(env, OUT "text", &writer));
+    assert_int_equal(writer != NULL, result == FCT_OK);
+    if (writer) fct_writer_close(writer, false);
+    return result;
+}
+
+static fct_result close_writer(const fct_env *env) {
+    fct_writer *writer;
+    assert_int_equal(fct_writer_open(env, OUT "text", &writer), FCT_OK);
+    fputs("text", fct_writer_stream(writer));
+    return STARVE(fct_writer_close(writer, true));
+}
+
+static fct_result check_output(const fct_env *env) {
+    return STARVE(fct_output_check(env, OUT "text"));
+}
+
+static fct_result finish_mesh(const fct_env *env, fct_mesh *mesh, fct_result result) {
+    static const fct_mesh none;
+    if (result != FCT_OK) assert_memory_equal(mesh, &none, sizeof none);
+    fct_mesh_release(env, mesh);
+    return result;
+}
+
+static fct_result create_mesh(const fct_env *env) {
+    fct_mesh mesh;
+    return finish_mesh(env, &mesh, STARVE(fct_mesh_create(env, 8, 9, 63, &mesh)));
+}
+
+static fct_result copy_mesh(const fct_env *env) {
+    fct_mesh mesh;
+    return finish_mesh(env, &mesh, STARVE(fct_mesh_copy(env, &inputs.sheet, &mesh)));
+}
+
+static fct_result extract_mesh(const fct_env *env) {
+    static const uint32_t faces[3] = {9, 1, 7};
+    fct_mesh mesh;
+    uint32_t *ids = NULL;
+    fct_result result = STARVE(fct_mesh_extract(env, &inputs.sheet, faces, 3, &mesh, &ids));
+    assert_int_equal(ids != NULL, result == FCT_OK);
+    if (ids) fct_memory_release(env, ids);
+    return finish_mesh(env, &mesh, result);
+}
+
+static fct_result inspect_mesh(const fct_env *env) {
+    fct_mesh_report report;
+    return STARVE(fct_mesh_inspect(env, &inputs.sheet, &report));
+}
+
+static fct_result validate_mesh(const fct_env *env) {
+    return STARVE(fct_mesh_validate(env, &inputs.sheet));
+}
+
+static fct_result load_mesh(const fct_env *env, const char *path) {
+    fct_mesh mesh;
+    return finish_mesh(env, &mesh, STARVE(fct_mesh_load(env, path, &mesh)));
+}
+
+static fct_result load_ply(const fct_env *env) {
+    return load_mesh(env, IN "sheet.ply");
+}
+
+static fct_result load_text_ply(const fct_env *env) {
+    return load_mesh(env, IN "text.ply");
+}
+
+static fct_result load_obj(const fct_env *env) {
+    return load_mesh(env, IN "sheet.obj");
+}
+
+static fct_result load_off(const fct_env *env) {
+    return load_mesh(env, IN "sheet.off");
+}
+
+static fct_result load_stl(const fct_env *env) {
+    return load_mesh(env, IN "sheet.stl");
+}
+
+static fct_result load_text_stl(const fct_env *env) {
+    return load_mesh(env, IN "text.stl");
+}
+
+static fct_result load_om(const fct_env *env) {
+    return load_mesh(env, IN "sheet.om");
+}
+
+static fct_result load_glb(const fct_env *env) {
+    return load_mesh(env, IN "sheet.glb");
+}
+
+static fct_result load_gltf(const fct_env *env) {
+    return load_mesh(env, IN "corner.gltf");
+}
+
+static fct_result count_file(const fct_env *env) {
+    bool known;
+    uint32_t faces, vertices;
+    return STARVE(fct_mesh_file_counts(env, IN "sheet.ply", &known, &faces, &vertices));
+}
+
+static fct_result find_light(const fct_env *env) {
+    bool lit;
+    return STARVE(fct_mesh_file_holds_light(env, IN "sheet.glb", &lit));
+}
+
+static fct_result save_ply(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.ply", &inputs.sheet, NULL));
+}
+
+static fct_result save_text_ply(const fct_env *env) {
+    fct_mesh_save_def def = fct_mesh_save_def_default();
+    def.ascii = true;
+    return STARVE(fct_mesh_save(env, OUT "sheet.ply", &inputs.sheet, &def));
+}
+
+static fct_result save_obj(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.obj", &inputs.sheet, NULL));
+}
+
+static fct_result save_off(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.off", &inputs.sheet, NULL));
+}
+
+static fct_result save_stl(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.stl", &inputs.sheet, NULL));
+}
+
+static fct_result save_om(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.om", &inputs.sheet, NULL));
+}
+
+static fct_result save_glb(const fct_env *env) {
+    return STARVE(fct_mesh_save(env, OUT "sheet.glb", &inputs.sheet, NULL));
+}
+
+static fct_result build_dual(const fct_env *env) {
+    fct_dual dual;
+    fct_result result = STARVE(fct_dual_build(env, &inputs.sheet, &dual));
+    if (result != FCT_OK) assert_null(dual.edges);
+    fct_dual_release(env, &dual);
+    return result;
+}
+
+static fct_result build_weld(const fct_env *env) {
+    fct_mesh soup; /* each corner has a vertex of its own */
+    assert_int_equal(
+        fct_mesh_create(&inputs.env, 3 * inputs.ball.face_count, inputs.ball.face_count, 0, &soup), FCT_OK);
+    for (uint32_t c = 0; c < soup.vertex_count; ++c) {
+        memcpy(soup.positions + 3 * (size_t)c, inputs.ball.positions + 3 * (size_t)inputs.ball.triangles[c],
+               12);
+        soup.triangles[c] = c;
+    }
+    fct_weld weld;
+    fct_result result = STARVE(fct_weld_build(env, &soup, &weld));
+    if (result != FCT_OK) assert_null(weld.triangles);
+    fct_weld_release(env, &weld);
+    fct_mesh_release(&inputs.env, &soup);
+    return result;
+}
+
+static fct_result find_inward(const fct_env *env) {
+    uint32_t count;
+    fct_result result = STARVE(fct_inward_find(env, &inputs.ball, &count, NULL));
+    if (result == FCT_OK) assert_int_equal(count, 1);
+    return result;
+}
+
+static fct_result flip_inward(const fct_env *env) {
+    fct_mesh mesh;
+    uint32_t count;
+    assert_int_equal(fct_mesh_copy(&inputs.env, &inputs.ball, &mesh), FCT_OK);
+    fct_result result = STARVE(fct_inward_flip(env, &mesh, &count));
+    bool unchanged = memcmp(mesh.triangles, inputs.ball.triangles, 12 * (size_t)mesh.face_count) == 0;
+    assert_int_equal(unchanged, result != FCT_OK);
+    fct_mesh_release(&inputs.env, &mesh);
+    return result;
+}
+
+static fct_result simplify(const fct_env *env) {
+    fct_mesh mesh;
+    fct_simplify_def def = fct_simplify_def_default();
+    def.target_faces = 10;
+    return finish_mesh(env, &mesh, STARVE(fct_simplify(env, &inputs.sheet, &def, &mesh, NULL)));
+}
+
+const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
+                                  {"fct_writer_open", "", open_writer, false},
+                                  {"fct_writer_close", "", close_writer, false},
+                                  {"fct_output_check", "", check_output, false},
+                                  {"fct_mesh_create", "", create_mesh, false},
+                                  {"fct_mesh_copy", "", copy_mesh, false},
+                                  {"fct_mesh_extract", "", extract_mesh, false},
+                                  {"fct_mesh_inspect", "", inspect_mesh, false},
+                                  {"fct_mesh_validate", "", validate_mesh, false},
+                                  {"fct_mesh_load", "ply", load_ply, false},
+                                  {"fct_mesh_load", "text ply", load_text_ply, false},
+                                  {"fct_mesh_load", "obj", load_obj, false},
+                                  {"fct_mesh_load", "off", load_off, false},
+                                  {"fct_mesh_load", "stl", load_stl, false},
+                                  {"fct_mesh_load", "text stl", load_text_stl, false},
+                                  {"fct_mesh_load", "om", load_om, false},
+                                  {"fct_mesh_load", "glb", load_glb, false},
+                                  {"fct_mesh_load", "gltf", load_gltf, false},
+                                  {"fct_mesh_file_counts", "", count_file, false},
+                                  {"fct_mesh_file_holds_light", "", find_light, false},
+                                  {"fct_mesh_save", "ply", save_ply, false},
+                                  {"fct_mesh_save", "text ply", save_text_ply, false},
+                                  {"fct_mesh_save", "obj", save_obj, false},
+                                  {"fct_mesh_save", "off", save_off, false},
+                                  {"fct_mesh_save", "stl", save_stl, false},
+                                  {"fct_mesh_save", "om", save_om, false},
+                                  {"fct_mesh_save", "glb", save_glb, false},
+                                  {"fct_dual_build", "", build_dual, false},
+                                  {"fct_weld_build", "", build_weld, false},
+                                  {"fct_inward_find", "", find_inward, false},
+                                  {"fct_inward_flip", "", flip_inward, false},
+                                  {"fct_simplify", "", simplify, false},
+                                  {NULL, NULL, NULL, false}};
