@@ -18,6 +18,7 @@
 #include "cluster/tree/welded.h"
 #include "facetree/partition.h"
 #include "partition/labels.h"
+#include "partition/units.h"
 
 enum { TURNS = 8 };
 static const double pi = 3.14159265358979323846;
@@ -150,18 +151,19 @@ static void judge_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) judge_piece(user, (uint32_t)i);
 }
 
-/* Sums the perimeters of the pieces. Returns whether edges connect the faces of each piece. */
-static bool walk_dual(const judge *j, const fct_dual *dual) {
+/* Sums the perimeters of the pieces. unit: of the lengths. Returns whether edges connect the faces of each
+ * piece. */
+static bool walk_dual(const judge *j, const fct_dual *dual, double unit) {
     uint32_t joined = 0, filled = 0;
     for (uint32_t i = 0; i < j->count; ++i) filled += j->pieces[i].count > 0;
     for (uint32_t f = 0; f < dual->face_count; ++f) {
-        j->pieces[j->labels[f]].perimeter += (double)dual->perimeters[f];
+        j->pieces[j->labels[f]].perimeter += unit * (double)dual->perimeters[f];
         j->parents[f] = f;
     }
     for (uint32_t e = 0; e < dual->edge_count; ++e) {
         uint32_t a = dual->edges[2 * (size_t)e], b = dual->edges[2 * (size_t)e + 1];
         if (j->labels[a] != j->labels[b]) continue;
-        j->pieces[j->labels[a]].perimeter -= 2 * (double)dual->lengths[e];
+        j->pieces[j->labels[a]].perimeter -= 2 * unit * (double)dual->lengths[e];
         joined += fct_sets_join(j->parents, a, b);
     }
     return joined == dual->face_count - filled;
@@ -201,15 +203,16 @@ static fct_partition_quality average_pieces(const judge *j, bool connected) {
 /* Measures the pieces of a judge. All of its members except `parents` must be set. */
 static fct_result measure_pieces(const fct_env *env, judge *j, fct_partition_quality *out) {
     fct_dual dual = {0};
+    double unit;
     j->parents = fct_allocate(env, j->mesh->face_count, sizeof *j->parents);
     fct_result result;
     if (!j->parents)
         result = fct_fail_memory(env, "measuring a partition");
     else
-        result = fct_dual_build(env, j->mesh, &dual);
+        result = fct_units_dual(env, j->mesh, &dual, &unit);
     if (result == FCT_OK) {
         fct_parallel_for(env, j->count, 64, judge_chunk, j);
-        *out = average_pieces(j, walk_dual(j, &dual));
+        *out = average_pieces(j, walk_dual(j, &dual, unit));
     }
     fct_dual_release(env, &dual);
     fct_release(env, j->parents);

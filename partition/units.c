@@ -5,6 +5,8 @@
  */
 #include "partition/units.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "base/env.h"
@@ -58,11 +60,49 @@ static fct_result renumber_dual(const fct_env *env, const uint32_t *numbers, fct
     return FCT_OK;
 }
 
+/* Extents of a mesh whose lengths are floats of full precision. */
+#define LEAST_EXTENT 1e-30
+#define MOST_EXTENT  1e37
+
+/* The longest side of the bounds of the faces. */
+static double find_extent(const fct_mesh *mesh) {
+    double extent = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        double lower = INFINITY, upper = -INFINITY;
+        for (size_t i = 0; i < 3 * (size_t)mesh->face_count; ++i) {
+            double x = (double)mesh->positions[3 * (size_t)mesh->triangles[i] + k];
+            lower = x < lower ? x : lower, upper = x > upper ? x : upper;
+        }
+        extent = upper - lower > extent ? upper - lower : extent;
+    }
+    return extent;
+}
+
+fct_result fct_units_dual(const fct_env *env, const fct_mesh *mesh, fct_dual *out, double *unit) {
+    double extent = find_extent(mesh);
+    int power;
+    *out = (fct_dual){0}, *unit = 1;
+    if (!(extent > 0) || (extent >= LEAST_EXTENT && extent <= MOST_EXTENT))
+        return fct_dual_build(env, mesh, out);
+    frexp(extent, &power);
+    *unit = ldexp(1, power);
+    fct_mesh scaled = *mesh;
+    scaled.positions = fct_allocate(env, mesh->vertex_count, 3 * sizeof *scaled.positions);
+    if (!scaled.positions) return fct_fail_memory(env, "measuring a partition");
+    for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; ++i)
+        scaled.positions[i] =
+            (float)fmax(fmin((double)mesh->positions[i] / *unit, (double)FLT_MAX), -(double)FLT_MAX);
+    fct_result result = fct_dual_build(env, &scaled, out);
+    fct_release(env, scaled.positions);
+    return result;
+}
+
 fct_result fct_units_of_faces(const fct_env *env, const fct_mesh *mesh, const uint32_t *numbers,
                               const fct_mesh *numbered, fct_units *out) {
     *out = (fct_units){.count = mesh->face_count, .mesh = numbers ? numbered : mesh};
     out->of_faces = out->mesh->materials;
-    fct_result result = fct_dual_build(env, mesh, &out->dual);
+    double unit; /* a refinement does not depend on it */
+    fct_result result = fct_units_dual(env, mesh, &out->dual, &unit);
     if (result == FCT_OK && numbers) result = renumber_dual(env, numbers, &out->dual);
     if (result != FCT_OK) goto failed;
     size_t ends = 2 * (size_t)out->dual.edge_count;

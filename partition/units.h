@@ -45,6 +45,9 @@ static inline bool fct_units_alike(const fct_units *units, uint32_t a, uint32_t 
     return !m || (m[a] == m[b] && m[a] != FCT_NONE);
 }
 
+/* The dual graph of a mesh, with lengths in units of *unit: a power of two, and 1 unless floats are too
+ * coarse or too small for the lengths in the mesh's unit. Errors: MEMORY, CANCELLED. */
+fct_result fct_units_dual(const fct_env *env, const fct_mesh *mesh, fct_dual *out, double *unit);
 /* The faces of a mesh, which must outlive *out. If numbers is not NULL, unit numbers[f] is face f of the
  * mesh, and `numbered` is the mesh with its faces in the order of the numbers; vectors and materials come
  * from it. The graph always comes from `mesh`, because the order of ids decides which faces an edge of three

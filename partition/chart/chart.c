@@ -6,6 +6,8 @@
  * border. A vertex where fans or borders only touch lowers the characteristic below 1. O(faces) per tested
  * node; nodes with too wide a cone are opened without a test.
  */
+#include <float.h>
+
 #include "base/parallel.h"
 #include "base/union_find.h"
 #include "cluster/tree/welded.h"
@@ -35,6 +37,14 @@ fct_chart_def fct_chart_def_default(void) {
                            .max_area = INFINITY};
 }
 
+/* The area of a cluster, also where no float is near it. */
+static double find_area(const fct_tree_view *view, const fct_cluster *c) {
+    double area = 0;
+    if (c->area >= FLT_MIN && c->area < FLT_MAX) return (double)c->area;
+    for (size_t p = c->first; p < (size_t)c->first + c->count; ++p) area += v3_norm(fct_face_vector(view, p));
+    return area;
+}
+
 /* Compares the stored cone, which is rounded up; compares the faces where that does not decide. */
 static bool is_within_angle(const fct_tree_view *view, const fct_cluster *c, double limit) {
     const double rounding = 4e-6;
@@ -45,7 +55,7 @@ static bool is_within_angle(const fct_tree_view *view, const fct_cluster *c, dou
     for (size_t p = c->first; p < (size_t)c->first + c->count; ++p) s = v3_add(s, fct_face_vector(view, p));
     for (size_t p = c->first; p < (size_t)c->first + c->count; ++p)
         if (fct_angle(fct_face_vector(view, p), s) > limit) return false;
-    return v3_norm2(s) > 0 || c->area == 0;
+    return v3_norm2(s) > 0 || find_area(view, c) == 0;
 }
 
 static bool has_one_material(const fct_tree_view *view, const fct_cluster *c) {
@@ -87,7 +97,8 @@ static bool is_chart(void *user, uint32_t node, uint32_t thread) {
         ++o->opened[thread].angle;
         return false;
     }
-    if (c->count > charter->def.max_faces || (double)c->area > charter->def.max_area ||
+    if (c->count > charter->def.max_faces ||
+        (charter->def.max_area < INFINITY && find_area(charter->view, c) > charter->def.max_area) ||
         !has_one_material(charter->view, c)) {
         ++o->opened[thread].limit;
         return false;

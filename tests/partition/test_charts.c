@@ -238,6 +238,21 @@ static void the_angle_decides(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Two faces of opposite windings are two charts, also where their areas are below the smallest float. */
+static void opposite_faces_are_apart_at_every_scale(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    for (int power = 0; power <= 40; power += 10) {
+        fct_mesh mesh = make_grid(&env, 1);
+        uint32_t swap = mesh.triangles[4];
+        mesh.triangles[4] = mesh.triangles[5], mesh.triangles[5] = swap;
+        for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
+            mesh.positions[i] *= (float)pow(10, -power);
+        for (int keep = 0; keep < 2; ++keep) assert_int_equal(charts_of(&env, &mesh, pi / 4, keep).charts, 2);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 static void merging_leaves_fewer_charts_and_shorter_seams(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -389,6 +404,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(charts_are_disks_within_the_angle),
                                        cmocka_unit_test(known_surfaces),
                                        cmocka_unit_test(the_angle_decides),
+                                       cmocka_unit_test(opposite_faces_are_apart_at_every_scale),
                                        cmocka_unit_test(merging_leaves_fewer_charts_and_shorter_seams),
                                        cmocka_unit_test(materials_and_areas_are_kept_apart),
                                        cmocka_unit_test(limits_are_kept),

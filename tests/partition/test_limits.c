@@ -52,8 +52,28 @@ static void merged_charts_have_their_own_perimeter(void **state) {
     fct_mesh_release(&env, &mesh);
     fct_mesh_release(&env, &grid);
 }
+
+/* The lengths of borders need no scale, also where those of the mesh are no floats. */
+static void quality_does_not_depend_on_scale(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_partition_quality all[3];
+    for (int k = 0; k < 3; ++k) {
+        fct_mesh mesh = make_grid(&env, 8);
+        uint32_t labels[128];
+        for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
+            mesh.positions[i] = ldexpf(mesh.positions[i], (const int[]){0, 127, -140}[k]);
+        for (uint32_t f = 0; f < mesh.face_count; ++f) labels[f] = f / 16 % 3;
+        assert_int_equal(fct_labels_quality(&env, &mesh, labels, 3, all + k), FCT_OK);
+        fct_mesh_release(&env, &mesh);
+        assert_true(fabs(all[k].mean_irregularity - all[0].mean_irregularity) < 1e-9);
+        assert_true(fabs(all[k].box_area - all[0].box_area) < 1e-9 && all[k].mean_irregularity > 1);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_degenerate_face_passes_its_border_on),
-                                       cmocka_unit_test(merged_charts_have_their_own_perimeter)};
+                                       cmocka_unit_test(merged_charts_have_their_own_perimeter),
+                                       cmocka_unit_test(quality_does_not_depend_on_scale)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
