@@ -13,7 +13,7 @@ static void write_position(const fct_simplifier *s, uint32_t point, float *out) 
         memcpy(out, s->mesh->positions + 3 * (size_t)s->sources[point], 3 * sizeof *out);
         return;
     }
-    v3_store(out, v3_mad(s->center, s->extent, point_position(s, point)));
+    store_written(s, point_position(s, point), out);
 }
 
 /* Writes the attributes of a live corner's wedge: c in the input, `corner` and its vertex v in the output.

@@ -13,6 +13,8 @@
 #ifndef FCT_SIMPLIFY_STATE_H
 #define FCT_SIMPLIFY_STATE_H
 
+#include <float.h>
+
 #include "base/env.h"
 #include "base/math/vec.h"
 #include "base/union_find.h"
@@ -120,6 +122,13 @@ static inline bool corner_dead(const fct_simplifier *s, uint32_t c) {
 static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
     return (v3){s->positions[3 * (size_t)p], s->positions[3 * (size_t)p + 1],
                 s->positions[3 * (size_t)p + 2]};
+}
+/* The floats of a position. Those of a point outside of the range end at its limit. */
+static inline void store_written(const fct_simplifier *s, v3 at, float out[3]) {
+    v3 p = v3_mad(s->center, s->extent, at);
+    const double most = (double)FLT_MAX;
+    v3_store(out, (v3){fct_max(-most, fct_min(p.x, most)), fct_max(-most, fct_min(p.y, most)),
+                       fct_max(-most, fct_min(p.z, most))});
 }
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
     return s->corner_wedges ? fct_sets_find(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];

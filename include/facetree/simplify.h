@@ -76,12 +76,14 @@ typedef struct fct_simplify_stats {
  * doubled creases and texture seams do not crack. Doubled vertices with equal attributes become one vertex.
  * Bodies that only touch stay apart. A point of more than 512 faces does not move. Faces: with
  * check_foldover, the result has no duplicate face, no face whose area is 0 in the written floats, no two
- * faces folded onto each other (less than 26 degrees between them) and no edge of more than two faces, unless
- * the input has such there. If no other contraction is left, more than target_faces remain. Attributes:
- * colours, texture coordinates and normals stay within the range of each component in the input; normals then
- * get unit length. Dropped: vertices that no face uses, and faces with two corners at one point. Every run
- * and every thread count give the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is
- * negative or NaN), MEMORY, CANCELLED. */
+ * faces folded onto each other (less than 26 degrees between them, before their corners become floats;
+ * several turns of less than 4 degrees each may lead there) and no edge of more than two faces, unless the
+ * input has such there; faces lower than 1e-15 of the longest side of the bounds count as faces without area.
+ * If no other contraction is left, more than target_faces remain. Attributes: colours, texture coordinates
+ * and normals stay within the range of each component in the input; normals then get unit length. Dropped:
+ * vertices that no face uses, and faces with two corners at one point. Every run and every thread count give
+ * the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is negative or NaN), MEMORY,
+ * CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 

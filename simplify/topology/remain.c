@@ -31,7 +31,7 @@ static double find_written_area2(const fct_simplifier *s, v3 a, v3 b, v3 c) {
     v3 written[3];
     for (int k = 0; k < 3; ++k) {
         float p[3];
-        v3_store(p, v3_mad(s->center, s->extent, at[k]));
+        store_written(s, at[k], p);
         written[k] = v3_load(p);
     }
     return v3_norm2(v3_cross(v3_sub(written[1], written[0]), v3_sub(written[2], written[0])));

@@ -14,8 +14,8 @@
 #include "base/key.h"
 #include "simplify/topology/weld.h"
 
-/* A corner moves by at most .87 of the largest coordinate's epsilon when it becomes a float, so a face with
- * four times this height keeps more than half of it. */
+/* A corner moves by at most .87 of the step between floats at the largest coordinate when it becomes a float,
+ * so a face with four times this height keeps more than half of it. */
 #define LEAST_HEIGHT 4
 
 enum { KEY_WORDS = 7 };
@@ -98,7 +98,8 @@ static void find_frame(fct_simplifier *s) {
     s->extent = empty ? 1 : fct_max(size.x, fct_max(size.y, size.z));
     if (!(s->extent > 0)) s->extent = 1;
     double reach = fct_max(fabs(s->center.x), fct_max(fabs(s->center.y), fabs(s->center.z))) + .5 * s->extent;
-    s->least_height = LEAST_HEIGHT * FLT_EPSILON * reach / s->extent;
+    double step = fct_max(FLT_EPSILON * reach, FLT_TRUE_MIN);
+    s->least_height = LEAST_HEIGHT * step / s->extent;
 }
 
 static fct_result make_points(fct_simplifier *s) {

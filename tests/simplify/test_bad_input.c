@@ -153,6 +153,38 @@ static void extremes_of_extent(void **state) {
     }
 }
 
+/* Points outside of the bounds keep finite coordinates. */
+static void the_largest_floats_stay_finite(void **state) {
+    (void)state;
+    fct_mesh sphere = make_sphere(&env, 20);
+    for (uint32_t i = 0; i < 3 * sphere.vertex_count; ++i) sphere.positions[i] *= 3.4e38f;
+    for (uint32_t faces = 4; faces <= 64; faces *= 2) {
+        fct_mesh out = to_count(&sphere, faces, NULL);
+        assert_true(out.face_count <= faces);
+        fct_mesh_release(&env, &out);
+    }
+    fct_mesh_release(&env, &sphere);
+}
+
+/* A rough square whose sides are 14 steps between the smallest floats. */
+static void the_smallest_floats_keep_areas(void **state) {
+    (void)state;
+    fct_mesh grid = make_grid(&env, 12);
+    uint32_t random = 12;
+    for (uint32_t i = 0; i < 3 * grid.vertex_count; ++i) {
+        random = random * 1664525u + 1013904223u;
+        grid.positions[i] += (float)((random >> 8) / 16777216. - .5) / 120;
+        grid.positions[i] *= 2e-44f;
+    }
+    for (uint32_t f = 0; f < grid.face_count; ++f) assert_true(v3_norm(face_cross(&grid, f)) > 0);
+    for (uint32_t faces = 4; faces < 288; faces += 1 + faces / 8) {
+        fct_mesh out = to_count(&grid, faces, NULL);
+        for (uint32_t f = 0; f < out.face_count; ++f) assert_true(v3_norm(face_cross(&out, f)) > 0);
+        fct_mesh_release(&env, &out);
+    }
+    fct_mesh_release(&env, &grid);
+}
+
 static void duplicated_and_non_manifold_faces(void **state) {
     (void)state;
     fct_mesh sphere = make_sphere(&env, 16), mesh = make(sphere.vertex_count, 3 * sphere.face_count);
@@ -348,6 +380,8 @@ int main(void) {
         cmocka_unit_test(an_edge_of_a_hundred_thousand_faces),
         cmocka_unit_test(many_disconnected_triangles),
         cmocka_unit_test(extremes_of_extent),
+        cmocka_unit_test(the_largest_floats_stay_finite),
+        cmocka_unit_test(the_smallest_floats_keep_areas),
         cmocka_unit_test(duplicated_and_non_manifold_faces),
         cmocka_unit_test(more_wedges_than_an_edge_takes),
         cmocka_unit_test(bad_attributes_and_options_are_refused),
