@@ -24,12 +24,13 @@ typedef struct slabs {
     int near[3]; /* row of fct_scene_node.bounds where the ray enters a slab; it leaves at row near ^ 1 */
 } slabs;
 
-/* Returns false for a ray that hits nothing: a NaN, no direction, or t_min > t_max. */
+/* Returns false for a ray that hits nothing: a component that is not finite, no direction, or t_min > t_max.
+ */
 static inline bool prepare_slabs(const fct_ray *ray, slabs *s) {
     bool moving = false;
     for (int c = 0; c < 3; ++c) {
         float o = ray->origin[c], d = ray->direction[c];
-        if (isnan(o) || isnan(d)) return false;
+        if (!isfinite(o) || !isfinite(d)) return false;
         moving |= d != 0;
         s->origin[c] = o;
         s->inverse[c] = fabsf(d) > FLT_MIN ? 1 / d : copysignf(1 / FLT_MIN, d);

@@ -184,9 +184,11 @@ fct_result fct_scene_build_nodes(const fct_env *env, uint32_t count, const fct_v
         return fct_fail_memory(env, "the volumes of a scene");
     }
     uint32_t node_count = 1;
-    float size = 0;
-    for (int c = 0; c < 3; ++c) size = fmaxf(size, volumes[0].bounds.upper[c] - volumes[0].bounds.lower[c]);
-    const float pad = PAD * size;
+    float pad = 0;
+    for (int c = 0; c < 3; ++c) {
+        double size = (double)volumes[0].bounds.upper[c] - (double)volumes[0].bounds.lower[c];
+        pad = fmaxf(pad, (float)(PAD * size));
+    }
     origins[0] = 0;
     for (uint32_t n = 0; n < node_count; ++n) {
         uint32_t slots[FCT_SCENE_WIDTH], used = collect_children(volumes, origins[n], slots);

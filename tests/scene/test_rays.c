@@ -222,11 +222,11 @@ static void useless_rays_hit_nothing(void **unused) {
     fct_env env = fct_env_default();
     fct_scene *scene = make_scene(&env, FCT_BACKEND_OBB);
     fct_scene_hit hit;
-    fct_ray rays[4] = {{{0, 0, 5}, 0, {0, 0, 0}, INFINITY},
-                       {{0, NAN, 5}, 0, {0, 0, -1}, INFINITY},
-                       {{0, 0, 5}, 0, {0, NAN, -1}, INFINITY},
-                       {{0, 0, 5}, 9, {0, 0, -1}, 1}};
-    for (int k = 0; k < 4; ++k) {
+    fct_ray rays[6] = {
+        {{0, 0, 5}, 0, {0, 0, 0}, INFINITY},         {{0, NAN, 5}, 0, {0, 0, -1}, INFINITY},
+        {{0, 0, 5}, 0, {0, 0, -INFINITY}, INFINITY}, {{0, -INFINITY, 0}, 0, {0, INFINITY, -1}, INFINITY},
+        {{0, 0, 5}, 0, {0, NAN, -1}, INFINITY},      {{0, 0, 5}, 9, {0, 0, -1}, 1}};
+    for (int k = 0; k < 6; ++k) {
         assert_false(fct_scene_closest_hit(scene, rays + k, &hit, NULL));
         assert_int_equal(hit.instance, FCT_NONE);
         assert_false(fct_scene_any_hit(scene, rays + k, NULL));
