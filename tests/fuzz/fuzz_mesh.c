@@ -31,5 +31,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         fct_mesh_release(&env, &mesh);
     }
     fuzz_require(memcmp(&mesh, &empty, sizeof mesh) == 0, "a failed read leaves nothing behind");
+    fuzz_end();
     return 0;
 }

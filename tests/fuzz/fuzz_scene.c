@@ -13,5 +13,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         fuzz_use_scene(scene);
         fct_scene_destroy(scene);
     }
+    fuzz_end();
     return 0;
 }

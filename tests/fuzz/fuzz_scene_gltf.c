@@ -10,5 +10,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (fct_scene_read_gltf(scene, "scene", data, size, NULL) == FCT_OK && fct_scene_commit(scene) == FCT_OK)
         fuzz_use_scene(scene);
     fct_scene_destroy(scene);
+    fuzz_end();
     return 0;
 }

@@ -37,5 +37,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         fct_scene_commit(scene) == FCT_OK)
         fuzz_use_scene(scene);
     fct_scene_destroy(scene);
+    fuzz_end();
     return 0;
 }

@@ -1,110 +1,14 @@
-/* Any bytes give an error, or a tree on which no public call crashes or hangs, with and without a check of
- * the tree. The fuzzer corrects the checksums first, because otherwise every mutation would fail there. */
-#include <math.h>
-#include <string.h>
-
-#include "cluster/file/format.h"
-#include "facetree/bvh.h"
-#include "facetree/partition.h"
-#include "fuzz/fuzz.h"
-
-static void mend(const fct_env *env, uint8_t *data, size_t size) {
-    fct_format_header h;
-    uint64_t hash;
-    if (size < sizeof h) return;
-    memcpy(&h, data, sizeof h);
-    h.file_size = size;
-    for (int i = 0; i < FCT_SECTION_COUNT; ++i) {
-        fct_format_section *s = &h.sections[i];
-        if (s->offset > size || s->size > size - s->offset || s->size > FCT_FORMAT_BLOCK) continue;
-        fct_format_hash_blocks(env, data + s->offset, s->size, &hash);
-        s->checksum = fct_format_fold(&hash, fct_format_block_count(s->size));
-    }
-    memcpy(data, &h, sizeof h);
-    if (h.head_size < sizeof h || h.head_size > size) return;
-    h.checksum = fct_format_head_checksum(data, h.head_size);
-    memcpy(data, &h, sizeof h);
-}
-
-static void shoot(const fct_env *env, const fct_tree *tree) {
-    fct_bvh *bvh;
-    if (fct_bvh_create(env, tree, FCT_BACKEND_OBB, &bvh) != FCT_OK) return;
-    uint32_t faces = fct_tree_get(tree).face_count;
-    fct_ray ray = {{.1F, .2F, 3}, 0, {.01F, .02F, -1}, INFINITY};
-    fct_hit hit;
-    if (fct_bvh_closest_hit(bvh, &ray, &hit, NULL))
-        fuzz_require(hit.face < faces && hit.t >= 0, "a hit is a face");
-    fct_closest closest;
-    if (fct_bvh_closest_point(bvh, ray.origin, INFINITY, &closest, NULL))
-        fuzz_require(closest.face < faces, "a nearest point lies on a face");
-    fct_bvh_destroy(bvh);
-}
-
-/* Partitions and their clusters, one by one. `sound`: the tree has been checked. */
-static void cut(const fct_env *env, const fct_tree *tree, uint32_t *nodes, bool sound) {
-    fct_tree_view view = fct_tree_get(tree);
-    for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 2) {
-        uint32_t count, places = 0;
-        fct_result result = fct_tree_partition(env, tree, k, nodes, &count);
-        fuzz_require(result == FCT_OK ? count >= k : count == 0 && !sound, "a partition is one or none");
-        for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
-            fct_cluster cluster, child[2];
-            fct_box box;
-            result = fct_tree_cluster(tree, nodes[i], &cluster);
-            fuzz_require(result == FCT_OK || !sound, "a checked tree has all clusters");
-            if (result != FCT_OK) break;
-            fct_cluster_box(&cluster, &box);
-            fuzz_require(cluster.first == places, "clusters follow one another");
-            places += cluster.count;
-            if (cluster.count < 2) continue;
-            result = fct_tree_children(tree, nodes[i], child);
-            fuzz_require(result == FCT_OK ? child[0].count + child[1].count == cluster.count : !sound,
-                         "two children make their parent");
-            result = FCT_OK;
-        }
-        if (result == FCT_OK) fuzz_require(places == view.face_count, "a partition has every face once");
-    }
-    fuzz_require(fct_tree_count_at_cost(tree, .01) <= view.face_count, "there are no more than all");
-}
-
-static void use_all(const fct_env *env, const fct_tree *tree, uint32_t *nodes, uint32_t *labels) {
-    fct_tree_view view = fct_tree_get(tree);
-    for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 2) {
-        uint32_t count;
-        fuzz_require(fct_tree_partition(env, tree, k, nodes, &count) == FCT_OK, "a partition comes out");
-        fuzz_require(fct_tree_labels(env, tree, nodes, count, labels) == FCT_OK, "labels come out");
-        for (uint32_t f = 0; f < view.face_count; ++f) fuzz_require(labels[f] < count, "labels are in range");
-        fct_partition_quality quality;
-        fct_tree_quality(env, tree, nodes, count, &quality);
-    }
-    fct_mesh mesh;
-    fuzz_require(fct_tree_mesh(env, tree, &mesh) == FCT_OK, "a tree holds a mesh");
-    fct_mesh_release(env, &mesh);
-    shoot(env, tree);
-}
+/* Whatever the bytes are, with corrected checksums: an error, or a tree that every public call can use. */
+#include "cluster/file/mend.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_limit limit;
     fct_env env = fuzz_env(&limit, size);
-    fct_tree *tree;
     uint8_t *copy = malloc(size + 1);
     if (!copy) return 0;
     memcpy(copy, data, size);
-    mend(&env, copy, size);
-    fct_result result = fct_tree_parse(&env, "input", copy, size, &tree);
+    mend_try(&env, copy, size);
     free(copy);
-    fuzz_require((result == FCT_OK) == (tree != NULL), "a failed read leaves no tree");
-    if (!tree) return 0;
-    uint32_t faces = fct_tree_get(tree).face_count;
-    uint32_t *nodes = fct_allocate(&env, faces, 4), *labels = fct_allocate(&env, faces, 4);
-    cut(&env, tree, nodes, false);
-    if (fct_tree_check(&env, tree) == FCT_OK) {
-        cut(&env, tree, nodes, true);
-        use_all(&env, tree, nodes, labels);
-    }
-    fct_tree_verify(&env, tree);
-    fct_release(&env, nodes);
-    fct_release(&env, labels);
-    fct_tree_destroy(tree);
+    fuzz_end();
     return 0;
 }
