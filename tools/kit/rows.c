@@ -90,17 +90,24 @@ static int read_rows(reader *r, FILE *file, tool_rows *rows) {
     return code;
 }
 
+int tool_rows_parse(tool *t, const char *name, FILE *file, int least, int columns, const double *missing,
+                    tool_rows *rows) {
+    *rows = (tool_rows){0};
+    reader r = {t, name, 0, least, columns, missing};
+    int code = read_rows(&r, file, rows);
+    if (code != TOOL_DONE) tool_rows_release(t, rows);
+    return code;
+}
+
 int tool_rows_read(tool *t, const char *path, int least, int columns, const double *missing,
                    tool_rows *rows) {
     *rows = (tool_rows){0};
-    bool standard = !strcmp(path, "-");
-    FILE *file = standard ? stdin : fopen(path, "re");
+    if (!strcmp(path, "-")) return tool_rows_parse(t, "standard input", stdin, least, columns, missing, rows);
+    FILE *file = fopen(path, "re");
     if (!file) return tool_fail(t, TOOL_INPUT, "%s: cannot be read: %s", path, strerror(errno));
-    int noted = standard ? TOOL_DONE : tool_note_input(t, path);
-    reader r = {t, standard ? "standard input" : path, 0, least, columns, missing};
-    int code = noted == TOOL_DONE ? read_rows(&r, file, rows) : noted;
-    if (!standard) fclose(file);
-    if (code != TOOL_DONE) tool_rows_release(t, rows);
+    int code = tool_note_input(t, path);
+    if (code == TOOL_DONE) code = tool_rows_parse(t, path, file, least, columns, missing, rows);
+    fclose(file);
     return code;
 }
 

@@ -13,6 +13,9 @@ typedef struct tool_rows {
  * columns. Empty lines and text after # are skipped. The first `least` columns must be finite. Returns an
  * exit code. */
 int tool_rows_read(tool *t, const char *path, int least, int columns, const double *missing, tool_rows *rows);
+/* The same for an open file. `name` is used in messages. */
+int tool_rows_parse(tool *t, const char *name, FILE *file, int least, int columns, const double *missing,
+                    tool_rows *rows);
 /* Writes count points relative to the origin: columns [column, column + 3) of each row. */
 void tool_rows_points(const tool_rows *rows, int columns, int column, const double origin[3], float *points);
 void tool_rows_release(tool *t, tool_rows *rows);
