@@ -1,11 +1,10 @@
 /* mesh/save.c: selects the writer by the ending of the file name, and replaces the file as a whole. */
 #define _GNU_SOURCE
-#include <locale.h>
 #include <string.h>
 #include <strings.h>
 
 #include "base/io/output.h"
-#include "mesh/glb/write.h"
+#include "mesh/glb/write/write.h"
 #include "mesh/mesh.h"
 #include "mesh/om/write.h"
 #include "mesh/ply/write.h"
@@ -53,12 +52,5 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
                         "%s: unknown kind of file; .ply, .obj, .off, .stl, .om and .glb are known", path);
     fct_result result = fct_mesh_check(env, path, mesh);
     if (result != FCT_OK) return result;
-    /* In some locales printf writes a decimal comma. */
-    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!c) return fct_fail_memory(env, "a locale");
-    locale_t before = uselocale(c);
-    result = fct_file_write_atomic(env, path, produce, &j);
-    uselocale(before);
-    freelocale(c);
-    return result;
+    return fct_sink_write(env, path, produce, &j);
 }

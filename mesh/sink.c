@@ -1,9 +1,12 @@
 /* mesh/sink.c: see sink.h. */
+#define _GNU_SOURCE
 #include "mesh/sink.h"
 
+#include <locale.h>
 #include <string.h>
 
 #include "base/env.h"
+#include "base/io/output.h"
 #include "mesh/mesh.h"
 
 void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
@@ -30,4 +33,15 @@ void fct_warn_of_origin(const fct_sink *sink) {
                  "%s: this format stores coordinates as floats, which lose digits this far from 0 "
                  "(about %g %g %g)",
                  sink->name, o[0], o[1], o[2]);
+}
+
+fct_result fct_sink_write(const fct_env *env, const char *path,
+                          fct_result (*produce)(void *user, FILE *stream), void *user) {
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (!c) return fct_fail_memory(env, "a locale");
+    locale_t before = uselocale(c);
+    fct_result result = fct_file_write_atomic(env, path, produce, user);
+    uselocale(before);
+    freelocale(c);
+    return result;
 }

@@ -27,6 +27,10 @@ void fct_note_left_out(const fct_sink *sink, unsigned arrays);
 /* Warns that the format stores positions as floats, if the mesh has an origin. */
 void fct_warn_of_origin(const fct_sink *sink);
 
+/* fct_file_write_atomic in the C locale, because in some locales printf writes a decimal comma. */
+fct_result fct_sink_write(const fct_env *env, const char *path,
+                          fct_result (*produce)(void *user, FILE *stream), void *user);
+
 #ifdef __cplusplus
 }
 #endif

@@ -164,21 +164,26 @@ static int run_simplify(tool *t, void *options) {
     if (!o->faces_given && !(o->ratio > 0) && !o->error_given)
         return tool_fail(t, TOOL_USAGE, "expected --faces N, --ratio R or --max-error E");
     fct_mesh mesh, simple = {0};
+    fct_gltf *gltf = NULL; /* the document that is kept, if both files are glTF */
     fct_simplify_stats stats;
-    int code = tool_load_mesh(t, t->inputs[0], &mesh);
+    bool keeps =
+        tool_is_gltf(t, t->inputs[0]) && strcmp(t->inputs[0], "-") != 0 && tool_ends(t->output, "glb");
+    int code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     code = set_attribute_weights(t, o, &mesh);
     if (code == TOOL_DONE) code = tool_result(t, fct_simplify(&t->env, &mesh, &o->def, &simple, &stats));
-    if (code == TOOL_DONE) code = tool_save_mesh(t, t->output, &simple, 1);
+    if (code == TOOL_DONE)
+        code = gltf ? tool_save_gltf(t, gltf, t->output, &simple) : tool_save_mesh(t, t->output, &simple, 1);
     if (code == TOOL_DONE && stats.faces_after > o->def.target_faces &&
         stats.stopped_because == FCT_STOP_EXHAUSTED)
         tool_warn(t, "stopped at %u faces, because no more contractions are allowed", stats.faces_after);
     if (code == TOOL_DONE) code = report_simplify(t, &simple, &stats);
     fct_mesh_release(&t->env, &simple);
     fct_mesh_release(&t->env, &mesh);
+    fct_gltf_close(gltf);
     return code;
 }
 
@@ -190,6 +195,10 @@ int tool_simplify(int argc, char **argv) {
         .synopsis = "IN -o OUT",
         .summary = "reduce a mesh, keeping its shape and colours",
         .text = "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. "
+                "If both are "
+                "glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
+                "counts once, "
+                "however many nodes place it. "
                 "Edges are contracted in the "
                 "order of their quadric error until the faces are as few as --faces or --ratio says, or "
                 "until the error would "

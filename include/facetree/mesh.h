@@ -1,4 +1,4 @@
-/* facetree/mesh.h: indexed triangle meshes: load, save, inspect.
+/* facetree/mesh.h: indexed triangle meshes: load, save, inspect; glTF documents with other triangles.
  *
  * Face f and vertex v keep their numbers in every later step. Polygons become triangles in order, and
  * source_faces gives the polygon of each triangle. Loading repairs nothing: degenerate, duplicate and
@@ -119,6 +119,31 @@ FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
  * invalid mesh), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
                                  const fct_mesh_save_def *def);
+
+/* ---- The triangles of a glTF document replaced ---- */
+
+/* A glTF document that keeps its nodes with their names and transforms, its materials with their textures,
+ * its cameras and lights. fct_gltf_open gives its triangles as one mesh in the world. The caller makes
+ * another mesh from it, for instance with fct_simplify, and fct_gltf_save writes the document with the
+ * triangles of that mesh. */
+typedef struct fct_gltf fct_gltf;
+
+/* Opens a .glb or .gltf and reads its meshes. Each mesh of the document is read once, at the place of the
+ * first node that has it, however many nodes have it. mesh->materials holds the primitive of each face: a
+ * number below mesh->material_count, in the order of the document; there are no material names. A warning
+ * names what neither the mesh nor fct_gltf_save keeps. *out keeps the file open; env must outlive it. Errors:
+ * INPUT, DATA, MEMORY, CANCELLED. */
+FCT_API fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, fct_mesh *mesh);
+
+/* Writes the document as a .glb with the faces of `mesh`, whose materials and origin are those of the mesh
+ * that fct_gltf_open gave. Positions go back into the space of their node. Kept: positions, normals, the
+ * first colours and texture coordinates, _RADIOSITY if the file had it; images are stored in the file. A
+ * primitive without faces is left out, and so is a mesh without primitives; its node stays. Replaces the
+ * target as fct_mesh_save does. def may be NULL. Errors: OUTPUT, DATA (mesh->materials absent or out of
+ * range, other than .glb, more than 4 GB), INPUT (the file of a buffer), MEMORY, CANCELLED. */
+FCT_API fct_result fct_gltf_save(fct_gltf *gltf, const char *path, const fct_mesh *mesh,
+                                 const fct_mesh_save_def *def);
+FCT_API void fct_gltf_close(fct_gltf *gltf);
 
 #ifdef __cplusplus
 }

@@ -6,7 +6,7 @@
 typedef struct use_counts {
     size_t color_textures, emissive_textures, other_textures, transparent;
     size_t lights, instanced, skinned, orthographic;
-    size_t morphed, points, lines;
+    size_t morphed, points, lines, attributed;
 } use_counts;
 
 /* Whether the object has a member whose name ends in Texture, such as normalTexture. */
@@ -62,6 +62,19 @@ static void count_nodes(const fct_glb *glb, use_counts *n) {
             json_array_size(json_object_get(fct_glb_extension(glb->root, "KHR_lights_punctual"), "lights"));
 }
 
+/* Whether the primitive has an attribute that fct_mesh has no place for. */
+static bool has_other_attribute(json_t *primitive) {
+    static const char *const known[] = {"POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0", "_RADIOSITY"};
+    const char *key;
+    json_t *value;
+    json_object_foreach(json_object_get(primitive, "attributes"), key, value) {
+        bool found = false;
+        for (size_t i = 0; i < sizeof known / sizeof *known; ++i) found = found || !strcmp(key, known[i]);
+        if (!found) return true;
+    }
+    return false;
+}
+
 static void count_primitives(const fct_glb *glb, use_counts *n) {
     json_t *mesh, *primitive;
     size_t i, j;
@@ -72,14 +85,22 @@ static void count_primitives(const fct_glb *glb, use_counts *n) {
         n->morphed += json_array_size(json_object_get(primitive, "targets")) > 0;
         n->points += mode == 0;
         n->lines += mode > 0 && mode < 4;
+        n->attributed += has_other_attribute(primitive);
     }
 }
 
+typedef struct feature_line {
+    size_t count;
+    const char *text;
+} feature_line;
+
+static void report_lines(const fct_glb *glb, const feature_line *lines, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        if (lines[i].count) fct_glb_warn(glb, "%zu %s", lines[i].count, lines[i].text);
+}
+
 static void report_counts(const fct_glb *glb, const use_counts *n) {
-    const struct {
-        size_t count;
-        const char *text;
-    } lines[] = {
+    const feature_line lines[] = {
         {n->lights, "lights (KHR_lights_punctual) are left out; only materials with an emission emit light"},
         {n->color_textures, "materials have a base colour texture, which is left out; the base colour factor "
                             "alone is used"},
@@ -96,8 +117,26 @@ static void report_counts(const fct_glb *glb, const use_counts *n) {
         {n->lines, "primitives of lines are left out"},
         {n->orthographic, "cameras have no perspective and are left out"},
     };
-    for (size_t i = 0; i < sizeof lines / sizeof *lines; ++i)
-        if (lines[i].count) fct_glb_warn(glb, "%zu %s", lines[i].count, lines[i].text);
+    report_lines(glb, lines, sizeof lines / sizeof *lines);
+}
+
+void fct_glb_report_losses(const fct_glb *glb) {
+    use_counts n = {0};
+    count_nodes(glb, &n);
+    count_primitives(glb, &n);
+    const feature_line lines[] = {
+        {n.instanced, "nodes have instances (EXT_mesh_gpu_instancing), which are left out; each node places "
+                      "its mesh once"},
+        {fct_glb_count(glb, "animations"), "animations are left out"},
+        {n.skinned, "nodes have a skin, which is left out"},
+        {n.morphed, "primitives have morph targets, which are left out"},
+        {n.points, "primitives of points are left out"},
+        {n.lines, "primitives of lines are left out"},
+        {n.attributed,
+         "primitives have other attributes (tangents, more texture coordinates, ...), which are left "
+         "out"},
+    };
+    report_lines(glb, lines, sizeof lines / sizeof *lines);
 }
 
 /* Whether another warning, or an error, already reports what the extension stands for. */

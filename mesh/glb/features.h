@@ -8,5 +8,7 @@
  * textures, transparency, instancing, animations, skins, morph targets, points and lines, other extensions.
  */
 void fct_glb_report_features(const fct_glb *glb);
+/* The same for what is lost when the triangles of the document are replaced. */
+void fct_glb_report_losses(const fct_glb *glb);
 
 #endif

@@ -177,7 +177,9 @@ static fct_result append_triangles(fct_glb_builder *b, const fct_glb_primitive *
                     p->texcoord >= 0 ? (float)fct_glb_value(texcoords, (size_t)index, c) : 0;
         }
         if (b->has_materials)
-            soup->materials[soup->corner_count / 3] = p->material >= 0 ? (uint32_t)p->material : b->unnamed;
+            soup->materials[soup->corner_count / 3] = b->by_primitive    ? b->primitive_count
+                                                      : p->material >= 0 ? (uint32_t)p->material
+                                                                         : b->unnamed;
         soup->corner_count += 3;
     }
     b->without_texcoord += b->has_texcoords && p->texcoord < 0 ? 3 * triangles : 0;
@@ -201,6 +203,33 @@ fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_pr
     if (result == FCT_OK) result = fct_glb_index(glb, object, "mode", &out->mode);
     if (result == FCT_OK && out->mode == FCT_GLB_ABSENT) out->mode = 4;
     return result;
+}
+
+fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
+    json_t *mesh, *object, *material;
+    size_t i, j, primitives = 0, with_normals = 0;
+    *unnamed = false;
+    json_array_foreach(json_object_get(b->glb->root, "meshes"), i, mesh)
+        json_array_foreach(json_object_get(mesh, "primitives"), j, object) {
+        fct_glb_primitive p;
+        fct_result result = fct_glb_read_primitive(b->glb, object, &p);
+        if (result != FCT_OK) return result;
+        if (p.position == FCT_GLB_ABSENT || (p.mode > 0 && p.mode < 4)) continue;
+        ++primitives;
+        with_normals += p.normal >= 0;
+        b->has_colors |= p.color >= 0 || p.radiosity >= 0;
+        b->has_texcoords |= p.texcoord >= 0;
+        *unnamed |= p.material < 0;
+        if (p.material < 0) continue;
+        result = fct_glb_item(b->glb, "materials", p.material, &material);
+        if (result != FCT_OK) return result;
+        b->has_materials |= json_is_string(json_object_get(material, "name")) || p.material > 0;
+    }
+    b->has_normals = with_normals && with_normals == primitives;
+    if (with_normals && !b->has_normals)
+        fct_glb_warn(b->glb, "%zu of %zu primitives have no normals, so all normals are left out",
+                     primitives - with_normals, primitives);
+    return FCT_OK;
 }
 
 /* Refuses what the reader cannot understand: another mode, a material that does not exist, or positions that
@@ -240,6 +269,7 @@ fct_result fct_glb_append_mesh(fct_glb_builder *b, int64_t index, const fct_glb_
             result = append_vertices(b, t, &p);
         }
         if (result == FCT_OK && p.mode) result = append_triangles(b, &p, first, turn);
+        b->primitive_count += p.mode > 0;
         if (result != FCT_OK) return result;
         before = p;
     }

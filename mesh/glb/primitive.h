@@ -15,7 +15,10 @@ typedef struct fct_glb_builder {
     fct_soup *soup;
     /* The arrays that the soup gets. has_normals: every primitive has normals. */
     bool has_colors, has_normals, has_texcoords, has_materials;
-    uint32_t unnamed; /* number of the material that primitives without one get */
+    uint32_t unnamed;  /* number of the material that primitives without one get */
+    bool by_primitive; /* faces get the number of their primitive instead of a material: primitive_count so
+                          far */
+    uint32_t primitive_count;
 
     size_t without_color, without_texcoord; /* vertices and corners without a value in the file */
     size_t incomplete;                      /* primitives that end with an incomplete triangle */
@@ -23,6 +26,10 @@ typedef struct fct_glb_builder {
     size_t vertex_capacity, color_capacity, normal_capacity, corner_capacity, texcoord_capacity,
         material_capacity;
 } fct_glb_builder;
+
+/* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
+ * normals if all primitives have them. *unnamed: a primitive has no material. Errors: DATA. */
+fct_result fct_glb_choose_arrays(fct_glb_builder *builder, bool *unnamed);
 
 /* Reads the members of a primitive. An absent mode is 4. Errors: DATA. */
 fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_primitive *out);

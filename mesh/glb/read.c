@@ -11,36 +11,7 @@ typedef struct reader {
     fct_glb glb;
     fct_glb_builder builder;
     bool needs_unnamed;
-    size_t primitives, with_normals;
 } reader;
-
-/* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
- * normals if all primitives have them. */
-static fct_result choose_arrays(reader *r) {
-    json_t *meshes = json_object_get(r->glb.root, "meshes"), *mesh, *object;
-    size_t i, j;
-    json_array_foreach(meshes, i, mesh) json_array_foreach(json_object_get(mesh, "primitives"), j, object) {
-        fct_glb_primitive p;
-        fct_result result = fct_glb_read_primitive(&r->glb, object, &p);
-        if (result != FCT_OK) return result;
-        if (p.position == FCT_GLB_ABSENT || (p.mode > 0 && p.mode < 4)) continue;
-        ++r->primitives;
-        r->with_normals += p.normal >= 0;
-        r->builder.has_colors |= p.color >= 0 || p.radiosity >= 0;
-        r->builder.has_texcoords |= p.texcoord >= 0;
-        r->needs_unnamed |= p.material < 0;
-        if (p.material < 0) continue;
-        json_t *material;
-        result = fct_glb_item(&r->glb, "materials", p.material, &material);
-        if (result != FCT_OK) return result;
-        r->builder.has_materials |= json_is_string(json_object_get(material, "name")) || p.material > 0;
-    }
-    r->builder.has_normals = r->with_normals && r->with_normals == r->primitives;
-    if (r->with_normals && !r->builder.has_normals)
-        fct_glb_warn(&r->glb, "%zu of %zu primitives have no normals, so all normals are left out",
-                     r->primitives - r->with_normals, r->primitives);
-    return FCT_OK;
-}
 
 /* Numbers the materials as the file does. Adds one with an empty name if a primitive has no material. */
 static fct_result name_materials(reader *r) {
@@ -72,7 +43,7 @@ fct_result fct_read_glb(const fct_source *source, fct_soup *out) {
     reader r = {.builder = {.soup = out}};
     r.builder.glb = &r.glb;
     fct_result result = fct_glb_open(source, &r.glb);
-    if (result == FCT_OK) result = choose_arrays(&r);
+    if (result == FCT_OK) result = fct_glb_choose_arrays(&r.builder, &r.needs_unnamed);
     if (result == FCT_OK) result = name_materials(&r);
     if (result == FCT_OK) result = fct_glb_begin_soup(&r.builder);
     if (result == FCT_OK) result = fct_glb_visit_nodes(&r.glb, place_mesh, &r);

@@ -142,6 +142,25 @@ static fct_result save_glb(const fct_env *env) {
     return STARVE(fct_mesh_save(env, OUT "sheet.glb", &inputs.sheet, NULL));
 }
 
+static fct_result open_gltf(const fct_env *env) {
+    fct_gltf *gltf;
+    fct_mesh mesh;
+    fct_result result = STARVE(fct_gltf_open(env, IN "corner.gltf", &gltf, &mesh));
+    assert_int_equal(gltf != NULL, result == FCT_OK);
+    fct_gltf_close(gltf);
+    return finish_mesh(env, &mesh, result);
+}
+
+static fct_result save_gltf(const fct_env *env) {
+    fct_gltf *gltf;
+    fct_mesh mesh;
+    assert_int_equal(fct_gltf_open(env, IN "corner.gltf", &gltf, &mesh), FCT_OK);
+    fct_result result = STARVE(fct_gltf_save(gltf, OUT "corner.glb", &mesh, NULL));
+    fct_mesh_release(env, &mesh);
+    fct_gltf_close(gltf);
+    return result;
+}
+
 static fct_result build_dual(const fct_env *env) {
     fct_dual dual;
     fct_result result = STARVE(fct_dual_build(env, &inputs.sheet, &dual));
@@ -219,6 +238,8 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_mesh_save", "stl", save_stl, false},
                                   {"fct_mesh_save", "om", save_om, false},
                                   {"fct_mesh_save", "glb", save_glb, false},
+                                  {"fct_gltf_open", "", open_gltf, false},
+                                  {"fct_gltf_save", "", save_gltf, false},
                                   {"fct_dual_build", "", build_dual, false},
                                   {"fct_weld_build", "", build_weld, false},
                                   {"fct_inward_find", "", find_inward, false},

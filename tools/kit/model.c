@@ -57,14 +57,34 @@ static int load_mesh(tool *t, const char *path, fct_mesh *mesh) {
     return code;
 }
 
-int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
+/* Follows --flip-inward. Releases the mesh after a failure. */
+static int turn_bodies(tool *t, const char *path, fct_mesh *mesh) {
     uint32_t count;
-    int code = load_mesh(t, path, mesh);
-    if (code != TOOL_DONE || !t->flip_inward) return code;
-    code = tool_result(t, fct_inward_flip(&t->env, mesh, &count));
+    if (!t->flip_inward) return TOOL_DONE;
+    int code = tool_result(t, fct_inward_flip(&t->env, mesh, &count));
     if (code == TOOL_DONE) tool_say(t, "%s: turned %u closed bod%s", path, count, count == 1 ? "y" : "ies");
     if (code != TOOL_DONE) fct_mesh_release(&t->env, mesh);
     return code;
+}
+
+int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh) {
+    int code = load_mesh(t, path, mesh);
+    return code == TOOL_DONE ? turn_bodies(t, path, mesh) : code;
+}
+
+int tool_open_gltf(tool *t, const char *path, fct_gltf **gltf, fct_mesh *mesh) {
+    int code = tool_result(t, fct_gltf_open(&t->env, path, gltf, mesh));
+    if (code == TOOL_DONE) code = turn_bodies(t, path, mesh);
+    if (code == TOOL_DONE) return code;
+    fct_gltf_close(*gltf);
+    *gltf = NULL;
+    return code;
+}
+
+int tool_save_gltf(tool *t, fct_gltf *gltf, const char *path, const fct_mesh *mesh) {
+    int code = tool_refuse_input(t, path);
+    if (code == TOOL_DONE) code = tool_check_inputs(t);
+    return code == TOOL_DONE ? tool_result(t, fct_gltf_save(gltf, path, mesh, NULL)) : code;
 }
 
 int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def) {

@@ -13,6 +13,9 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
 int tool_tree_mesh(tool *t, const fct_tree *tree, fct_mesh *mesh);
 /* The mesh of a mesh file or of a .fct file, turned if the command got --flip-inward. */
 int tool_load_mesh(tool *t, const char *path, fct_mesh *mesh);
+/* The triangles of a glTF file, and the file for tool_save_gltf. */
+int tool_open_gltf(tool *t, const char *path, fct_gltf **gltf, fct_mesh *mesh);
+int tool_save_gltf(tool *t, fct_gltf *gltf, const char *path, const fct_mesh *mesh);
 /* Saves a mesh. */
 int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def);
 /* Saves a mesh. exposure: a factor on its colours for display. */

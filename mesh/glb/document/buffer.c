@@ -100,7 +100,7 @@ static fct_result open_file(const fct_glb *glb, const char *uri, char *path, cha
     return result;
 }
 
-static fct_result open_uri(const fct_glb *glb, const json_t *value, fct_glb_buffer *out) {
+fct_result fct_glb_open_uri(const fct_glb *glb, const json_t *value, fct_glb_buffer *out) {
     const fct_env *env = glb->source->env;
     const char *uri = json_string_value(value), *comma = strchr(uri, ',');
     size_t length = json_string_length(value), folder = glb->source->folder ? strlen(glb->source->folder) : 0;
@@ -128,7 +128,7 @@ static fct_result open_buffer(fct_glb *glb, int64_t index, const fct_glb_buffer 
     *out = buffer;
     if (buffer->open) return FCT_OK;
     if (json_is_string(uri)) {
-        result = open_uri(glb, uri, buffer);
+        result = fct_glb_open_uri(glb, uri, buffer);
         glb->byte_count += buffer->size;
     } else if (glb->binary) {
         buffer->data = glb->binary, buffer->size = glb->binary_size;

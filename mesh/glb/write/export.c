@@ -1,6 +1,6 @@
 /* mesh/glb/export.c: see export.h. Source: glTF 2.0 specification, chapters 3.6, 3.7 and 4. */
 #define _GNU_SOURCE
-#include "mesh/glb/export.h"
+#include "mesh/glb/write/export.h"
 
 #include <math.h>
 #include <stdio.h>

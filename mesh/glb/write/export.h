@@ -1,4 +1,4 @@
-/* mesh/glb/export.h: the geometry of a glTF file as JSON and as bytes.
+/* mesh/glb/write/export.h: the geometry of a glTF file as JSON and as bytes.
  *
  * A file holds a list of geometries: vertices with their attributes, and one primitive per material over
  * them. Each attribute is a buffer view and an accessor, and so are the indices of each primitive. COLOR_0
@@ -9,7 +9,7 @@
 #ifndef FCT_MESH_GLB_EXPORT_H
 #define FCT_MESH_GLB_EXPORT_H
 
-#include "mesh/glb/layout.h"
+#include "mesh/glb/write/layout.h"
 
 typedef struct fct_glb_geometry {
     const fct_mesh *mesh;

@@ -1,4 +1,4 @@
-/* mesh/glb/write.h: the writer of GLB, the binary form of glTF 2. */
+/* mesh/glb/write/write.h: the writer of GLB, the binary form of glTF 2. */
 #ifndef FCT_MESH_GLB_WRITE_H
 #define FCT_MESH_GLB_WRITE_H
 

@@ -1,4 +1,4 @@
-/* mesh/glb/layout.h: the vertices and faces of a mesh in the order of a glTF file.
+/* mesh/glb/write/layout.h: the vertices and faces of a mesh in the order of a glTF file.
  *
  * In glTF, texture coordinates belong to vertices, so a vertex whose corners have different ones is repeated
  * after the last vertex. Faces are sorted by material, because each material makes a primitive.

@@ -3,10 +3,10 @@
  *
  * A coloured mesh is unlit (KHR_materials_unlit).
  */
-#include "mesh/glb/write.h"
+#include "mesh/glb/write/write.h"
 
 #include "base/env.h"
-#include "mesh/glb/export.h"
+#include "mesh/glb/write/export.h"
 #include "mesh/mesh.h"
 
 /* Prints a JSON string. Bytes that are not UTF-8 are read as Latin-1. */

@@ -1,5 +1,5 @@
 /* mesh/glb/layout.c: see layout.h. */
-#include "mesh/glb/layout.h"
+#include "mesh/glb/write/layout.h"
 
 #include <string.h>
 
