@@ -24,7 +24,9 @@ fct_result fct_output_fail(const fct_env *env, const char *path, int error) {
 static int create_spool(void) {
     const char *folder = getenv("TMPDIR");
     char name[PATH_MAX];
-    int descriptor = fct_temporary_open(folder && *folder ? folder : "/tmp", name, sizeof name);
+    if (!folder || !*folder) folder = "/tmp";
+    fct_temporary_sweep(folder); /* a process that was killed before its unlink */
+    int descriptor = fct_temporary_open(folder, name, sizeof name);
     if (descriptor >= 0 && *name) unlink(name);
     return descriptor;
 }

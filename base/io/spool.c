@@ -34,6 +34,7 @@ fct_result fct_spool_open(const fct_env *env, const char *folder, const char *be
     else
         fct_folder_of(beside, path, sizeof path);
     snprintf(out->folder, sizeof out->folder, "%.*s", (int)sizeof out->folder - 1, path);
+    fct_temporary_sweep(path); /* a process that was killed before its unlink */
     out->descriptor = open_nameless(path);
     if (out->descriptor >= 0) return FCT_OK;
     fct_result result = fail_spool(out, "made", errno);

@@ -15,8 +15,8 @@ typedef struct fct_spool {
     char folder[256]; /* for messages */
 } fct_spool;
 
-/* Creates an empty file in `folder`, or in the folder of the file `beside` if folder is NULL. Errors: OUTPUT.
- */
+/* Creates an empty file in `folder`, or in the folder of the file `beside` if folder is NULL. Also removes
+ * temporary files of ended processes there. Errors: OUTPUT. */
 fct_result fct_spool_open(const fct_env *env, const char *folder, const char *beside, fct_spool *out);
 /* A zeroed struct is allowed. */
 void fct_spool_close(fct_spool *spool);

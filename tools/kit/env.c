@@ -251,9 +251,9 @@ int tool_result(tool *t, fct_result result) {
 }
 
 int tool_json(tool *t, json_t *object) {
-    int code = TOOL_DONE;
     if (!object) return t->json ? tool_fail(t, TOOL_MEMORY, "out of memory for the JSON output") : TOOL_DONE;
-    if (t->json) {
+    int code = tool_check_inputs(t);
+    if (t->json && code == TOOL_DONE) {
         tool_progress_clear(&t->bar);
         if (!t->warnings) t->warnings = json_array();
         json_object_set(object, "warnings", t->warnings);
@@ -310,7 +310,7 @@ static void print_lines(json_t *object) {
 }
 
 int tool_print(tool *t, json_t *object) {
-    if (!t->json && object) print_lines(object);
+    if (!t->json && object && tool_check_inputs(t) == TOOL_DONE) print_lines(object);
     return tool_json(t, object);
 }
 

@@ -93,8 +93,8 @@ double tool_seconds(void);
 /* The largest resident memory of the process so far, in bytes. */
 size_t tool_peak_bytes(void);
 
-/* Prints the one object of --json, with the warnings so far as `warnings`. Frees the object in any case.
- * Returns an exit code. */
+/* Prints the one object of --json, with the warnings so far as `warnings`, unless an input was shortened.
+ * Frees the object in any case. Returns an exit code. */
 int tool_json(tool *t, json_t *object);
 /* For commands whose answer is the object: like tool_json, but without --json prints lines "key value". */
 int tool_print(tool *t, json_t *object);

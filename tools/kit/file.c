@@ -160,6 +160,7 @@ int tool_writer_open(tool *t, const char *path, tool_writer *writer) {
 
 int tool_writer_close(tool *t, tool_writer *writer, int code) {
     bool keep = code == TOOL_DONE || code == TOOL_NO;
+    if (keep && tool_check_inputs(t) != TOOL_DONE) keep = false, code = TOOL_INPUT; /* mapped until here */
     fct_result result = fct_writer_close(writer->file, keep);
     *writer = (tool_writer){0};
     return keep && result != FCT_OK ? tool_result(t, result) : code;

@@ -66,6 +66,20 @@ static void a_file_beside_and_a_folder_that_is_not_there(void **state) {
     assert_int_equal(fct_spool_open(&env, path, NULL, &spool), FCT_ERROR_OUTPUT);
 }
 
+static void files_of_killed_processes_are_removed(void **state) {
+    (void)state;
+    char path[512];
+    fct_env env = fct_env_default();
+    fct_spool spool;
+    snprintf(path, sizeof path, "%s/.facetree-1-0.tmp", folder);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    fclose(file);
+    assert_int_equal(fct_spool_open(&env, folder, NULL, &spool), FCT_OK);
+    assert_false(file_exists(path));
+    fct_spool_close(&spool);
+}
+
 typedef struct numbers {
     uint64_t fail_at;
     int fills;
@@ -123,6 +137,7 @@ static int remove_folder(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(bytes_come_back),
                                        cmocka_unit_test(a_file_beside_and_a_folder_that_is_not_there),
+                                       cmocka_unit_test(files_of_killed_processes_are_removed),
                                        cmocka_unit_test(blocks_are_kept_and_replaced)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
