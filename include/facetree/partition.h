@@ -159,12 +159,12 @@ typedef struct fct_meshlet {
     uint32_t vertex_count, triangle_count;
 } fct_meshlet;
 
-/* Bounds for culling. They hold for the floats as stored: sphere and boxes contain every vertex (except for a
- * sphere of radius FLT_MAX, whose radius may be larger than a float). Every triangle faces away from `eye`
- * (its corners run clockwise) if dot(normalize(cone_apex - eye), cone_axis) >= cone_cutoff evaluated in
- * floats; the cutoff includes a margin of 1e-5 for their rounding, and the distance to the eye must be one
- * whose square is a float: 1e-18 to 1e18. If the normals span too much, the axis is 0 and the cutoff is 1,
- * and the test never passes. */
+/* Bounds for culling. They hold for the floats as stored: sphere and boxes contain every vertex, except
+ * where a radius or half extent is FLT_MAX, because the true one may be larger. Every triangle faces away
+ * from `eye` (its corners run clockwise) if dot(normalize(cone_apex - eye), cone_axis) >= cone_cutoff
+ * evaluated in floats; the cutoff includes a margin of 1e-5 for their rounding, and the distance to the eye
+ * must be one whose square is a float: 1e-18 to 1e18. If the normals span too much, the axis is 0 and the
+ * cutoff is 1, and the test never passes. */
 typedef struct fct_meshlet_bounds {
     float center[3], radius; /* sphere */
     float cone_apex[3], cone_axis[3], cone_cutoff;
