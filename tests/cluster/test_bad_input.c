@@ -27,12 +27,17 @@ static void set_face(fct_mesh *mesh, uint32_t f, uint32_t a, uint32_t b, uint32_
 /* Whether the clusters of every partition must be connected. */
 enum { NEVER, ALWAYS };
 
-/* Builds with both methods and costs and checks the trees. Releases the mesh. */
+/* Builds with both methods and costs, and once with materials, and checks the trees. Releases the mesh. */
 static void check(fct_mesh *mesh, int connected) {
     recorder r = {0};
     fct_env env = recorder_env(&r);
     fct_env plain = fct_env_default();
-    for (int option = 0; option < 4; ++option) {
+    for (int option = 0; option < 5; ++option) {
+        if (option == 4) {
+            mesh->materials = fct_allocate(&plain, mesh->face_count, sizeof *mesh->materials);
+            mesh->material_count = 3, connected = NEVER;
+            for (uint32_t f = 0; f < mesh->face_count; ++f) mesh->materials[f] = f / 5 % 3;
+        }
         fct_tree_def def = fct_tree_def_default();
         def.method = option & 1 ? FCT_CLUSTER_GREEDY : FCT_CLUSTER_ROUNDS;
         def.cost = option & 2 ? FCT_COST_MEAN : FCT_COST_INCREMENT;
