@@ -187,6 +187,52 @@ static void meshlets_are_full_and_cones_cull(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Mean over the faces of 1 - cosine of the angle to the mean normal of their meshlet, and of the squared
+ * distance to its mean centroid. */
+static void measure_spread(const fct_mesh *mesh, const fct_meshlets *m, double *angle, double *distance) {
+    *angle = *distance = 0;
+    for (uint32_t i = 0; i < m->count; ++i) {
+        v3 normal = {0, 0, 0}, middle = {0, 0, 0};
+        double squares = 0, count = m->first_face[i + 1] - m->first_face[i];
+        for (uint32_t at = m->first_face[i]; at < m->first_face[i + 1]; ++at) {
+            v3 p[3];
+            for (size_t k = 0; k < 3; ++k)
+                p[k] = v3_load(mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)m->faces[at] + k]);
+            v3 centroid = v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1.0 / 3);
+            normal = v3_add(normal, v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]))));
+            middle = v3_add(middle, centroid), squares += v3_norm2(centroid);
+        }
+        *angle += (count - v3_norm(normal)) / mesh->face_count;
+        *distance += (squares - v3_norm2(middle) / count) / mesh->face_count;
+    }
+}
+
+/* The more the weight of normals, the narrower and the longer are meshlets of sheets with folds. */
+static void flatness_trades_shape_for_cones(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    for (int run = 0; run < 6; ++run) {
+        fct_mesh mesh = make_grid(&env, 40);
+        const double slope = 0.2 + 0.2 * run, folds = 5 + run;
+        for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+            float *p = mesh.positions + 3 * (size_t)v;
+            double x = (double)p[run % 2] * folds;
+            p[2] = (float)(slope / folds * fabs(x - 2 * floor(x / 2) - 1));
+        }
+        double angles[3], distances[3];
+        for (int i = 0; i < 3; ++i) {
+            fct_meshlet_def def = fct_meshlet_def_default();
+            def.flatness = i == 0 ? 0 : i == 1 ? 1 : 100;
+            fct_meshlets m = meshlets_of(&env, &mesh, &def);
+            measure_spread(&mesh, &m, &angles[i], &distances[i]);
+            fct_meshlets_release(&env, &m);
+        }
+        assert_true(angles[2] <= angles[1] && angles[1] < 0.95 * angles[0]);
+        assert_true(distances[2] > 0.99 * distances[0]);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 static void materials_do_not_mix(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -332,6 +378,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_face_once_within_limits_and_bounds),
                                        cmocka_unit_test(bounds_hold_at_every_scale),
                                        cmocka_unit_test(meshlets_are_full_and_cones_cull),
+                                       cmocka_unit_test(flatness_trades_shape_for_cones),
                                        cmocka_unit_test(materials_do_not_mix),
                                        cmocka_unit_test(the_smallest_ball),
                                        cmocka_unit_test(bad_options_are_refused),
