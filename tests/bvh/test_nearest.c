@@ -114,13 +114,28 @@ static void searches_agree_with_brute_force(void **state) {
     agrees_with_plain_distances(&env, make_pebble(&env, 20, 3), 40);
 }
 
+/* Loose triangles with two sides along axes, so that many have exactly the same normal. */
+static fct_mesh make_shelves(const fct_env *env, uint32_t n) {
+    fct_mesh mesh = make_soup(env, n, 3);
+    uint64_t seed = 5;
+    for (uint32_t f = 0; f < n; ++f) {
+        float *p = mesh.positions + 9 * (size_t)f;
+        for (int k = 0; k < 3; ++k) p[k] = (float)floor(32 * random_unit(&seed)) / 32;
+        for (int k = 3; k < 9; ++k) p[k] = p[k % 3];
+        uint32_t axis = f % 3;
+        p[3 + axis] += 1.0f / 16, p[6 + (axis + 1 + f / 3 % 2) % 3] += 1.0f / 8;
+        for (uint32_t k = 0; k < 3; ++k) mesh.triangles[3 * (size_t)f + k] = 3 * f + k;
+    }
+    return mesh;
+}
+
 /* Among the faces within reach: the normal nearest to the wanted one, then the nearest, then the lower id. */
 static void facing_faces_win(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    fct_mesh meshes[2] = {make_soup(&env, 900, 7), make_pebble(&env, 12, 4)};
+    fct_mesh meshes[3] = {make_soup(&env, 900, 7), make_pebble(&env, 12, 4), make_shelves(&env, 900)};
     size_t found = 0, empty = 0;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < 3; ++k) {
         model m = model_make(&env, meshes[k], FCT_BACKEND_OBB);
         uint64_t seed = 13;
         for (int i = 0; i < 300; ++i) {
