@@ -1,6 +1,7 @@
 /* Queries on a scene against the same queries on all its triangles, taken to the world in double. */
 #include "support.h"
 
+#include "base/math/origin.h"
 #include "facetree/scene.h"
 #include "scene/transform.h"
 
@@ -235,11 +236,60 @@ static void equal_instances_and_order_in_a_row(void **unused) {
     fct_scene_destroy(scene);
 }
 
+/* A scene gets an origin if its coordinates exceed 512 times the longest side of its bounds: those of the
+ * turned boxes of its instances. */
+static void far_scenes_have_the_origin_of_their_bounds(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    int origins = 0, none = 0;
+    for (int run = 0; run < 60; ++run) {
+        fct_scene *scene;
+        fct_material material = {.name = "m"};
+        fct_extent extent = {.any = true, .fine = true};
+        double at[3], far = pow(10, between(2, 4.5)), largest = 0, side = 0, expected[3] = {0, 0, 0};
+        uint32_t id;
+        assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+        assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+        for (int c = 0; c < 3; ++c) {
+            extent.lower[c] = INFINITY, extent.upper[c] = -INFINITY;
+            at[c] = between(-1, 1) * far;
+        }
+        for (int i = 0; i < 1 + run % 3; ++i) {
+            float m[12];
+            fct_mesh mesh = make_grid(&env, 3);
+            random_transform(run + i, m);
+            for (int c = 0; c < 3; ++c) m[4 * c + 3] += (float)at[c];
+            assert_int_equal(fct_scene_add_object(scene, "object", &mesh, NULL, m, id, NULL), FCT_OK);
+            for (int corner = 0; corner < 4; ++corner) { /* of the unit square */
+                float p[3] = {(float)(corner % 2), (float)(corner / 2), 0};
+                v3 q = place(m, p);
+                const double x[3] = {q.x, q.y, q.z};
+                for (int c = 0; c < 3; ++c)
+                    extent.lower[c] = fmin(extent.lower[c], x[c]),
+                    extent.upper[c] = fmax(extent.upper[c], x[c]);
+            }
+            fct_mesh_release(&env, &mesh);
+        }
+        for (int c = 0; c < 3; ++c) {
+            largest = fmax(largest, fmax(fabs(extent.lower[c]), fabs(extent.upper[c])));
+            side = fmax(side, extent.upper[c] - extent.lower[c]);
+        }
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        if (largest > 512 * side) fct_extent_origin(&extent, expected);
+        ++*(largest > 512 * side ? &origins : &none);
+        fct_scene_view view = fct_scene_get(scene);
+        for (int c = 0; c < 3; ++c) assert_true(fabs(view.origin[c] - expected[c]) <= 1e-6 * side);
+        fct_scene_destroy(scene);
+    }
+    assert_true(origins > 15 && none > 15);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closest_points_are_those_of_the_flat_mesh),
         cmocka_unit_test(rays_are_those_of_the_flat_mesh),
         cmocka_unit_test(equal_instances_and_order_in_a_row),
+        cmocka_unit_test(far_scenes_have_the_origin_of_their_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

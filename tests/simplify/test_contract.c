@@ -187,6 +187,61 @@ static void a_retired_wedge_leaves_its_quadric(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* A fan whose faces have three colours at the middle: one has one face, which vanishes; its quadric goes to
+ * the colour of most faces. */
+static void the_busiest_wedge_takes_a_quadric(void **state) {
+    (void)state;
+    enum { FACES = 8 };
+    uint64_t seed = 83;
+    for (int round = 0; round < 60; ++round) {
+        /* vertices 0 to 2 lie in the middle; some order of their faces around it */
+        uint32_t counts[3] = {0, 0, 0}, lone = (uint32_t)(3 * uniform(&seed)),
+                 few = (lone + 1 + (uint32_t)round % 2) % 3;
+        uint32_t alone = 2 + (uint32_t)(4 * uniform(&seed)), most = 3 - lone - few;
+        fct_mesh mesh;
+        assert_int_equal(fct_mesh_create(&env, 3 + FACES + 1, FACES, FCT_MESH_COLORS, &mesh), FCT_OK);
+        for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+            double angle = .6 * (v - 3.);
+            float p[3] = {(float)cos(angle), (float)sin(angle), (float)between(&seed, 0, .2)},
+                  none[3] = {0, 0, 0};
+            memcpy(mesh.positions + 3 * (size_t)v, v < 3 ? none : p, sizeof p);
+            for (int k = 0; k < 3; ++k) mesh.colors[3 * v + (uint32_t)k] = (float)uniform(&seed);
+        }
+        for (uint32_t f = 0, left = 2; f < FACES; ++f) {
+            uint32_t middle = f == alone ? lone : left > 0 && f % 3 != 0 ? (--left, few) : most;
+            uint32_t t[3] = {middle, 3 + f, 4 + f};
+            memcpy(mesh.triangles + 3 * (size_t)f, t, sizeof t);
+            ++counts[middle];
+        }
+        assert_true(counts[lone] == 1 && counts[few] < counts[most]);
+        fct_simplify_def def = fct_simplify_def_default();
+        def.color_weight = .5, def.boundary_weight = 1;
+        fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+        uint32_t wedges[3];
+        for (uint32_t f = 0; f < FACES; ++f)
+            wedges[mesh.triangles[3 * (size_t)f]] = s->corner_wedges[3 * (size_t)f];
+        fct_elimination e;
+        double before[3][POSITION_QUADRIC];
+        for (int k = 0; k < 3; ++k)
+            memcpy(before[k], s->quadrics + (size_t)s->quadric_size * wedges[k], sizeof before[k]);
+        fct_quadric_eliminate(s->quadrics + (size_t)s->quadric_size * wedges[lone], s->steering,
+                              s->attributes + (size_t)s->channel_count * wedges[lone], 0, &e);
+        uint32_t ends[2] = {s->point_of[3 + alone], s->point_of[4 + alone]};
+        uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
+        fct_candidate candidate;
+        assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
+        fct_simplify_collapse(s, ends, &candidate, keep, fct_simplify_gather(s, ends[!keep], s->ring_b));
+        const double *taken = s->quadrics + (size_t)s->quadric_size * wedges[most],
+                     *kept = s->quadrics + (size_t)s->quadric_size * wedges[few];
+        for (int k = 0; k < POSITION_QUADRIC; ++k) {
+            assert_close(taken[k], before[most][k] + e.position[k], 1e-9);
+            assert_true(kept[k] == before[few][k]);
+        }
+        fct_simplifier_destroy(s);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 /* --- The first contraction of a run --- */
 
 /* Key and squared relative error of an edge, with its loss; false if it may not be contracted. */
@@ -298,6 +353,7 @@ int main(void) {
         cmocka_unit_test(the_queue_pops_within_an_eighth),
         cmocka_unit_test(contractions_update_every_array),
         cmocka_unit_test(a_retired_wedge_leaves_its_quadric),
+        cmocka_unit_test(the_busiest_wedge_takes_a_quadric),
         cmocka_unit_test(the_first_contraction_is_the_cheapest),
         cmocka_unit_test(quadrics_of_remaining_points_are_sums),
         cmocka_unit_test(max_error_is_compared_with_the_root_mean_square),

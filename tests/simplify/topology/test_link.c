@@ -215,12 +215,57 @@ static void faces_may_turn_by_84_degrees(void **state) {
     }
 }
 
+/* Height over the longest side. */
+static double find_height(v3 a, v3 b, v3 c) {
+    double longest = fmax(v3_norm(v3_sub(b, a)), fmax(v3_norm(v3_sub(c, b)), v3_norm(v3_sub(a, c))));
+    return v3_norm(v3_cross(v3_sub(b, a), v3_sub(c, a))) / longest;
+}
+
+/* A corner moves in the plane of its face, so that nothing turns. */
+static void faces_may_not_become_thin(void **state) {
+    (void)state;
+    uint64_t seed = 59;
+    uint32_t yes = 0, no = 0;
+    fct_mesh mesh = make_sheet(&env, 0, 2);
+    mesh.face_count = 1;
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_simplifier *s = open_simplifier(&env, &mesh, &def);
+    const double least = s->least_height;
+    for (int round = 0; round < 40000; ++round) {
+        uint32_t turn = (uint32_t)(3 * uniform(&seed)), points[3];
+        v3 x = v3_unit(random_vector(&seed)), y = v3_unit(v3_cross(x, random_vector(&seed))), at[4];
+        for (uint32_t k = 0; k < 3; ++k) points[k] = s->triangles[(k + turn) % 3];
+        at[0] = v3_scale(random_vector(&seed), .2);
+        at[1] = v3_mad(at[0], least * pow(10, between(&seed, -.5, 4)), x);
+        for (int k = 2; k < 4; ++k) {
+            double along = least * pow(10, between(&seed, -1, 4)),
+                   up = least * pow(10, between(&seed, -1, 4));
+            at[k] = v3_mad(v3_mad(at[0], uniform(&seed) < .5 ? along : -along, x), up, y);
+        }
+        for (int k = 0; k < 3; ++k) {
+            double *p = s->positions + 3 * (size_t)points[k];
+            p[0] = at[k].x, p[1] = at[k].y, p[2] = at[k].z;
+        }
+        double before = find_height(at[0], at[1], at[2]) / least,
+               after = find_height(at[0], at[1], at[3]) / least;
+        if (before < 1.001 || fabs(after - 1) < .001) continue;
+        uint32_t count = fct_simplify_gather(s, points[2], s->ring_a);
+        fct_simplify_begin_move(s);
+        assert_int_equal(fct_simplify_folds_over(s, s->ring_a, count, FCT_NONE, at[2], at[3]), after < 1);
+        ++*(after < 1 ? &yes : &no);
+    }
+    assert_true(yes > 1000 && no > 1000);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &mesh);
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(contractions_keep_the_topology_by_the_link_condition),
         cmocka_unit_test(rings_drop_dead_corners),
         cmocka_unit_test(faces_may_turn_by_84_degrees),
+        cmocka_unit_test(faces_may_not_become_thin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
