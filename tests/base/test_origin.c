@@ -32,6 +32,36 @@ static void far_and_fine_coordinates_get_an_origin(void **state) {
     assert_true(o[0] == 0 && o[1] == 0 && o[2] == 0);
 }
 
+/* A multiple of the least power of two that is at least the side, nearest to the centre; for sides that are
+ * powers of two, and others. */
+static void the_origin_is_a_multiple_of_the_step(void **state) {
+    (void)state;
+    uint64_t seed = 3;
+    for (int i = 0; i < 2000; ++i) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        double side = ldexp(i % 2 ? 1 : 1 + (double)(seed >> 40) * 0x1p-24, (int)(seed % 41) - 20), step = 1,
+               o[3];
+        fct_extent e = {.any = true, .fine = true};
+        for (int k = 0; k < 3; ++k) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            e.lower[k] = ((double)(seed >> 33) - 0x1p30) * side / 3,
+            e.upper[k] = e.lower[k] + (k == i % 3 ? side : side / 4);
+        }
+        double longest =
+            fmax(e.upper[0] - e.lower[0], fmax(e.upper[1] - e.lower[1], e.upper[2] - e.lower[2]));
+        if (i % 2)
+            e.lower[i % 3] = side * floor(e.lower[i % 3] / side), e.upper[i % 3] = e.lower[i % 3] + side,
+                        longest = side;
+        while (step < longest) step *= 2;
+        while (step / 2 >= longest) step /= 2;
+        assert_true(fct_extent_origin(&e, o));
+        for (int k = 0; k < 3; ++k) {
+            double centre = .5 * e.lower[k] + .5 * e.upper[k];
+            assert_true(o[k] / step == floor(o[k] / step) && fabs(o[k] - centre) <= .5 * step);
+        }
+    }
+}
+
 static void floats_get_none(void **state) {
     (void)state;
     double o[3];
@@ -89,6 +119,7 @@ static void one_point_has_none(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(far_and_fine_coordinates_get_an_origin),
+        cmocka_unit_test(the_origin_is_a_multiple_of_the_step),
         cmocka_unit_test(floats_get_none),
         cmocka_unit_test(printed_floats_are_not_fine),
         cmocka_unit_test(order_does_not_matter),

@@ -114,6 +114,28 @@ static void other_meshes_are_not_inward(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Two cones over one rough rim, with their tops at one place: their volume is rounding alone. */
+static void bodies_without_volume_are_not_inward(void **state) {
+    (void)state;
+    enum { RIM = 40 };
+    uint64_t seed = 1;
+    for (int run = 0; run < 50; ++run) {
+        fct_mesh mesh;
+        assert_int_equal(fct_mesh_create(&env, RIM + 2, 2 * RIM, 0, &mesh), FCT_OK);
+        for (size_t k = 0; k < 3 * (size_t)(RIM + 1); ++k) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            mesh.positions[k] = (float)(seed >> 40) * 0x1p-24f;
+        }
+        memcpy(mesh.positions + 3 * (RIM + 1), mesh.positions + 3 * RIM, 3 * sizeof(float));
+        for (uint32_t i = 0; i < RIM; ++i) {
+            uint32_t next = (i + 1) % RIM, t[6] = {i, next, RIM, next, i, RIM + 1};
+            memcpy(mesh.triangles + 6 * (size_t)i, t, sizeof t);
+        }
+        assert_int_equal(count_inward(&mesh), 0);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 /* Every corner has a vertex of its own. */
 static void a_soup_is_a_body(void **state) {
     (void)state;
@@ -163,6 +185,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_found_and_turned),
         cmocka_unit_test(other_meshes_are_not_inward),
+        cmocka_unit_test(bodies_without_volume_are_not_inward),
         cmocka_unit_test(a_soup_is_a_body),
         cmocka_unit_test(the_nth_allocation_fails),
     };

@@ -497,8 +497,59 @@ static void memory_runs_out(void **state) {
     fct_scene_destroy(f.scene);
 }
 
+/* Center, area and mean squared distance of lamps with any number of roots, against sums over their faces. */
+static void measures_are_those_of_all_roots(void **state) {
+    (void)state;
+    for (uint32_t roots = 1; roots <= 64; roots *= 4) {
+        fixture f = begin();
+        fct_mesh mesh = make_sphere(&plain, 12);
+        fct_tree_def def = fct_tree_def_default();
+        fct_tree *tree;
+        fct_lamp lamp;
+        def.root_count = roots;
+        for (uint32_t v = 0; v < mesh.vertex_count; ++v) /* an egg */
+            mesh.positions[3 * (size_t)v + 2] *= 2 + .5f * mesh.positions[3 * (size_t)v];
+        assert_int_equal(fct_tree_build(&plain, &mesh, &def, NULL, &tree), FCT_OK);
+        uint32_t light = place_material(f.scene, 0, 1, false);
+        assert_int_equal(fct_scene_add_object(f.scene, "egg", NULL, tree, NULL, light, NULL), FCT_OK);
+        add_ground(&f);
+        assert_int_equal(fct_scene_commit(f.scene), FCT_OK);
+        fct_scene_view view = fct_scene_get(f.scene);
+        assert_int_equal(fct_lamp_init(&plain, &view, 0, &lamp), FCT_OK);
+        assert_int_equal(fct_tree_get(lamp.tree).root_count, roots);
+        double area = 0, squares = 0, farthest = 0;
+        v3 center = {0, 0, 0};
+        for (int pass = 0; pass < 2; ++pass)
+            for (uint32_t face = 0; face < mesh.face_count; ++face) {
+                v3 p[3];
+                for (size_t k = 0; k < 3; ++k)
+                    p[k] = v3_load(mesh.positions + 3 * (size_t)mesh.triangles[3 * (size_t)face + k]);
+                v3 g = v3_scale(v3_add(p[0], v3_add(p[1], p[2])), 1. / 3);
+                double own = .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+                if (pass == 0) {
+                    area += own, center = v3_mad(center, own, g);
+                    continue;
+                }
+                v3 middle = v3_scale(center, 1 / area);
+                squares += own / area * v3_norm2(v3_sub(g, middle));
+                for (int k = 0; k < 3; ++k) {
+                    squares += own / area / 12 * v3_norm2(v3_sub(p[k], g));
+                    farthest = fmax(farthest, v3_norm(v3_sub(p[k], middle)));
+                }
+            }
+        assert_near(lamp.area, area, 1e-6);
+        assert_true(v3_norm(v3_sub(lamp.center, v3_scale(center, 1 / area))) < 1e-5);
+        assert_true(lamp.radius > farthest * (1 - 1e-6) && lamp.radius < 2 * farthest);
+        assert_true(lamp.rms2 > .8 * squares && lamp.rms2 < 1.5 * squares);
+        fct_lamp_release(&plain, &lamp);
+        fct_mesh_release(&plain, &mesh);
+        fct_scene_destroy(f.scene);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(measures_are_those_of_all_roots),
         cmocka_unit_test(parallel_squares),
         cmocka_unit_test(perpendicular_squares),
         cmocka_unit_test(equal_disks),

@@ -300,12 +300,68 @@ static void iteration_equals_a_dense_solve(void **state) {
     }
 }
 
+/* A solution that nears 1 by a factor per sweep. */
+typedef struct series {
+    double value, next, factor;
+} series;
+
+static void gather_series(void *user, size_t begin, size_t end, fct_change *sum) {
+    series *s = user;
+    (void)begin, (void)end;
+    s->next = 1 - s->factor + s->factor * s->value;
+    sum->change2 += (s->next - s->value) * (s->next - s->value), sum->norm2 += s->next * s->next;
+}
+
+static void publish_series(void *user) {
+    series *s = user;
+    s->value = s->next;
+}
+
+/* The first sweep k with |B_k - B_(k-1)| <= tolerance (1 - rho) / rho |B_k| is the last; then the error is at
+ * most the tolerance. */
+static void iteration_stops_at_the_tolerance(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    uint32_t largest = 0;
+    for (int run = 0; run < 60; ++run) {
+        double rho = .04 + .95 * (run % 12) / 12, tolerance = pow(10, -1 - run / 12);
+        fct_material materials[3] = {
+            {.reflectance = {.01f, .02f, .03f}}, {.two_sided = false}, {.two_sided = false}};
+        materials[1 + run % 2].reflectance[run % 3] = (float)rho;
+        rho = (double)(float)rho;
+        fct_elements set = {.env = &env, .view = {.materials = materials, .material_count = 3}};
+        series s = {.factor = rho}, own = {.factor = rho};
+        fct_sweep_def def = {.gather = gather_series,
+                             .publish = publish_series,
+                             .user = &s,
+                             .count = 1,
+                             .grain = 1,
+                             .tolerance = tolerance,
+                             .most = 2000};
+        fct_sweep_result done;
+        uint32_t sweeps = 0;
+        for (double change = INFINITY; change > tolerance * (1 - rho) / rho; ++sweeps) {
+            double before = own.value;
+            own.value = 1 - rho + rho * before;
+            change = (own.value - before) / own.value;
+        }
+        assert_int_equal(fct_iterate(&set, &def, &done), FCT_OK);
+        assert_true(done.converged && done.sweeps == sweeps);
+        assert_true(fabs(1 - s.value) <= tolerance * s.value * (1 + 1e-6));
+        largest = sweeps > largest ? sweeps : largest;
+        def.most = 1 + sweeps / 2, s.value = 0;
+        assert_int_equal(fct_iterate(&set, &def, &done), FCT_OK);
+        assert_true(done.converged == (def.most >= sweeps) && done.sweeps == def.most);
+    }
+    assert_true(largest > 50);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(far_links_equal_the_kernel),     cmocka_unit_test(visibility_is_the_seen_fraction),
         cmocka_unit_test(near_links_equal_the_integral),  cmocka_unit_test(fine_links_reach_closed_forms),
         cmocka_unit_test(epsilon_limits_links),           cmocka_unit_test(rows_above_one_are_scaled),
-        cmocka_unit_test(iteration_equals_a_dense_solve),
+        cmocka_unit_test(iteration_equals_a_dense_solve), cmocka_unit_test(iteration_stops_at_the_tolerance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
