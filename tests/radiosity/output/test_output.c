@@ -4,6 +4,7 @@
 #include "radiosity/output/probe.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/surface/tessellate.h"
+#include "scene/transform.h"
 
 static fct_env plain; /* outlives every scene */
 
@@ -205,8 +206,59 @@ static void probes_find_their_surface(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* Beside the rim of a sheet, at any transform, a probe belongs to the sheet if its normal is on the sheet's
+ * front, or if both sides are lit. */
+static void probes_beside_a_rim_know_the_side(void **state) {
+    (void)state;
+    uint64_t seed = 5;
+    int fronts = 0, backs = 0, none = 0;
+    for (int run = 0; run < 400; ++run) {
+        double r[12], q[4], length = 0;
+        for (int k = 0; k < 12; ++k) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            r[k] = 2 * (double)(seed >> 11) * 0x1p-53 - 1;
+        }
+        for (int k = 0; k < 4; ++k) length += r[k] * r[k];
+        for (int k = 0; k < 4; ++k) q[k] = r[k] / sqrt(length);
+        const double scale[3] = {(run & 1 ? -1 : 1) * (1 + .5 * r[4]), 1 + .5 * r[5], 1 + .5 * r[6]};
+        double m[12];
+        float transform[12], point[3], normal[3];
+        fct_transform_compose(r + 7, q, scale, m);
+        for (int k = 0; k < 12; ++k) transform[k] = (float)m[k];
+        fct_scene *scene = begin();
+        fct_mesh mesh = make_sheet(&plain, 2, v3_make(0, 0, 0), v3_make(1, 0, .2), v3_make(0, 1, .3));
+        bool both = run & 2;
+        place_mesh(scene, &mesh, place_material(scene, .5, 0, both), transform);
+        fct_mesh_release(&plain, &mesh);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        /* a little outside, beside the middle of the side through the corner; the front is that of the face
+         */
+        v3 a = fct_transform_point(transform, v3_make(0, 0, 0)),
+           b = fct_transform_point(transform, v3_make(1, 0, .2)),
+           c = fct_transform_point(transform, v3_make(0, 1, .3));
+        v3 u = v3_sub(b, a), v = v3_sub(c, a), front = v3_unit(v3_cross(u, v));
+        if (run & 1) front = v3_scale(front, -1); /* a mirrored sheet keeps its front */
+        v3 out = v3_unit(v3_cross(u, v3_cross(u, v)));
+        v3_store(point, v3_mad(v3_mad(a, .4, u), 5e-4, out));
+        v3 n = v3_unit(v3_mad(v3_mad(front, .3, out), .2, v3_unit(u)));
+        bool behind = run & 4;
+        v3_store(normal, behind ? v3_scale(n, -1) : n);
+        fct_site s = fct_probe_site(scene, point, normal);
+        bool belongs = both || !behind;
+        assert_int_equal(s.instance, belongs ? 0 : FCT_NONE);
+        if (belongs) {
+            assert_int_equal(s.back, behind);
+            assert_true(v3_norm(v3_sub(v3_load(s.point), v3_load(point))) < 6e-4);
+        }
+        ++*(!belongs ? &none : behind ? &backs : &fronts);
+        fct_scene_destroy(scene);
+    }
+    assert_true(fronts > 100 && backs > 50 && none > 50);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(probes_beside_a_rim_know_the_side),
         cmocka_unit_test(noise_on_flat_surfaces_is_smoothed),
         cmocka_unit_test(borders_are_relative_and_absolute),
         cmocka_unit_test(small_scenes_get_more_rays),
