@@ -114,6 +114,70 @@ static void normals_are_smooth_below_the_crease_angle(void **state) {
     }
 }
 
+static void cross_of(const float *a, const float *b, const float *c, double out[3]) {
+    double u[3], v[3];
+    for (int k = 0; k < 3; ++k) u[k] = (double)b[k] - (double)a[k], v[k] = (double)c[k] - (double)a[k];
+    for (int k = 0; k < 3; ++k) out[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+}
+
+static double length_of(const double v[3]) {
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* Rough and uneven grids: the normal of a corner is the sum of the area vectors of those faces around its
+ * vertex whose normals are within the crease angle of the face's own. */
+static void normals_are_sums_of_area_vectors(void **state) {
+    (void)state;
+    enum { N = 5, M = N + 1, FACES = 2 * N * N };
+    uint64_t seed = 1;
+    for (int run = 0; run < 40; ++run) {
+        float positions[3 * M * M];
+        uint32_t triangles[3 * FACES], count = 0;
+        for (int i = 0; i < 3 * M * M; ++i) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            double random = (double)(seed >> 11) * 0x1p-53, place = i % 3 == 0   ? i / 3 % M
+                                                                    : i % 3 == 1 ? i / 3 / M
+                                                                                 : 0;
+            positions[i] = (float)(place + .4 * random + .3 * place * place);
+        }
+        for (uint32_t y = 0; y < N; ++y)
+            for (uint32_t x = 0; x < N; ++x) {
+                uint32_t a = y * M + x, t[6] = {a, a + 1, a + M + 1, a, a + M + 1, a + M};
+                memcpy(triangles + count, t, sizeof t);
+                count += 6;
+            }
+        double crease = cos((5 + run) * 3.14159265358979323846 / 180), sums[FACES][3];
+        drawing d = {.mesh = {.vertex_count = M * M,
+                              .face_count = FACES,
+                              .positions = positions,
+                              .triangles = triangles},
+                     .shading = DRAWING_SMOOTH,
+                     .exposure = 1};
+        assert_int_equal(drawing_prepare(&test_tool, &d, crease, false), TOOL_DONE);
+        for (uint32_t f = 0; f < FACES; ++f) {
+            const uint32_t *t = triangles + 3 * (size_t)f;
+            cross_of(positions + 3 * t[0], positions + 3 * t[1], positions + 3 * t[2], sums[f]);
+        }
+        for (uint32_t c = 0; c < 3 * FACES; ++c) {
+            double sum[3] = {0, 0, 0}, *own = sums[c / 3];
+            bool close = false;
+            for (uint32_t f = 0; f < FACES; ++f) {
+                const uint32_t *t = triangles + 3 * (size_t)f;
+                if (t[0] != triangles[c] && t[1] != triangles[c] && t[2] != triangles[c]) continue;
+                double dot = own[0] * sums[f][0] + own[1] * sums[f][1] + own[2] * sums[f][2];
+                double cosine = dot / length_of(own) / length_of(sums[f]);
+                close = close || fabs(cosine - crease) < 1e-6;
+                for (int k = 0; k < 3 && cosine >= crease; ++k) sum[k] += sums[f][k];
+            }
+            double length = length_of(sum);
+            if (!close)
+                assert_rgb(d.normals + 3 * c, sum[0] / length, sum[1] / length, sum[2] / length, 1e-6);
+        }
+        d.mesh = (fct_mesh){0};
+        tool_release(&test_tool, d.normals);
+    }
+}
+
 static void baked_colors_are_shown_as_light(void **state) {
     (void)state;
     float positions[18], colors[18] = {0}, glow[12] = {0}, rgb[3];
@@ -174,6 +238,7 @@ int main(void) {
         cmocka_unit_test(the_filmic_curve_is_narkowiczs),
         cmocka_unit_test(the_palette_has_twelve_even_hues),
         cmocka_unit_test(normals_are_smooth_below_the_crease_angle),
+        cmocka_unit_test(normals_are_sums_of_area_vectors),
         cmocka_unit_test(baked_colors_are_shown_as_light),
         cmocka_unit_test(studio_light_is_a_sum_of_lamps),
     };
