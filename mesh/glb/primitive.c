@@ -205,6 +205,11 @@ fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_pr
     return result;
 }
 
+/* Lines are left out. Points only have vertices. */
+static bool is_left_out(const fct_glb_builder *b, int64_t mode) {
+    return mode < 4 && (mode > 0 || b->by_primitive);
+}
+
 fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
     json_t *mesh, *object, *material;
     size_t i, j, primitives = 0, with_normals = 0;
@@ -214,7 +219,7 @@ fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
         fct_glb_primitive p;
         fct_result result = fct_glb_read_primitive(b->glb, object, &p);
         if (result != FCT_OK) return result;
-        if (p.position == FCT_GLB_ABSENT || (p.mode > 0 && p.mode < 4)) continue;
+        if (p.position == FCT_GLB_ABSENT || is_left_out(b, p.mode)) continue;
         ++primitives;
         with_normals += p.normal >= 0;
         b->has_colors |= p.color >= 0 || p.radiosity >= 0;
@@ -263,7 +268,7 @@ fct_result fct_glb_append_mesh(fct_glb_builder *b, int64_t index, const fct_glb_
         if (p.position == FCT_GLB_ABSENT) continue;
         result = check_primitive(b, object, &p);
         if (result != FCT_OK) return result;
-        if (p.mode > 0 && p.mode < 4) continue;
+        if (is_left_out(b, p.mode)) continue;
         if (!share_vertices(&before, &p)) {
             first = b->soup->vertex_count;
             result = append_vertices(b, t, &p);

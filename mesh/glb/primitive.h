@@ -15,10 +15,10 @@ typedef struct fct_glb_builder {
     fct_soup *soup;
     /* The arrays that the soup gets. has_normals: every primitive has normals. */
     bool has_colors, has_normals, has_texcoords, has_materials;
-    uint32_t unnamed;  /* number of the material that primitives without one get */
-    bool by_primitive; /* faces get the number of their primitive instead of a material: primitive_count so
-                          far */
-    uint32_t primitive_count;
+    uint32_t unnamed; /* number of the material that primitives without one get */
+    /* Faces get the number of their primitive of triangles instead of a material, and points are left out. */
+    bool by_primitive;
+    uint32_t primitive_count; /* so far */
 
     size_t without_color, without_texcoord; /* vertices and corners without a value in the file */
     size_t incomplete;                      /* primitives that end with an incomplete triangle */

@@ -59,6 +59,7 @@ static fct_result list_parts(fct_gltf *d, uint32_t mesh) {
 typedef struct reader {
     fct_gltf *gltf;
     fct_glb_builder builder;
+    fct_glb_transform last; /* of the mesh read last */
 } reader;
 
 static fct_result read_mesh(void *user, const fct_glb_place *place) {
@@ -71,15 +72,18 @@ static fct_result read_mesh(void *user, const fct_glb_place *place) {
     fct_gltf_group *g = d->groups + place->mesh;
     g->placed = true;
     set_transform(g, &place->to_world);
-    fct_glb_transform to_world = {.identity = g->identity};
-    memcpy(to_world.m, g->to_world, sizeof to_world.m);
     result = list_parts(d, (uint32_t)place->mesh);
-    return result == FCT_OK ? fct_glb_append_mesh(&r->builder, place->mesh, &to_world) : result;
+    if (result != FCT_OK || !g->count) return result;
+    r->last.identity = g->identity;
+    memcpy(r->last.m, g->to_world, sizeof r->last.m);
+    return fct_glb_append_mesh(&r->builder, place->mesh, &r->last);
 }
 
 /* Reads each mesh once, those that no node of the scene has last, relative to the origin in *soup. */
 static fct_result read_soup(fct_gltf *d, fct_soup *soup) {
-    reader r = {.gltf = d, .builder = {.glb = &d->glb, .soup = soup, .by_primitive = true}};
+    reader r = {.gltf = d,
+                .builder = {.glb = &d->glb, .soup = soup, .by_primitive = true},
+                .last = {.identity = true}};
     bool unnamed;
     memset(d->groups, 0, d->group_count * sizeof *d->groups);
     d->part_count = 0;
@@ -88,7 +92,8 @@ static fct_result read_soup(fct_gltf *d, fct_soup *soup) {
     r.builder.has_materials = true;
     if (result == FCT_OK) result = fct_glb_begin_soup(&r.builder);
     if (result == FCT_OK) result = fct_glb_visit_nodes(&d->glb, read_mesh, &r);
-    fct_glb_place place = {.index = FCT_GLB_ABSENT, .to_world = {.identity = true}};
+    /* Others are put beside one of them, so that they share its local origin. */
+    fct_glb_place place = {.index = FCT_GLB_ABSENT, .to_world = r.last};
     for (; result == FCT_OK && place.mesh < (int64_t)d->group_count; ++place.mesh)
         result = read_mesh(&r, &place);
     if (result != FCT_OK) return result;

@@ -4,7 +4,6 @@
  * these groups becomes a geometry (export.h) in the space of its node. The document is copied without its
  * geometry, and its meshes get new primitives.
  */
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -241,14 +240,30 @@ static fct_result store_images(writing *w) {
     return result;
 }
 
-/* Prints an object without its last brace. Returns whether it has members. */
+/* Text that goes to a stream, except for its last byte. */
+typedef struct held_text {
+    FILE *stream;
+    size_t length;
+    char last;
+} held_text;
+
+static int hold_last_byte(const char *bytes, size_t size, void *user) {
+    held_text *t = user;
+    if (!size) return 0;
+    if (t->length) fputc(t->last, t->stream);
+    fwrite(bytes, 1, size - 1, t->stream);
+    t->last = bytes[size - 1];
+    t->length += size;
+    return 0;
+}
+
+/* Prints an object without its last brace. Returns whether it has members. (json_dumps of jansson 2.14 can
+ * lose a key without an error when memory is exhausted.) */
 static bool print_open(writing *w, const json_t *object, FILE *json) {
-    char *text = object ? json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
-    size_t length = text ? strlen(text) : 0;
-    if (!text) w->failed = true;
-    fprintf(json, "%.*s", length ? (int)(length - 1) : 0, text ? text : "");
-    free(text);
-    return length > 2;
+    held_text text = {.stream = json};
+    w->failed |=
+        !object || json_dump_callback(object, hold_last_byte, &text, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    return text.length > 2;
 }
 
 static void print_primitive(writing *w, size_t k, uint32_t i, const json_t *object, FILE *json) {

@@ -54,7 +54,7 @@ static const char *const document =
     "{\"bufferView\":3,\"componentType\":5121,\"count\":6,\"type\":\"SCALAR\"},"
     "{\"bufferView\":3,\"byteOffset\":6,\"componentType\":5121,\"count\":6,\"type\":\"SCALAR\"},"
     "{\"bufferView\":4,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},"
-    "{\"bufferView\":4,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},"
+    "{\"bufferView\":2,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},"
     "{\"bufferView\":5,\"componentType\":5121,\"count\":12,\"type\":\"SCALAR\"}],"
     "\"bufferViews\":[{\"buffer\":0,\"byteLength\":72},{\"buffer\":0,\"byteOffset\":72,\"byteLength\":48},"
     "{\"buffer\":0,\"byteOffset\":120,\"byteLength\":72},{\"buffer\":0,\"byteOffset\":192,\"byteLength\":12},"
@@ -190,6 +190,8 @@ static void the_rest_of_a_document_stays(void **state) {
                          18);
         assert_int_equal(
             json_integer_value(json_object_get(item(root, "bufferViews", view + 1), "byteLength")), 8);
+        assert_int_equal(
+            json_integer_value(json_object_get(item(root, "bufferViews", view + 1), "byteOffset")) % 4, 0);
         assert_json(item(root, "images", 2), "{\"uri\":\"lost.png\"}");
         assert_int_equal(fct_gltf_open(&env, path_of("out.glb"), &again, &copy), FCT_OK);
         assert_same_surface(&mesh, &copy);
