@@ -5,7 +5,7 @@
 
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
-#include "tools/kit/labels.h"
+#include "tools/labels.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
 

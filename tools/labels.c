@@ -1,5 +1,5 @@
-/* tools/kit/labels.c: see labels.h. Cost: linear in the faces. */
-#include "tools/kit/labels.h"
+/* tools/labels.c: see labels.h. Cost: linear in the faces. */
+#include "tools/labels.h"
 
 #include <math.h>
 #include <string.h>

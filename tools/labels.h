@@ -1,4 +1,4 @@
-/* tools/kit/labels.h: writes a number per face, as text or as a mesh with a colour per number. */
+/* tools/labels.h: writes a number per face, as text or as a mesh with a colour per number. */
 #ifndef FCT_TOOLS_LABELS_H
 #define FCT_TOOLS_LABELS_H
 
