@@ -5,9 +5,9 @@
 
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
-#include "tools/labels.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
+#include "tools/labels.h"
 
 typedef struct box_options {
     uint32_t clusters; /* 0: not given */

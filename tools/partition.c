@@ -8,9 +8,9 @@
 
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
-#include "tools/labels.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
+#include "tools/labels.h"
 
 static const double degree = 3.14159265358979323846 / 180;
 
