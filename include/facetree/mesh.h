@@ -130,9 +130,8 @@ typedef struct fct_gltf fct_gltf;
 
 /* Opens a .glb or .gltf and reads its meshes. Each mesh of the document is read once, at the place of the
  * first node that has it, however many nodes have it. mesh->materials holds the primitive of each face: a
- * number below mesh->material_count, in the order of the document; there are no material names. A warning
- * names what neither the mesh nor fct_gltf_save keeps. *out keeps the file open; env must outlive it. Errors:
- * INPUT, DATA, MEMORY, CANCELLED. */
+ * number below mesh->material_count, without a name. A warning names what neither the mesh nor fct_gltf_save
+ * keeps. *out keeps the file open; env must outlive it. Errors: INPUT, DATA, MEMORY, CANCELLED. */
 FCT_API fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, fct_mesh *mesh);
 
 /* Writes the document as a .glb with the faces of `mesh`, whose materials and origin are those of the mesh
