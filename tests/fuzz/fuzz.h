@@ -23,6 +23,7 @@ typedef struct fuzz_limit {
 enum { FUZZ_ARENA = 64 << 20, FUZZ_GAP = 64, FUZZ_FILL = 4096 };
 static _Alignas(FUZZ_GAP) uint8_t fuzz_arena[FUZZ_ARENA];
 static size_t fuzz_used, fuzz_alive;
+static bool fuzz_full; /* a request of this run has failed, because the arena was full */
 
 static inline void fuzz_require(bool condition, const char *what) {
     if (condition) return;
@@ -37,7 +38,10 @@ static inline void *fuzz_allocate(void *user, size_t size) {
         abort();
     }
     size_t block = fuzz_used + FUZZ_GAP, end = (block + size + FUZZ_GAP - 1) / FUZZ_GAP * FUZZ_GAP;
-    if (end > FUZZ_ARENA - FUZZ_GAP) return NULL;
+    if (end > FUZZ_ARENA - FUZZ_GAP) {
+        fuzz_full = true;
+        return NULL;
+    }
     uint8_t *memory = fuzz_arena + block;
     ASAN_UNPOISON_MEMORY_REGION(memory - FUZZ_GAP, sizeof size);
     memcpy(memory - FUZZ_GAP, &size, sizeof size);
@@ -68,6 +72,7 @@ static inline fct_env fuzz_env(fuzz_limit *limit, size_t size) {
     static bool poisoned;
     if (!poisoned) ASAN_POISON_MEMORY_REGION(fuzz_arena, FUZZ_ARENA);
     poisoned = true;
+    fuzz_full = false;
     *limit = (fuzz_limit){(1 << 20) + 2000 * size};
     fct_env env = fct_env_default();
     env.thread_count = 1;

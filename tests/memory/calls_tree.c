@@ -11,7 +11,8 @@ static fct_result build_with(const fct_env *env, fct_cluster_method method, fct_
     fct_tree *tree;
     fct_tree_def def = fct_tree_def_default();
     def.method = method, def.cost = cost;
-    return finish_tree(tree, STARVE(fct_tree_build(env, &inputs.sheet, &def, NULL, &tree)));
+    fct_result result = STARVE(fct_tree_build(env, &inputs.sheet, &def, NULL, &tree));
+    return finish_tree(tree, result);
 }
 
 static fct_result build_rounds(const fct_env *env) {
@@ -65,7 +66,8 @@ static fct_result save_tree(const fct_env *env) {
 
 static fct_result open_tree(const fct_env *env) {
     fct_tree *tree;
-    return finish_tree(tree, STARVE(fct_tree_open(env, IN "sheet.fct", &tree)));
+    fct_result result = STARVE(fct_tree_open(env, IN "sheet.fct", &tree));
+    return finish_tree(tree, result);
 }
 
 static fct_result verify_tree(const fct_env *env) {
