@@ -9,9 +9,9 @@
 
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
-#include "tools/labels.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
+#include "tools/labels.h"
 
 enum { KEY_VERTICES = TOOL_KEY, KEY_TRIANGLES, KEY_FLATNESS };
 
