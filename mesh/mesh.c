@@ -102,35 +102,55 @@ fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out
     return result;
 }
 
-/* Numbers the vertices of the listed faces in ascending order, and sets others to FCT_NONE. Returns the
- * count. */
-static uint32_t number_vertices(const fct_mesh *mesh, const uint32_t *faces, uint32_t count,
-                                uint32_t *numbers) {
-    if (mesh->vertex_count) memset(numbers, 0xff, mesh->vertex_count * sizeof(uint32_t));
+/* The vertices of some faces. The span from the least to the greatest is all that an extraction looks at, so
+ * that it does not take time in proportion to the whole mesh. */
+typedef struct vertex_span {
+    uint32_t first, count;
+    uint32_t *numbers; /* per vertex of the span: its number in the extracted mesh, or FCT_NONE */
+} vertex_span;
+
+static void find_span(const fct_mesh *mesh, const uint32_t *faces, uint32_t count, vertex_span *span) {
+    uint32_t least = FCT_NONE, greatest = 0;
     for (uint32_t i = 0; i < count; ++i)
-        for (int j = 0; j < 3; ++j) numbers[mesh->triangles[3 * (size_t)faces[i] + j]] = 0;
+        for (int j = 0; j < 3; ++j) {
+            uint32_t v = mesh->triangles[3 * (size_t)faces[i] + j];
+            least = v < least ? v : least;
+            greatest = v > greatest ? v : greatest;
+        }
+    *span = (vertex_span){.first = count ? least : 0, .count = count ? greatest - least + 1 : 0};
+}
+
+/* Numbers the vertices of the listed faces in ascending order. Returns their count. */
+static uint32_t number_vertices(const fct_mesh *mesh, const uint32_t *faces, uint32_t count,
+                                const vertex_span *span) {
     uint32_t used = 0;
-    for (uint32_t v = 0; v < mesh->vertex_count; ++v)
-        if (numbers[v] != FCT_NONE) numbers[v] = used++;
+    for (uint32_t i = 0; i < span->count; ++i) span->numbers[i] = FCT_NONE;
+    for (uint32_t i = 0; i < count; ++i)
+        for (int j = 0; j < 3; ++j)
+            span->numbers[mesh->triangles[3 * (size_t)faces[i] + j] - span->first] = 0;
+    for (uint32_t i = 0; i < span->count; ++i)
+        if (span->numbers[i] != FCT_NONE) span->numbers[i] = used++;
     return used;
 }
 
-static void extract_vertices(const fct_mesh *mesh, const uint32_t *numbers, fct_mesh *out, uint32_t *ids) {
-    for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
-        if (numbers[v] == FCT_NONE) continue;
-        size_t from = 3 * (size_t)v, to = 3 * (size_t)numbers[v];
+static void extract_vertices(const fct_mesh *mesh, const vertex_span *span, fct_mesh *out, uint32_t *ids) {
+    for (uint32_t i = 0; i < span->count; ++i) {
+        if (span->numbers[i] == FCT_NONE) continue;
+        uint32_t v = span->first + i;
+        size_t from = 3 * (size_t)v, to = 3 * (size_t)span->numbers[i];
         copy(out->positions + to, mesh->positions + from, 3, sizeof(float));
         if (mesh->colors) copy(out->colors + to, mesh->colors + from, 3, sizeof(float));
         if (mesh->normals) copy(out->normals + to, mesh->normals + from, 3, sizeof(float));
-        if (ids) ids[numbers[v]] = v;
+        if (ids) ids[span->numbers[i]] = v;
     }
 }
 
-static void extract_faces(const fct_mesh *mesh, const uint32_t *numbers, const uint32_t *faces,
+static void extract_faces(const fct_mesh *mesh, const vertex_span *span, const uint32_t *faces,
                           uint32_t count, fct_mesh *out) {
     for (uint32_t i = 0; i < count; ++i) {
         size_t from = faces[i], to = i;
-        for (int j = 0; j < 3; ++j) out->triangles[3 * to + j] = numbers[mesh->triangles[3 * from + j]];
+        for (int j = 0; j < 3; ++j)
+            out->triangles[3 * to + j] = span->numbers[mesh->triangles[3 * from + j] - span->first];
         if (mesh->texcoords) copy(out->texcoords + 6 * to, mesh->texcoords + 6 * from, 6, sizeof(float));
         if (mesh->face_colors)
             copy(out->face_colors + 3 * to, mesh->face_colors + 3 * from, 3, sizeof(float));
@@ -143,19 +163,22 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
                             fct_mesh *out, uint32_t **vertex_ids) {
     *out = (fct_mesh){0};
     if (vertex_ids) *vertex_ids = NULL;
-    uint32_t *ids = NULL, *numbers = fct_allocate(env, mesh->vertex_count, sizeof(uint32_t));
-    if (!numbers) return fct_fail_memory(env, "vertex numbers");
-    uint32_t used = number_vertices(mesh, faces, count, numbers);
+    uint32_t *ids = NULL;
+    vertex_span span;
+    find_span(mesh, faces, count, &span);
+    span.numbers = fct_allocate(env, span.count, sizeof(uint32_t));
+    if (!span.numbers) return fct_fail_memory(env, "vertex numbers");
+    uint32_t used = number_vertices(mesh, faces, count, &span);
     fct_result result = fct_mesh_create(env, used, count, arrays_of(mesh), out);
     if (result == FCT_OK && vertex_ids && !(ids = fct_allocate(env, used, sizeof(uint32_t))))
         result = fct_fail_memory(env, "vertex ids");
     if (result == FCT_OK) {
         memcpy(out->origin, mesh->origin, sizeof out->origin);
-        extract_vertices(mesh, numbers, out, ids);
-        extract_faces(mesh, numbers, faces, count, out);
+        extract_vertices(mesh, &span, out, ids);
+        extract_faces(mesh, &span, faces, count, out);
         result = copy_names(env, mesh, out);
     }
-    fct_release(env, numbers);
+    fct_release(env, span.numbers);
     if (result != FCT_OK) {
         fct_release(env, ids);
         fct_mesh_release(env, out);

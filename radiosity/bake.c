@@ -105,8 +105,8 @@ static fct_result solve_scene(fct_bake *bake) {
     return FCT_OK;
 }
 
-/* The work of lighting an instance, for the progress. A face of a dense mesh
- * takes less than one of a large surface. */
+/* Estimates how long an instance takes to light, in a unit of its own. The progress needs it. A face of a
+ * dense mesh takes less time than a face of a large surface. */
 static double estimate_work(const fct_scene_view *view, uint32_t instance, double max_edge) {
     const fct_instance *i = &view->instances[instance];
     const fct_tree *tree = view->models[i->model].tree;

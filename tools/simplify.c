@@ -166,8 +166,7 @@ static int run_simplify(tool *t, void *options) {
     fct_mesh mesh, simple = {0};
     fct_gltf *gltf = NULL; /* the document that is kept, if both files are glTF */
     fct_simplify_stats stats;
-    bool keeps =
-        tool_is_gltf(t, t->inputs[0]) && strcmp(t->inputs[0], "-") != 0 && tool_ends(t->output, "glb");
+    bool keeps = tool_is_gltf(t, t->inputs[0]) && tool_ends(t->output, "glb");
     int code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);

@@ -195,8 +195,7 @@ static uint64_t hash_sides_near(v3 point, const v3 p[3]) {
 }
 
 /* Whether the faces near `point` leave no gap around the ray:
- *   1. the exact ray crosses an odd number of them. It crosses a sharp tip twice, and rounding may move the
- * tip out of its way;
+ *   1. the ray crosses one of them, by exact arithmetic;
  *   2. each ray of a ring around it meets one of them;
  *   3. each side that passes near the point belongs to an even number of faces. Faces that only touch (a
  * corner on another's side, or a face without area between them) may leave a slit after rounding. Only hits
@@ -206,7 +205,7 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
     const fct_tree_view *view = &bvh->view;
     uint32_t height = 0, covered = 0;
     uint64_t unpaired = 0;
-    bool odd = false;
+    bool met = false;
     for (uint32_t r = 0; r < view->root_count; ++r) c->stack[height++] = view->roots[r];
     while (height) {
         uint32_t node = c->stack[--height];
@@ -225,14 +224,14 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
             continue;
         unpaired ^= hash_sides_near(point, p);
         measure_rim_distance(e, p, 0, 0, &at);
-        odd ^= at < farthest && crosses_exactly(bvh, e, place);
+        met = met || (at < farthest && crosses_exactly(bvh, e, place));
         for (int i = 0; i < AROUND; ++i) {
             double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
             double rim = measure_rim_distance(e, p, radius * fct_cos(angle), radius * fct_sin(angle), &at);
             if (rim >= 0 && at < farthest) covered |= 1u << i;
         }
     }
-    return odd && !unpaired && covered == (1u << AROUND) - 1;
+    return met && !unpaired && covered == (1u << AROUND) - 1;
 }
 
 /* Whether we missed a nearer hit of Embree's: cases 2 and 3 at the top of this file. A place is FCT_NONE on a

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "mesh/glb/document/accessor.h"
+
 typedef struct use_counts {
     size_t color_textures, emissive_textures, other_textures, transparent;
     size_t lights, instanced, skinned, orthographic;
@@ -120,10 +122,33 @@ static void report_counts(const fct_glb *glb, const use_counts *n) {
     report_lines(glb, lines, sizeof lines / sizeof *lines);
 }
 
-void fct_glb_report_losses(const fct_glb *glb) {
+/* Counts the primitives with a colour that is not opaque. */
+static fct_result count_clear_colors(fct_glb *glb, size_t *count) {
+    json_t *mesh, *primitive;
+    size_t i, j;
+    json_array_foreach(json_object_get(glb->root, "meshes"), i, mesh)
+        json_array_foreach(json_object_get(mesh, "primitives"), j, primitive) {
+        const fct_glb_array *colors = NULL;
+        int64_t color;
+        bool clear = false;
+        fct_result result = fct_glb_index(glb, json_object_get(primitive, "attributes"), "COLOR_0", &color);
+        if (result == FCT_OK && color == FCT_GLB_ABSENT) continue;
+        if (result == FCT_OK) result = fct_glb_array_of(glb, color, 3, 4, &colors);
+        if (result != FCT_OK) return result;
+        for (size_t v = 0; colors->width == 4 && v < colors->count && !clear; ++v)
+            clear = fct_glb_value(colors, v, 3) < 1;
+        *count += clear;
+    }
+    return FCT_OK;
+}
+
+fct_result fct_glb_report_losses(fct_glb *glb) {
     use_counts n = {0};
+    size_t clear = 0;
     count_nodes(glb, &n);
     count_primitives(glb, &n);
+    fct_result result = count_clear_colors(glb, &clear);
+    if (result != FCT_OK) return result;
     const feature_line lines[] = {
         {n.instanced, "nodes have instances (EXT_mesh_gpu_instancing), which are left out; each node places "
                       "its mesh once"},
@@ -135,8 +160,10 @@ void fct_glb_report_losses(const fct_glb *glb) {
         {n.attributed,
          "primitives have other attributes (tangents, more texture coordinates, ...), which are left "
          "out"},
+        {clear, "primitives have colours with an alpha below 1, which becomes 1"},
     };
     report_lines(glb, lines, sizeof lines / sizeof *lines);
+    return FCT_OK;
 }
 
 /* Whether another warning, or an error, already reports what the extension stands for. */

@@ -8,7 +8,9 @@
  * textures, transparency, instancing, animations, skins, morph targets, points and lines, other extensions.
  */
 void fct_glb_report_features(const fct_glb *glb);
-/* The same for what is lost when the triangles of the document are replaced. */
-void fct_glb_report_losses(const fct_glb *glb);
+/* Sends one warning with a count for each feature that fct_gltf_save leaves out: instancing, animations,
+ * skins, morph targets, points and lines, and attributes that fct_mesh has no place for. Errors: those of
+ * fct_glb_array_of. */
+fct_result fct_glb_report_losses(fct_glb *glb);
 
 #endif

@@ -118,10 +118,8 @@ static fct_result read_document(fct_gltf *d, fct_mesh *mesh) {
         soup = far;
         result = read_soup(d, &soup);
     }
-    if (result == FCT_OK) {
-        fct_glb_report_losses(&d->glb);
-        return fct_soup_mesh(d->env, d->name, &soup, mesh);
-    }
+    if (result == FCT_OK) result = fct_glb_report_losses(&d->glb);
+    if (result == FCT_OK) return fct_soup_mesh(d->env, d->name, &soup, mesh);
     fct_soup_release(d->env, &soup);
     return result;
 }
@@ -133,7 +131,8 @@ fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, f
     if (!d) return fct_fail_memory(env, "a glTF document");
     d->env = env;
     d->glb.source = &d->source, d->source.env = env;
-    d->name = fct_copy_text(env, path, strlen(path));
+    const char *name = strcmp(path, "-") != 0 ? path : "standard input";
+    d->name = fct_copy_text(env, name, strlen(name));
     d->folder = d->name ? fct_file_folder(env, path) : NULL;
     fct_result result = d->folder ? fct_file_open(env, path, &d->file) : FCT_ERROR_MEMORY;
     if (!d->name) result = fct_fail_memory(env, "a glTF document");

@@ -169,6 +169,8 @@ static fct_result copy_document(writing *w) {
     snprintf(generator, sizeof generator, "Facetree %s", fct_version());
     remove_encodings(w->root, "extensionsUsed");
     remove_encodings(w->root, "extensionsRequired");
+    if (!json_is_object(json_object_get(w->root, "asset")))
+        json_object_set_new(w->root, "asset", json_pack("{s:s}", "version", "2.0"));
     bool done = renumber_meshes(w, numbers) &&
                 !json_object_set_new(json_object_get(w->root, "asset"), "generator", json_string(generator));
     fct_release(d->env, numbers);
@@ -297,7 +299,7 @@ static void print_mesh(writing *w, size_t k, FILE *json) {
     json_decref(mesh);
 }
 
-/* The root has members, because every document has an asset. */
+/* The root has members: copy_document gives it an asset. */
 static size_t print_document(void *user, FILE *json) {
     writing *w = user;
     print_open(w, w->root, json);

@@ -240,6 +240,43 @@ static void empty_primitives_and_meshes_are_left_out(void **state) {
     fct_gltf_close(gltf);
 }
 
+/* A triangle whose second colour is half clear, in a document without an asset. */
+static void alpha_is_reported_and_an_asset_is_made(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    const char *format =
+        "{\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"COLOR_0\":1}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":5121,\"normalized\":true,\"count\":3,\"type\":\"VEC4\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},"
+        "{\"buffer\":0,\"byteOffset\":36,\"byteLength\":12}],"
+        "\"buffers\":[{\"byteLength\":48,\"uri\":\"%s\"}]}";
+    struct {
+        float corners[9];
+        unsigned char colors[12];
+    } data = {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255}};
+    for (int clear = 0; clear < 2; ++clear) {
+        char text[1024];
+        fct_gltf *gltf;
+        fct_mesh mesh;
+        if (clear) data.colors[7] = 128;
+        write_file("colors.bin", &data, 48);
+        write_file("colors.gltf", text, (size_t)snprintf(text, sizeof text, format, "colors.bin"));
+        r.text[0] = 0, r.messages = 0;
+        assert_int_equal(fct_gltf_open(&env, path_of("colors.gltf"), &gltf, &mesh), FCT_OK);
+        assert_int_equal(r.messages, clear);
+        assert_true(!clear || strstr(r.text, "alpha"));
+        assert_int_equal(fct_gltf_save(gltf, path_of("colors.glb"), &mesh, NULL), FCT_OK);
+        json_t *root = read_root("colors.glb");
+        assert_string_equal(json_string_value(json_object_get(json_object_get(root, "asset"), "version")),
+                            "2.0");
+        json_decref(root);
+        fct_mesh_release(&env, &mesh);
+        fct_gltf_close(gltf);
+    }
+}
+
 static void other_meshes_are_refused(void **state) {
     (void)state;
     recorder r = {0};
@@ -267,6 +304,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_rest_of_a_document_stays),
         cmocka_unit_test(empty_primitives_and_meshes_are_left_out),
+        cmocka_unit_test(alpha_is_reported_and_an_asset_is_made),
         cmocka_unit_test(other_meshes_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, clear);
