@@ -1,6 +1,6 @@
 /* tests/mesh/test_inspect.c: counts against pictures, brute force, and real meshes. */
 #include "base/math/vec.h"
-#include "mesh_support.h"
+#include "mesh/mesh_support.h"
 
 static fct_mesh_report inspect(const fct_env *env, const fct_mesh *mesh) {
     fct_mesh_report report;

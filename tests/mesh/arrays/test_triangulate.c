@@ -1,7 +1,7 @@
 /* tests/mesh/test_triangulate.c: triangles of polygons cover them once: areas add up and none turns over. */
 #include "base/math/vec.h"
+#include "mesh/mesh_support.h"
 #include "mesh/triangulate.h"
-#include "mesh_support.h"
 
 static v3 area_vector(const float *p, const uint32_t *corners, uint32_t count) {
     v3 sum = {0, 0, 0}, o = v3_load(p + 3 * (size_t)corners[0]);
