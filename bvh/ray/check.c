@@ -55,7 +55,7 @@ static exact_ray make_exact_ray(const fct_bvh *bvh, const fct_ray *ray) {
     return e;
 }
 
-/* Not scaled. */
+/* Loads the corners of a face, not scaled. */
 static void load_corners(const fct_bvh *bvh, uint32_t place, v3 p[3]) {
     for (size_t c = 0; c < 3; ++c)
         p[c] = v3_load(bvh->view.positions + 3 * (size_t)bvh->view.triangles[3 * (size_t)place + c]);

@@ -56,9 +56,9 @@ static void add_determinant(expansion *e, double sign, v3 a, v3 b, v3 c) {
     add_product(e, z, b.x, c.y), add_product(e, -z, b.y, c.x);
 }
 
-/* On which side of the edge a b the line passes: 1 or -1, or 0 if the edge is a point seen along the line.
- * Where the line meets the edge, the sign of the first shift e of the origin decides that changes the
- * determinant: the change is det(d, e, a - b) times the shift. */
+/* On which side of the edge a b the line passes: 1 or -1, or 0 if the edge is a point seen along the line. If
+ * the line meets the edge, the origin is shifted along x; if that changes nothing, along y, then along z. A
+ * shift s e changes the determinant by s det(d, e, a - b). */
 static int find_side(v3 o, v3 d, v3 a, v3 b) {
     static const v3 shifts[3] = {{.x = 1}, {.y = 1}, {.z = 1}};
     expansion e = {.count = 0};

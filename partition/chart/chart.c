@@ -37,7 +37,7 @@ fct_chart_def fct_chart_def_default(void) {
                            .max_area = INFINITY};
 }
 
-/* The area of a cluster, also where no float is near it. */
+/* The area of a cluster. If the stored float is 0 or infinite, its faces give the area. */
 static double find_area(const fct_tree_view *view, const fct_cluster *c) {
     double area = 0;
     if (c->area >= FLT_MIN && c->area < FLT_MAX) return (double)c->area;
