@@ -8,8 +8,8 @@ The lists are tests/mutation/NAME.json, one per folder of the library. Each entr
   tests     regular expression (ctest -R) of the tests that should fail
   survives  optional: why no test can or need detect this mutant; it then counts as explained
 
-For each mutant the script changes the copy, builds the tests that the expression names, and runs them until one fails. It
-then restores the file. The exit code is 0 if at least 95 % of all mutants die and every survivor is explained, 1 if not, and 2
+For each mutant the script changes the copy, builds the tests that the expression names, and runs them until one fails: the
+quick ones together, then the slow ones one by one, the quickest first. It then restores the file. The exit code is 0 if at least 95 % of all mutants die and every survivor is explained, 1 if not, and 2
 if an entry is wrong (the text is absent or occurs twice, or the mutant does not compile).
 
 The copy is built with -O1, without the real meshes of FACETREE_DATA, so that generated meshes must do. It stays in --copy for
@@ -31,6 +31,7 @@ from queue import Queue
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LISTS = ROOT / "tests" / "mutation"
 GOAL = 0.95
+QUICK = 1.0  # seconds of a test that runs together with others
 
 
 def parse_arguments():
@@ -107,11 +108,12 @@ class Copy:
             wanted.add(target if re.search(r"^(bin/)?%s: " % target, targets, re.M) else "facetree_program")
         return self.run("ninja", "-C", str(self.build), "-j", self.jobs, *sorted(wanted))
 
-    def run_tests(self, expression):
-        return self.run("ctest", "--test-dir", str(self.build), "-R", expression, "-j", self.jobs, "--stop-on-failure",
-                        "--timeout", self.timeout)
+    def run_tests(self, tests):
+        return self.run("ctest", "--test-dir", str(self.build), "-R", "^(%s)$" % "|".join(map(re.escape, tests)), "-j", self.jobs,
+                        "--stop-on-failure", "--timeout", self.timeout)
 
-    def try_mutant(self, mutant):
+    def try_mutant(self, mutant, seconds):
+        """Returns killed, survived or wrong, and a note. seconds: of each test without a mutant."""
         path = self.root / mutant["file"]
         if not path.exists():
             return "wrong", "no such file"
@@ -123,15 +125,24 @@ class Copy:
             return "wrong", "no test matches"
         try:
             path.write_text(text.replace(mutant["from"], mutant["to"]))
-            built = self.build_tests(tests)
-            if built.returncode:
-                errors = [line for line in built.stdout.split("\n") if "error:" in line]
-                return "wrong", "does not compile: " + (errors[0] if errors else built.stdout[-300:])
-            done = self.run_tests(mutant["tests"])
+            for group in group_tests(tests, seconds):
+                built = self.build_tests(group)
+                if built.returncode:
+                    errors = [line for line in built.stdout.split("\n") if "error:" in line]
+                    return "wrong", "does not compile: " + (errors[0] if errors else built.stdout[-300:])
+                done = self.run_tests(group)
+                if done.returncode:
+                    return "killed", ", ".join(re.findall(r"(\S+) +\.+\**(?:Failed|\*+Failed|.*Timeout|.*Exception)", done.stdout))
         finally:
             path.write_text(text)
-        failed = re.findall(r"(\S+) +\.+\**(?:Failed|\*+Failed|.*Timeout|.*Exception)", done.stdout)
-        return ("killed", ", ".join(failed)) if done.returncode else ("survived", "")
+        return "survived", ""
+
+
+def group_tests(tests, seconds):
+    """Quick tests in one group, then each slow one alone, the quickest first."""
+    quick = [test for test in tests if seconds.get(test, QUICK) < QUICK]
+    slow = sorted((test for test in tests if test not in quick), key=lambda test: seconds.get(test, QUICK))
+    return ([quick] if quick else []) + [[test] for test in slow]
 
 
 def describe_line(mutant):
@@ -143,15 +154,16 @@ def describe_line(mutant):
                                     " ".join(mutant["to"].split())[:70] or "(nothing)")
 
 
-def check_originals(copy, mutants):
-    """The tests must pass before any mutant, or a failure says nothing."""
-    expression = "|".join(sorted({"(%s)" % mutant["tests"] for mutant in mutants}))
-    built = copy.build_tests(copy.name_tests(expression))
+def time_originals(copy, mutants):
+    """Returns the seconds of each test without a mutant. All must pass, or a failure says nothing."""
+    tests = copy.name_tests("|".join(sorted({"(%s)" % mutant["tests"] for mutant in mutants})))
+    built = copy.build_tests(tests)
     if built.returncode:
         sys.exit("the unchanged copy does not build:\n" + built.stdout[-2000:])
-    done = copy.run_tests(expression)
+    done = copy.run_tests(tests)
     if done.returncode:
         sys.exit("tests fail without any mutant:\n" + done.stdout[-2000:])
+    return {test: float(time) for test, time in re.findall(r"(\S+) +\.+ +Passed +([\d.]+) sec", done.stdout)}
 
 
 def main():
@@ -166,14 +178,14 @@ def main():
     for worker in range(arguments.workers):
         copies.put(Copy(os.path.join(arguments.copy, str(worker)), jobs, arguments.timeout))
     first = copies.get()
-    check_originals(first, mutants)
+    seconds = time_originals(first, mutants)
     copies.put(first)
 
     def work(mutant):
         copy = copies.get()
         begin = time.time()
         try:
-            result, detail = copy.try_mutant(mutant)
+            result, detail = copy.try_mutant(mutant, seconds)
         finally:
             copies.put(copy)
         note = detail or mutant.get("survives", "")
