@@ -15,14 +15,23 @@
 #include "base/parallel.h"
 #include "cluster/large/large.h"
 
-enum { BITS = FCT_CURVE_BITS, STRETCH_BITS = 20, STRETCHES = 1 << STRETCH_BITS, ROWS = 1 << 16 };
+enum {
+    BITS = FCT_CURVE_BITS,
+    STRETCH_BITS = 20,
+    STRETCHES = 1 << STRETCH_BITS,
+    PAGE = 256, /* stretches */
+    PAGES = STRETCHES / PAGE,
+    ROWS = 1 << 16
+};
 
 typedef struct cutter {
     fct_large *large;
     uint32_t *codes;  /* per vertex: number on the curve */
     uint16_t *owners; /* per vertex: part of its first face; UINT16_MAX: none yet */
-    uint32_t *counts; /* per stretch: number of faces, later the stretch's group */
-    uint32_t *used;   /* one bit per vertex: a face uses it */
+    uint32_t *pages;  /* per page of stretches: 1 + its place in counts; 0: no face has its stretches */
+    uint32_t *counts; /* per stretch of these pages: number of faces, later the stretch's group */
+    size_t page_count, count_capacity;
+    uint32_t *used; /* one bit per vertex: a face uses it */
     float *positions;
     uint32_t *triangles, *materials; /* room for ROWS faces */
     double origin[3], scale;
@@ -120,6 +129,22 @@ static uint32_t stretch_of(const cutter *c, uint32_t vertex) {
     return c->codes[vertex] >> (3 * BITS - STRETCH_BITS);
 }
 
+/* The entry of counts of the stretch of a vertex whose page exists. */
+static uint32_t *count_of(const cutter *c, uint32_t vertex) {
+    uint32_t stretch = stretch_of(c, vertex);
+    return &c->counts[(size_t)(c->pages[stretch / PAGE] - 1) * PAGE + stretch % PAGE];
+}
+
+static fct_result add_page(cutter *c, uint32_t page) {
+    if (c->pages[page]) return FCT_OK;
+    fct_result result = fct_grow(c->large->env, (void **)&c->counts, &c->count_capacity,
+                                 (c->page_count + 1) * PAGE, sizeof *c->counts);
+    if (result != FCT_OK) return result;
+    memset(c->counts + c->page_count * PAGE, 0, PAGE * sizeof *c->counts);
+    c->pages[page] = (uint32_t)++c->page_count;
+    return FCT_OK;
+}
+
 /* Counts the faces of each stretch, marks used vertices, and raises material_count to the highest id + 1. */
 static fct_result count_faces(cutter *c) {
     fct_large *l = c->large;
@@ -131,7 +156,9 @@ static fct_result count_faces(cutter *c) {
         for (size_t i = 0; i < 3 * (size_t)rows; ++i)
             c->used[c->triangles[i] / 32] |= 1u << c->triangles[i] % 32;
         for (size_t i = 0; i < rows; ++i) {
-            ++c->counts[stretch_of(c, c->triangles[3 * i])];
+            result = add_page(c, stretch_of(c, c->triangles[3 * i]) / PAGE);
+            if (result != FCT_OK) return result;
+            ++*count_of(c, c->triangles[3 * i]);
             if (c->materials && c->materials[i] >= l->info.material_count)
                 l->info.material_count = c->materials[i] + 1;
         }
@@ -144,11 +171,12 @@ static fct_result cut_curve(cutter *c) {
     fct_large *l = c->large;
     uint64_t faces = l->info.face_count, groups = (faces + l->part_faces - 1) / l->part_faces, before = 0;
     if (groups > STRETCHES) groups = STRETCHES;
-    for (uint32_t s = 0; s < STRETCHES; ++s) {
-        uint32_t count = c->counts[s];
-        c->counts[s] = (uint32_t)((before + count / 2) * groups / faces);
-        before += count;
-    }
+    for (uint32_t p = 0; p < PAGES; ++p)
+        for (uint32_t s = 0; s < PAGE && c->pages[p]; ++s) {
+            uint32_t *entry = &c->counts[(size_t)(c->pages[p] - 1) * PAGE + s], count = *entry;
+            *entry = (uint32_t)((before + count / 2) * groups / faces);
+            before += count;
+        }
     c->group_count = (uint32_t)groups;
     c->current = fct_allocate(l->env, c->group_count, sizeof *c->current);
     if (!c->current) return fct_fail_memory(l->env, "the parts of a mesh");
@@ -195,7 +223,7 @@ static fct_result add_part(cutter *c) {
 static fct_result put_face(cutter *c, uint32_t face, size_t row) {
     fct_large *l = c->large;
     const uint32_t *t = c->triangles + 3 * row;
-    uint32_t *current = &c->current[c->counts[stretch_of(c, t[0])]];
+    uint32_t *current = &c->current[*count_of(c, t[0])];
     if (*current == FCT_NONE || l->parts[*current].face_count >= l->part_faces + l->part_faces / 4) {
         fct_result result = *current == FCT_NONE ? FCT_OK : flush(c, *current);
         if (result == FCT_OK) result = add_part(c);
@@ -247,14 +275,14 @@ fct_result fct_large_cut(fct_large *large) {
     cutter c = {.large = large};
     c.codes = fct_allocate(env, vertices, sizeof *c.codes);
     c.owners = fct_allocate(env, vertices, sizeof *c.owners);
-    c.counts = fct_allocate_zero(env, STRETCHES, sizeof *c.counts);
+    c.pages = fct_allocate_zero(env, PAGES, sizeof *c.pages);
     c.used = fct_allocate_zero(env, words, sizeof *c.used);
     large->shared = fct_allocate_zero(env, words, sizeof *large->shared);
     c.positions = fct_allocate(env, ROWS, 3 * sizeof *c.positions);
     c.triangles = fct_allocate(env, ROWS, 3 * sizeof *c.triangles);
     if (large->info.materials) c.materials = fct_allocate(env, ROWS, sizeof *c.materials);
     fct_result result;
-    if (!c.codes || !c.owners || !c.counts || !c.used || !large->shared || !c.positions || !c.triangles ||
+    if (!c.codes || !c.owners || !c.pages || !c.used || !large->shared || !c.positions || !c.triangles ||
         (large->info.materials && !c.materials)) {
         result = fct_fail_memory(env, "the parts of a mesh");
     } else {
@@ -263,6 +291,7 @@ fct_result fct_large_cut(fct_large *large) {
     }
     fct_release(env, c.codes);
     fct_release(env, c.owners);
+    fct_release(env, c.pages);
     fct_release(env, c.counts);
     fct_release(env, c.used);
     fct_release(env, c.positions);

@@ -142,7 +142,7 @@ static fct_result write_triangles(vertex_writer *w, uint32_t *rows) {
 static fct_result write_vertices(const mesh_writer *m) {
     const fct_env *env = m->large->env;
     size_t vertices = m->large->info.vertex_count;
-    vertex_writer *w = fct_allocate_zero(env, 1, sizeof *w);
+    vertex_writer *w = fct_allocate(env, 1, sizeof *w);
     uint32_t *rows = fct_allocate(env, ROWS, 3 * sizeof *rows);
     uint32_t *renamed = fct_allocate(env, vertices, sizeof *renamed);
     fct_result result = FCT_OK;
@@ -150,6 +150,7 @@ static fct_result write_vertices(const mesh_writer *m) {
         result = fct_fail_memory(env, "a hierarchy file");
     } else {
         w->mesh = m, w->renamed = renamed;
+        w->used = w->waiting = 0;
         memset(renamed, 0xFF, vertices * sizeof *renamed);
         result = fct_lookup_open(m->large, m->large->budget / 4, &w->lookup);
         if (result == FCT_OK) result = write_triangles(w, rows);
