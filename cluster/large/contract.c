@@ -15,6 +15,9 @@
 #include "cluster/merge/greedy.h"
 #include "cluster/merge/join.h"
 
+/* A sum of float lengths below this share of their magnitudes is 0. */
+#define ROUNDING 1e-6
+
 typedef struct upper {
     fct_large *large;
     fct_work work;
@@ -108,8 +111,13 @@ static fct_result read_edges(upper *u, const fct_top_edge *from, uint32_t count,
     u->large->component_count = components;
     fct_result result = fct_sort_pairs(work->env, keys, order, listed);
     for (uint32_t i = 0, end; i < listed && result == FCT_OK; i = end) {
-        double shared = 0;
-        for (end = i; end < listed && keys[end] == keys[i]; ++end) shared += (double)from[order[end]].shared;
+        double shared = 0, size = 0;
+        bool reduced = false;
+        for (end = i; end < listed && keys[end] == keys[i]; ++end) {
+            double length = (double)from[order[end]].shared;
+            shared += length, size += fabs(length), reduced |= signbit(length) != 0;
+        }
+        if (reduced && shared <= ROUNDING * size) continue; /* seam.c took back the whole border */
         work->edges[work->edge_count++] =
             (fct_edge){(uint32_t)(keys[i] >> 32), (uint32_t)keys[i], (float)fmax(shared, 0)};
     }
@@ -170,8 +178,8 @@ static void make_monotone(upper *u) {
         for (int k = 0; k < 2; ++k) {
             uint32_t child = work->children[m][k];
             const fct_top *top = child < count ? &u->large->all_tops[child] : NULL;
-            bool same =
-                top ? top->phase == phase : child - count >= (phase ? work->phase_ends[phase - 1] : 0);
+            bool same = top ? top->count > 1 && top->phase == phase
+                            : child - count >= (phase ? work->phase_ends[phase - 1] : 0);
             float cost = top ? top->cost : work->costs[child - count];
             if (same && cost > work->costs[m]) work->costs[m] = cost;
         }
