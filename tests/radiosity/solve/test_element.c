@@ -281,12 +281,202 @@ static void touched_pages_are_few(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* The point at fraction t of an element's area, worked out from the model's face order: under any transform
+ * the shares of a surface's faces are those of the model, and those of a volume's roots are the roots' world
+ * areas. Returns false if t lies on the border between two faces. */
+static bool find_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
+                        fct_element_point *out) {
+    const fct_element *e = &set->items[id];
+    while (e->kind == FCT_ELEMENT_VOLUME) {
+        double sum = 0, before = 0;
+        for (uint32_t k = 0; k < e->child_count; ++k) sum += set->items[e->child + k].area;
+        uint32_t k = 0;
+        while (k + 1 < e->child_count && before + set->items[e->child + k].area <= t * sum)
+            before += set->items[e->child + k++].area;
+        t = (t * sum - before) / set->items[e->child + k].area;
+        if (t < 1e-4 || t > 1 - 1e-4) return false;
+        e = &set->items[e->child + k];
+    }
+    const fct_instance *in = &set->view.instances[e->instance];
+    fct_tree_view tree = fct_tree_get(set->view.models[in->model].tree);
+    fct_element_range r = set->ranges[e - set->items];
+    double sum = 0, before = 0;
+    for (int pass = 0; pass < 2; ++pass)
+        for (uint32_t place = r.first; place < r.first + r.count; ++place) {
+            const uint32_t *c = tree.triangles + 3 * (size_t)place;
+            v3 x[3];
+            for (int k = 0; k < 3; ++k) x[k] = v3_load(tree.positions + 3 * (size_t)c[k]);
+            double area = v3_norm(v3_cross(v3_sub(x[1], x[0]), v3_sub(x[2], x[0])));
+            if (pass == 0) {
+                sum += area;
+            } else if (r.count == 1 || before + area > t * sum) {
+                if (r.count > 1 && (t * sum < before + 1e-5 * sum || t * sum > before + area - 1e-5 * sum))
+                    return false;
+                out->place = place;
+                break;
+            } else {
+                before += area;
+            }
+        }
+    v3 p[3];
+    load(set, e, out->place, p);
+    bool turn = in->mirrored != (e->back != 0); /* load has exchanged corners 1 and 2 */
+    if (e->kind == FCT_ELEMENT_TRIANGLE)
+        for (int k = 0; k < 3; ++k)
+            p[k] = v3_load(set->corners + 9 * (size_t)e->triangle + 3 * (turn && k ? 3 - k : k));
+    double v = b * sqrt(a), u = sqrt(a) - v;
+    v3 first = v3_sub(p[turn ? 2 : 1], p[0]), second = v3_sub(p[turn ? 1 : 2], p[0]);
+    v3 x = v3_mad(v3_mad(p[0], u, first), v, second), s = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+    v3_store(out->position, x), v3_store(out->normal, v3_unit(s));
+    out->u = (float)u, out->v = (float)v;
+    out->offset = (float)(1e-4 * sqrt(v3_norm(s)) + 2e-7 * fmax(fabs(x.x), fmax(fabs(x.y), fabs(x.z))));
+    return true;
+}
+
+static void samples_equal_the_face_at_their_fraction(void **state) {
+    (void)state;
+    fct_scene *scene = make_scene(true);
+    fct_elements set = open_all(scene, .5);
+    size_t tested = 0;
+    for (uint32_t id = 0; id < set.count; ++id)
+        for (uint64_t k = 0; k < 12; ++k) {
+            double t = fct_uniform(fct_hash3(id, k, 0)), a = fct_uniform(fct_hash3(id, k, 1)),
+                   b = fct_uniform(fct_hash3(id, k, 2));
+            fct_element_point p, q = {.place = FCT_NONE};
+            if (!find_sample(&set, id, t, a, b, &q)) continue;
+            fct_element_sample(&set, id, t, a, b, &p);
+            assert_int_equal(p.place, q.place);
+            assert_same(v3_load(p.position), v3_load(q.position), 2e-6 * (1 + v3_norm(v3_load(q.position))));
+            assert_same(v3_load(p.normal), v3_load(q.normal), 1e-4);
+            assert_near(p.u, q.u, 1e-6), assert_near(p.v, q.v, 1e-6);
+            assert_near(p.offset, q.offset, 1e-4 * q.offset);
+            ++tested;
+        }
+    assert_true(tested > 10 * set.count);
+    /* The stored points are those of the sixteenths. */
+    fct_elements_make_points(&set);
+    for (uint32_t id = 0; id < set.count; id += 3)
+        for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
+            const fct_element_point *p = &set.points[id * FCT_ELEMENT_POINTS + k];
+            uint32_t last = 0, first = FCT_NONE;
+            for (int i = 0; i <= 40; ++i) {
+                fct_element_point q;
+                fct_element_sample(&set, id, fmin((k + i / 40.) / 16, 1 - 1e-9), .5, .5, &q);
+                if (set.items[id].kind == FCT_ELEMENT_VOLUME) continue;
+                first = q.place < first ? q.place : first, last = q.place > last ? q.place : last;
+            }
+            assert_true(first == FCT_NONE || (p->place >= first && p->place <= last));
+        }
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
+/* Children start with their parent's light. Radii bound the boxes: the way to the centre of the box and its
+ * half diagonal, stretched by the scale or by the Frobenius norm. */
+static void children_inherit_light(void **state) {
+    (void)state;
+    fct_scene *scene = make_scene(true);
+    fct_elements set;
+    assert_int_equal(fct_elements_create(&plain, scene, .3, &set), FCT_OK);
+    for (size_t id = 0; id < set.count; ++id) {
+        fct_element *e = &set.items[id];
+        for (uint64_t c = 0; c < 3; ++c) {
+            e->radiosity[c] = fct_uniform(fct_hash3(id, c, 1)),
+            e->irradiance[c] = fct_uniform(fct_hash3(id, c, 2));
+            e->power[c] = v3_make(1, 2, 3);
+        }
+        if (!fct_elements_can_split(&set, (uint32_t)id)) continue;
+        assert_int_equal(fct_elements_split(&set, (uint32_t)id), FCT_OK);
+        e = &set.items[id];
+        assert_false(fct_elements_can_split(&set, (uint32_t)id));
+        for (uint32_t k = e->child; k < e->child + e->child_count; ++k) {
+            const fct_element *child = &set.items[k];
+            assert_true(child->parent == id && child->child_count == 0 && child->back == e->back);
+            assert_true(child->instance == e->instance);
+            for (int c = 0; c < 3; ++c) {
+                assert_near(child->radiosity[c], e->radiosity[c], 0);
+                assert_near(child->irradiance[c], e->irradiance[c], 0);
+                assert_same(child->power[c], v3_scale(child->vector, e->radiosity[c]), 1e-12);
+                assert_true(child->reflectance[c] == e->reflectance[c] &&
+                            child->emission[c] == e->emission[c]);
+            }
+        }
+    }
+    for (size_t id = set.view.volume_count; id < set.count; ++id) {
+        const fct_element *e = &set.items[id];
+        const fct_instance *in = &set.view.instances[e->instance];
+        const fct_tree *tree = set.view.models[in->model].tree;
+        fct_cluster c;
+        double radius = 0;
+        if (e->kind == FCT_ELEMENT_TRIANGLE) {
+            for (int k = 0; k < 3; ++k)
+                radius =
+                    fmax(radius,
+                         v3_norm(v3_sub(v3_load(set.corners + 9 * (size_t)e->triangle + 3 * k), e->center)));
+        } else {
+            assert_int_equal(fct_tree_cluster(tree, e->node, &c), FCT_OK);
+            double middle[3], frobenius = 0, x[3] = {e->center.x, e->center.y, e->center.z}, way = 0;
+            for (int r = 0; r < 3; ++r) {
+                middle[r] = in->to_world[4 * r + 3];
+                for (int k = 0; k < 3; ++k) {
+                    middle[r] += (double)in->to_world[4 * r + k] * c.box_center[k];
+                    frobenius += pow(in->to_world[4 * r + k], 2);
+                }
+                way += pow(middle[r] - x[r], 2);
+            }
+            radius = sqrt(way) +
+                     v3_norm(v3_load(c.box_half)) * sqrt(in->uniform_scale > 0 ? frobenius / 3 : frobenius);
+            assert_near(e->cone, in->uniform_scale > 0 ? c.cone_angle : FCT_PI, 1e-6);
+        }
+        assert_near(e->radius, radius, 1e-4 * radius);
+    }
+    for (size_t id = 0; id < set.view.volume_count; ++id) {
+        const fct_element *e = &set.items[id];
+        double radius = 0, area = 0;
+        for (uint32_t k = e->child; k < e->child + e->child_count; ++k) {
+            const fct_element *child = &set.items[k];
+            assert_int_equal(child->parent, id);
+            radius = fmax(radius, v3_norm(v3_sub(child->center, e->center)) + child->radius),
+            area += child->area;
+        }
+        assert_near(e->radius, radius, 1e-9 * radius), assert_near(e->area, area, 1e-9 * area);
+        assert_near(e->cone, FCT_PI, 0);
+        double moment[6] = {0};
+        for (uint32_t k = e->child; k < e->child + e->child_count; ++k)
+            for (int m = 0; m < 6; ++m) moment[m] += set.items[k].moment[m];
+        for (int m = 0; m < 6; ++m) assert_near(e->moment[m], moment[m], 1e-9 * area);
+    }
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
+/* With every element open and no points yet, the pages read are those of all nodes, faces and vertices. */
+static void touched_pages_are_counted(void **state) {
+    (void)state;
+    plain = fct_env_default();
+    for (uint32_t n = 4; n < 64; n *= 2) {
+        fct_scene *scene;
+        assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &scene), FCT_OK);
+        place_sheet(&plain, scene, place_material(scene, .5, 1, false), n, v3_make(0, 0, 0), v3_make(1, 0, 0),
+                    v3_make(0, 1, 0));
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_elements set = open_all(scene, 10);
+        uint64_t faces = 2 * n * n, nodes = faces - 1, vertices = (n + 1) * (n + 1), pages = 0;
+        const uint64_t sizes[3] = {nodes * sizeof(fct_cluster), faces * 12, vertices * 12};
+        for (int k = 0; k < 3; ++k) pages += (sizes[k] + 4095) / 4096;
+        assert_int_equal(fct_elements_touched(&set), 4096 * pages);
+        fct_elements_release(&set);
+        fct_scene_destroy(scene);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sums_equal_direct_sums),  cmocka_unit_test(quarters_tile_their_triangle),
         cmocka_unit_test(samples_follow_the_area), cmocka_unit_test(leaves_contain_their_points),
         cmocka_unit_test(points_are_stratified),   cmocka_unit_test(pull_weighs_by_area),
-        cmocka_unit_test(touched_pages_are_few),
+        cmocka_unit_test(touched_pages_are_few),   cmocka_unit_test(samples_equal_the_face_at_their_fraction),
+        cmocka_unit_test(children_inherit_light),  cmocka_unit_test(touched_pages_are_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

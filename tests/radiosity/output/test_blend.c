@@ -1,0 +1,342 @@
+/* Anchors against a plain evaluation in double: the rays of one gather, the groups of a surface, and blends
+ * of random anchors among walls. */
+#include "../place.h"
+#include "../soup.h"
+#include "radiosity/output/anchor.h"
+#include "radiosity/output/blend.h"
+#include "radiosity/solve/transport.h"
+#include "radiosity/surface/tessellate.h"
+
+static fct_env plain; /* outlives every scene */
+
+static void assert_near(double value, double expected, double tolerance) {
+    if (!(fabs(value - expected) <= tolerance))
+        fail_msg("%.9g, expected %.9g within %g", value, expected, tolerance);
+}
+
+/* A number in [0, 1). */
+static double pick(uint64_t a, uint64_t b, uint64_t c) {
+    return fct_uniform(fct_hash3(a, b, c));
+}
+
+/* A room with random sheets inside, and a bumpy ball as the last instance. Every leaf shines in a colour of
+ * its own. */
+typedef struct room {
+    fct_scene *scene;
+    fct_elements set;
+    float *stored;
+    soup triangles;
+    uint32_t ball;
+} room;
+
+static room make_room(uint64_t seed) {
+    room r = {.ball = 14};
+    plain = fct_env_default();
+    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &r.scene), FCT_OK);
+    uint32_t grey = place_material(r.scene, .5, 0, false), two = place_material(r.scene, .5, 0, true);
+    fct_mesh cube = make_sphere(&plain, 3), ball = make_bumpy(&plain, 9, .25);
+    for (size_t t = 0; t < cube.face_count; ++t) {
+        uint32_t *c = cube.triangles + 3 * t, swap = c[1];
+        c[1] = c[2], c[2] = swap;
+    }
+    const float wide[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0};
+    place_mesh(r.scene, &cube, grey, wide);
+    for (uint64_t k = 0; k < 13; ++k)
+        place_sheet(&plain, r.scene, k & 1 ? two : grey, 1,
+                    v3_make(2 * pick(seed, k, 0) - 1, 2 * pick(seed, k, 1) - 1, pick(seed, k, 2) - .5),
+                    v3_make(.4 * pick(seed, k, 3), .4, .3 * pick(seed, k, 4)),
+                    v3_make(.4, -.2, pick(seed, k, 5) - .5));
+    const float place[12] = {.6F, 0, 0, .2F, 0, .6F, 0, .5F, 0, 0, .6F, 0};
+    place_mesh(r.scene, &ball, two, place);
+    fct_mesh_release(&plain, &cube), fct_mesh_release(&plain, &ball);
+    assert_int_equal(fct_scene_commit(r.scene), FCT_OK);
+    assert_int_equal(fct_elements_create(&plain, r.scene, 1, &r.set), FCT_OK);
+    for (uint32_t id = 0; id < r.set.count; ++id)
+        if (fct_elements_can_split(&r.set, id)) assert_int_equal(fct_elements_split(&r.set, id), FCT_OK);
+    r.stored = malloc(3 * r.set.count * sizeof *r.stored);
+    for (size_t i = 0; i < 3 * r.set.count; ++i)
+        r.stored[i] = (float)(pick(seed, i, 6) * pick(seed, i / 30, 7));
+    r.triangles = list_triangles(r.scene);
+    return r;
+}
+
+static void end_room(room *r) {
+    free(r->stored), free(r->triangles.corners);
+    fct_elements_release(&r->set);
+    fct_scene_destroy(r->scene);
+}
+
+/* E = mean b, gradient = mean of b d / max(cos, .15), reach = harmonic mean distance. */
+static void gather_plainly(const room *r, uint32_t rays, uint64_t seed, fct_anchor *a) {
+    double e[3] = {0}, g[3][3] = {{0}}, inverse = 0;
+    for (uint32_t k = 0; k < rays; ++k) {
+        double u[2];
+        float origin[3], direction[3];
+        fct_plane_point(k, seed, u);
+        v3 n = v3_load(a->normal), d = fct_cosine_direction(n, u[0], u[1]);
+        for (int c = 0; c < 3; ++c)
+            origin[c] = (float)((double)a->position[c] + (double)a->offset * a->normal[c]);
+        v3_store(direction, d);
+        fct_found f = fct_transport_look(&r->set, r->stored, origin, direction);
+        inverse += 1 / f.distance;
+        const double x[3] = {d.x, d.y, d.z};
+        for (int c = 0; c < 3; ++c) {
+            e[c] += (double)f.radiosity[c] / rays;
+            for (int i = 0; i < 3; ++i)
+                g[c][i] += (double)f.radiosity[c] * x[i] / fmax(v3_dot(d, n), .15) / rays;
+        }
+    }
+    a->reach = (float)(rays / inverse);
+    for (int c = 0; c < 3; ++c) {
+        a->irradiance[c] = (float)e[c];
+        for (int i = 0; i < 3; ++i) a->gradient[c][i] = (float)g[c][i];
+    }
+}
+
+static void assert_same_anchor(const fct_anchor *a, const fct_anchor *b) {
+    assert_near(a->reach, b->reach, 1e-5 * b->reach);
+    for (int c = 0; c < 3; ++c) {
+        assert_near(a->normal[c], b->normal[c], 0);
+        assert_near(a->irradiance[c], b->irradiance[c], 1e-6);
+        for (int i = 0; i < 3; ++i) assert_near(a->gradient[c][i], b->gradient[c][i], 1e-5);
+    }
+    assert_near(a->offset, b->offset, 0);
+}
+
+static void gathers_equal_their_rays(void **state) {
+    (void)state;
+    room r = make_room(3);
+    for (uint64_t k = 0; k < 40; ++k) {
+        fct_anchor a = {.offset = (float)(1e-2 * pick(k, 0, 1))}, b;
+        for (uint64_t c = 0; c < 3; ++c) a.position[c] = (float)(pick(k, c, 2) - .5);
+        v3_store(a.normal, v3_unit(v3_make(pick(k, 0, 3) - .5, pick(k, 1, 3) - .5, pick(k, 2, 3) - .5)));
+        b = a;
+        fct_anchor_gather(&r.set, r.stored, 50 + (uint32_t)k, k, &a);
+        gather_plainly(&r, 50 + (uint32_t)k, k, &b);
+        assert_same_anchor(&a, &b);
+    }
+    end_room(&r);
+}
+
+/* The anchors that the rules of anchor.h make from the vertices. */
+typedef struct maker {
+    const room *r;
+    const fct_surface *f;
+    fct_anchors_def def;
+    double longest;
+    const fct_anchors *found;
+    uint32_t count, halved[2], turned;
+    uint64_t rays;
+} maker;
+
+static v3 at(const float *array, uint32_t v) {
+    return v3_load(array + 3 * (size_t)v);
+}
+
+static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
+    const fct_surface *f = m->f;
+    v3 p = {0, 0, 0}, n = {0, 0, 0};
+    for (uint32_t i = 0; i < count; ++i)
+        p = v3_add(p, at(f->sample_points, vertices[i])), n = v3_add(n, at(f->normals, vertices[i]));
+    p = v3_scale(p, 1. / count), n = v3_unit(n);
+    uint32_t middle = vertices[0], size = 0;
+    double least = INFINITY, worst = 0, turn = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        double d = v3_norm2(v3_sub(at(f->sample_points, vertices[i]), p)) *
+                   (2 - v3_dot(at(f->normals, vertices[i]), n));
+        if (d < least) least = d, middle = vertices[i];
+    }
+    fct_anchor a = {.offset = f->offsets[middle]};
+    v3_store(a.position, at(f->sample_points, middle));
+    v3_store(a.normal, v3_scale(at(f->normals, middle), m->def.side));
+    for (uint32_t k = count; k > 1 && size < 8; k /= 2) ++size;
+    uint32_t rays = m->def.rays + m->def.rays * size / 4;
+    gather_plainly(m->r, rays, fct_hash3(m->def.seed, middle, f->mesh.vertex_count), &a);
+    a.reach = (float)fmin(fmax(a.reach, 1.5 * sqrt(f->areas[middle])), m->longest);
+    ++m->count, m->rays += rays;
+    int known = 0;
+    for (uint32_t i = 0; i < m->found->count; ++i) {
+        const fct_anchor *x = &m->found->items[i];
+        if (memcmp(x->position, a.position, 12) != 0 || memcmp(x->normal, a.normal, 12) != 0 ||
+            fabsf(x->irradiance[0] - a.irradiance[0]) > 1e-6F)
+            continue;
+        assert_same_anchor(x, &a);
+        ++known;
+    }
+    assert_true(known > 0);
+    double lower[6], upper[6];
+    for (int k = 0; k < 6; ++k) lower[k] = INFINITY, upper[k] = -INFINITY;
+    for (uint32_t i = 0; i < count; ++i) {
+        v3 x = at(f->sample_points, vertices[i]), y = at(f->normals, vertices[i]);
+        double cosine = v3_dot(y, at(f->normals, middle));
+        worst = fmax(worst,
+                     v3_norm(v3_sub(x, at(f->sample_points, middle))) / a.reach + sqrt(fmax(1 - cosine, 0)));
+        turn = fmax(turn, 2 - 2 * cosine);
+        const double c[6] = {x.x, x.y, x.z, y.x, y.y, y.z};
+        for (int k = 0; k < 6; ++k) lower[k] = fmin(lower[k], c[k]), upper[k] = fmax(upper[k], c[k]);
+    }
+    if (count == 1 || (worst <= m->def.tolerance && turn <= .9 * .4)) return;
+    m->turned += worst <= m->def.tolerance;
+    int axis = 0, bent = 3;
+    for (int k = 1; k < 3; ++k) {
+        if (upper[k] - lower[k] > upper[axis] - lower[axis]) axis = k;
+        if (upper[k + 3] - lower[k + 3] > upper[bent] - lower[bent]) bent = k + 3;
+    }
+    if (upper[bent] - lower[bent] > .8) axis = bent;
+    uint32_t *parts = malloc(count * sizeof *parts), low = 0, done = 0;
+    for (int side = 0; side < 2; ++side) {
+        for (uint32_t i = 0; i < count; ++i) {
+            const float *x =
+                (axis < 3 ? f->sample_points : f->normals) + 3 * (size_t)vertices[i] + (size_t)axis % 3;
+            if (((double)*x < (lower[axis] + upper[axis]) / 2) == (side == 0)) parts[done++] = vertices[i];
+        }
+        if (side == 0) low = done;
+    }
+    ++m->halved[axis > 2];
+    assert_true(low > 0 && low < count);
+    follow_group(m, parts, low);
+    follow_group(m, parts + low, count - low);
+    free(parts);
+}
+
+static void groups_follow_the_rules(void **state) {
+    (void)state;
+    uint32_t halved[2] = {0, 0}, turned = 0;
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+        room r = make_room(seed);
+        fct_surface f;
+        uint32_t instance = seed % 2 ? r.ball : 0;
+        assert_int_equal(fct_surface_build(&plain, r.scene, instance, instance ? .4 : 1.5, &f), FCT_OK);
+        fct_anchors t;
+        maker m = {.r = &r,
+                   .f = &f,
+                   .found = &t,
+                   .def = {.rays = 17, .tolerance = seed < 4 ? .9 : 1.6, .seed = seed}};
+        m.def.side = seed % 4 == 3 ? -1 : 1;
+        v3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
+        for (size_t c = 0; c < 3 * r.triangles.count; ++c) {
+            v3 x = r.triangles.corners[c];
+            lower = v3_make(fmin(lower.x, x.x), fmin(lower.y, x.y), fmin(lower.z, x.z));
+            upper = v3_make(fmax(upper.x, x.x), fmax(upper.y, x.y), fmax(upper.z, x.z));
+        }
+        m.longest = v3_norm(v3_sub(upper, lower)) / 8;
+        assert_int_equal(fct_anchors_create(&plain, &r.set, r.stored, &f, &m.def, &t), FCT_OK);
+        uint32_t *vertices = malloc(f.mesh.vertex_count * sizeof *vertices), count = 0;
+        for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
+            if (f.places[v] != FCT_NONE) vertices[count++] = v;
+        follow_group(&m, vertices, count);
+        assert_int_equal(m.count, t.count);
+        assert_int_equal(m.rays, t.rays);
+        double inverse = 0;
+        for (uint32_t i = 0; i < t.count; ++i) inverse += 1 / (double)t.items[i].reach;
+        assert_near(t.turn, .7 / (inverse / t.count), 1e-6);
+        for (int k = 0; k < 2; ++k) halved[k] += m.halved[k];
+        turned += m.turned;
+        free(vertices);
+        fct_anchors_release(&plain, &t);
+        fct_surface_release(&plain, &f);
+        end_room(&r);
+    }
+    printf("    %u groups halved in space, %u by normals, %u for their turn alone\n", halved[0], halved[1],
+           turned);
+    assert_true(halved[0] > 20 && halved[1] > 20 && turned > 0);
+}
+
+/* blend.h and the formulas at the top of blend.c, over all anchors. Returns the number of rays. */
+static int blend_plainly(const room *r, const fct_anchors *t, v3 p, v3 n, double offset, bool wall,
+                         double e[3]) {
+    double x[10], w[10], values[10][3], total = 0, mean = 0, farthest = 0, far2[10];
+    const fct_anchor *near[10];
+    int count = 0, rays = 0;
+    for (uint32_t i = 0; i < t->count; ++i) {
+        const fct_anchor *a = &t->items[i];
+        double turn2 = v3_norm2(v3_sub(n, v3_load(a->normal)));
+        double d2 = v3_norm2(v3_sub(p, v3_load(a->position))) + t->turn * t->turn * turn2;
+        if (turn2 >= .4 || (count == 10 && d2 >= far2[9])) continue;
+        int k = count < 10 ? count++ : 9;
+        for (; k > 0 && far2[k - 1] > d2; --k) far2[k] = far2[k - 1], near[k] = near[k - 1];
+        far2[k] = d2, near[k] = a;
+    }
+    e[0] = e[1] = e[2] = 0;
+    if (count == 0) return 0;
+    for (int i = 0; i < count; ++i) {
+        v3 turn = v3_sub(n, v3_load(near[i]->normal));
+        x[i] = v3_norm(v3_sub(p, v3_load(near[i]->position))) / near[i]->reach + .7 * v3_norm(turn) + 1e-4;
+        farthest = fmax(farthest, x[i]);
+        for (int c = 0; c < 3; ++c) {
+            double own = near[i]->irradiance[c];
+            values[i][c] = fmin(fmax(own + v3_dot(v3_load(near[i]->gradient[c]), turn), .5 * own), 1.6 * own);
+        }
+    }
+    for (int i = 0; i < count; ++i) {
+        w[i] = count == 1 ? 1 : pow(1 / x[i] - .98 / farthest, 2);
+        total += w[i];
+        for (int c = 0; c < 3; ++c) mean += w[i] * values[i][c];
+    }
+    mean /= total;
+    for (int i = 0; i < count && wall && count > 1; ++i) {
+        double apart = fabs(values[i][0] + values[i][1] + values[i][2] - mean);
+        if (w[i] < .01 * total || apart < .15 * mean) continue;
+        ++rays;
+        v3 from = v3_mad(p, 4 * offset, n), a = v3_load(near[i]->normal);
+        if (!is_free(&r->triangles, from, v3_mad(v3_load(near[i]->position), 4 * near[i]->offset, a)))
+            w[i] = 0;
+    }
+    total = 0;
+    for (int i = 0; i < count; ++i) total += w[i];
+    if (total == 0) w[0] = total = 1;
+    for (int i = 0; i < count; ++i)
+        for (int c = 0; c < 3; ++c) e[c] += w[i] / total * values[i][c];
+    return rays;
+}
+
+static void blends_equal_the_formula(void **state) {
+    (void)state;
+    int rays_of_all = 0, dark = 0;
+    for (uint64_t seed = 0; seed < 24; ++seed) {
+        room r = make_room(seed);
+        fct_anchors t = {.count = seed < 3 ? (uint32_t)seed + 1 : 4 + 5 * (uint32_t)seed,
+                         .turn = .1 + .1 * (double)seed};
+        t.items = fct_allocate_zero(&plain, t.count, sizeof *t.items);
+        t.axes = fct_allocate_zero(&plain, t.count, 1);
+        for (uint32_t i = 0; i < t.count; ++i) {
+            fct_anchor *a = &t.items[i];
+            double level = i % 3 == 0 ? 1 : .5 + pick(seed, i, 9);
+            for (uint64_t k = 0; k < 3; ++k) {
+                a->position[k] = (float)((2 * pick(seed, i, k) - 1) * (k == 2 ? .3 : 1));
+                a->irradiance[k] = (float)(level * (1 + .1 * pick(seed, i, 10 + k)));
+                for (uint64_t c = 0; c < 3; ++c)
+                    a->gradient[k][c] = (float)((i % 4 ? .4 : 3) * (pick(seed, i, 20 + 3 * k + c) - .5));
+            }
+            v3_store(a->normal, v3_unit(v3_make(.8 * pick(seed, i, 3) - .4, .8 * pick(seed, i, 4) - .4, 1)));
+            a->reach = (float)(.1 + pick(seed, i, 5)), a->offset = (float)(.02 * pick(seed, i, 6));
+        }
+        fct_anchors_order(&t);
+        for (uint64_t q = 0; q < 60; ++q) {
+            float p[3], n[3], offset = (float)(.02 * pick(seed, q, 50));
+            for (uint64_t k = 0; k < 3; ++k)
+                p[k] = (float)((2 * pick(seed, q, 51 + k) - 1) * (k == 2 ? .3 : 1));
+            v3_store(n, v3_unit(v3_make(pick(seed, q, 54) - .5, pick(seed, q, 55) - .5, q % 9 ? 1 : .2)));
+            double expected[3], found[3];
+            uint64_t rays = 5;
+            int sent = blend_plainly(&r, &t, v3_load(p), v3_load(n), offset, q % 2, expected);
+            fct_anchors_irradiance(&t, &r.set, p, n, offset, q % 2, found, &rays);
+            assert_int_equal(rays, 5 + sent);
+            for (int c = 0; c < 3; ++c) assert_near(found[c], expected[c], 1e-6);
+            rays_of_all += sent, dark += found[0] == 0;
+        }
+        fct_anchors_release(&plain, &t);
+        end_room(&r);
+    }
+    printf("    %d visibility rays, %d points without an anchor\n", rays_of_all, dark);
+    assert_true(rays_of_all > 500 && dark > 5);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gathers_equal_their_rays),
+        cmocka_unit_test(groups_follow_the_rules),
+        cmocka_unit_test(blends_equal_the_formula),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
