@@ -288,9 +288,10 @@ static void least_memory(void **state) {
         large.max_memory = fct_tree_build_need(mesh.face_count, mesh.vertex_count, &def).in_parts;
         env.allocate = meter_allocate, env.release = meter_release, env.memory_user = &m;
         fct_tree *tree = build(&env, &mesh, &def, &large, &stats);
-        /* tops take 640 bytes, and half of the memory besides 12 MiB of buffers; each part may have 16 more
+        /* tops take 640 bytes, and half of 7/8 of the memory less 12 MiB; each part may have 16 more
          */
-        assert_true(stats.top_count <= (large.max_memory - (12 << 20)) / 1280 + 16 * stats.part_count);
+        assert_true(stats.top_count <=
+                    (large.max_memory / 8 * 7 - (12 << 20)) / 1280 + 16 * stats.part_count);
         check_nodes(name, tree, 1e-3, &all);
         check_frames(name, tree);
         fct_tree_destroy(tree);

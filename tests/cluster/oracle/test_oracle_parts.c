@@ -413,8 +413,45 @@ static void a_limit_of_clusters(void **state) {
     }
 }
 
+/* Two neighbours of 2048 faces and height 33. Their union is higher than 2 log2 n + 8 but not than 3 log2 n -
+ * 1, so they merge along their edge. With height 35 they are joined by proximity. */
+static void tall_tops_use_the_reserve(void **state) {
+    (void)state;
+    for (uint8_t height = 33; height <= 35; height += 2) {
+        fct_env env = single();
+        fct_tree_def def = def_of(1);
+        fct_large l = {.env = &env, .def = &def, .path = "/tmp/tree.fct", .top_count = 2};
+        fct_top tops[2];
+        fct_top_edge edge = {0, 1, 0.1f};
+        l.info.face_count = 4096;
+        l.bounds = (fct_bounds){{0, 0, 0}, {1, 1, 1}};
+        for (uint32_t i = 0; i < 2; ++i) {
+            fct_record record = {.count = 2048, .area = 1, .vector = {0, 0, 1}, .perimeter = 4};
+            tops[i] = (fct_top){.part = i,
+                                .count = 2048,
+                                .material = FCT_NONE,
+                                .phase = 1,
+                                .height = height,
+                                .upper = {1, 1, 1},
+                                .record = record};
+        }
+        assert_int_equal(fct_spool_open(&env, "/tmp", l.path, &l.tops), FCT_OK);
+        assert_int_equal(fct_spool_open(&env, "/tmp", l.path, &l.edges), FCT_OK);
+        assert_int_equal(fct_spool_append(&l.tops, tops, sizeof tops), FCT_OK);
+        assert_int_equal(fct_spool_append(&l.edges, &edge, sizeof edge), FCT_OK);
+        assert_int_equal(fct_large_contract(&l), FCT_OK);
+        assert_true(l.upper_count == 1 && l.component_count == 1);
+        assert_int_equal(l.upper_phase_counts[1], height == 33);
+        assert_int_equal(l.upper_phase_counts[2], height == 35);
+        fct_spool_close(&l.tops), fct_spool_close(&l.edges);
+        fct_release(&env, l.all_tops), fct_release(&env, l.upper);
+        fct_release(&env, l.top_order), fct_release(&env, l.top_places);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_cut), cmocka_unit_test(what_remains),
-                                       cmocka_unit_test(a_limit_of_clusters)};
+                                       cmocka_unit_test(a_limit_of_clusters),
+                                       cmocka_unit_test(tall_tops_use_the_reserve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
