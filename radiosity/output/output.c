@@ -52,7 +52,7 @@ double fct_output_ray_factor(const fct_solution *s) {
     return fct_min(fct_max(sqrt(SMALL_SCENE / faces), 1), MOST_RAY_FACTOR);
 }
 
-/* Barycentrics of a point's projection onto the face at `place`, clamped to the face. */
+/* Barycentrics of a point's projection onto the face at `place`. */
 static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t place, const float point[3],
                             float uv[2]) {
     const fct_instance *in = &s->elements.view.instances[instance];
@@ -66,7 +66,6 @@ static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t p
     double scale = v3_norm2(n);
     double u = scale > 0 ? v3_dot(v3_cross(d, f), n) / scale : 1 / 3.,
            v = scale > 0 ? v3_dot(v3_cross(e, d), n) / scale : 1 / 3.;
-    u = fct_min(fct_max(u, 0), 1), v = fct_min(fct_max(v, 0), 1 - u);
     uv[0] = (float)u, uv[1] = (float)v;
 }
 

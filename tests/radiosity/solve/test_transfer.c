@@ -253,8 +253,9 @@ static void spread_counts_darkness_sixteenfold(void **state) {
     const double lit[3][3] = {{1, 2, 3}, {1.5, 2, 1}, {1.25, 1, 2}}, half[2][3] = {{0, 0, 0}, {0, 1, 0}};
     assert_near(fct_direct_spread(&e, 3, lit), 4 * (.5 * .5 + .5 * 1 + .25 * 2), 1e-12);
     assert_near(fct_direct_spread(&e, 2, half), 16 * 4 * .5, 1e-12);
-    const double dark[2][3] = {{0}};
+    const double dark[2][3] = {{0}}, red[2][3] = {{1, 0, 0}, {2, 0, 0}};
     assert_true(fct_direct_spread(&e, 2, dark) == 0);
+    assert_near(fct_direct_spread(&e, 2, red), 4 * .5, 1e-12); /* no lamp sends green or blue */
 }
 
 int main(void) {
