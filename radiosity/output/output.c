@@ -52,7 +52,7 @@ double fct_output_ray_factor(const fct_solution *s) {
     return fct_min(fct_max(sqrt(SMALL_SCENE / faces), 1), MOST_RAY_FACTOR);
 }
 
-/* Barycentrics of a point's projection onto the face at `place`. */
+/* Barycentrics of a point's projection onto the face at `place`. Sample points lie on faces with an area. */
 static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t place, const float point[3],
                             float uv[2]) {
     const fct_instance *in = &s->elements.view.instances[instance];
@@ -63,9 +63,7 @@ static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t p
         p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * vertex));
     }
     v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(v3_load(point), p[0]), n = v3_cross(e, f);
-    double scale = v3_norm2(n);
-    double u = scale > 0 ? v3_dot(v3_cross(d, f), n) / scale : 1 / 3.,
-           v = scale > 0 ? v3_dot(v3_cross(e, d), n) / scale : 1 / 3.;
+    double scale = v3_norm2(n), u = v3_dot(v3_cross(d, f), n) / scale, v = v3_dot(v3_cross(e, d), n) / scale;
     uv[0] = (float)u, uv[1] = (float)v;
 }
 

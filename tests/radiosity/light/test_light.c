@@ -285,6 +285,7 @@ static fct_lamp_point point_plainly(const fct_lamp *lamp, const fct_receiver *re
     return out;
 }
 
+static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 static const float turned[12] = {0, -2, 0, 1, 2, 0, 0, 2, 0, 0, 2, 3};
 static const float mirrored[12] = {-1.5F, 0, 0, 1, 0, 1.5F, 0, 2, 0, 0, 1.5F, 3};
 static const float sheared[12] = {1, .5F, 0, 1, 0, 2, 0, 2, .3F, .25F, 1.5F, 3};
@@ -401,7 +402,7 @@ static void cuts_follow_the_rules(void **state) {
         for (int kind = 0; kind < 3; ++kind) {
             fct_lamp lamp;
             fct_scene *scene = make_lamp(shape, kind, &lamp);
-            for (uint64_t i = 0; i < 60; ++i) {
+            for (uint64_t i = 0; i < 80; ++i) {
                 uint64_t seed = (uint64_t)(4 * shape + kind);
                 v3 away =
                     v3_unit(v3_make(pick(seed, i, 0) - .5, pick(seed, i, 1) - .5, pick(seed, i, 2) - .5));
@@ -409,6 +410,14 @@ static void cuts_follow_the_rules(void **state) {
                 double size = lamp.radius * lamp.scale, r = size * (.3 + pow(40, pick(seed, i, 6)) * .9);
                 const float *m = fct_scene_get(scene).instances[0].to_world;
                 v3 c = fct_transform_point(m, v3_make(0, 0, 0)), x = v3_mad(c, r, away);
+                if (i % 4 == 1) { /* within .4 % of the plane through the lamp */
+                    fct_receiver here = fct_lamp_receiver(&lamp, (double[3]){c.x, c.y, c.z},
+                                                          (double[3]){away.x, away.y, away.z});
+                    v3 s = v3_unit(lamp.vector), side = v3_unit(v3_mad(here.n, -v3_dot(here.n, s), s));
+                    x = v3_mad(lamp.center, 1.5 * lamp.radius, side);
+                    x = v3_mad(x, .008 * lamp.radius * (pick(seed, i, 7) - .5), s);
+                    x = fct_transform_point(lamp.own ? identity : m, x);
+                }
                 if (i % 3) n = v3_unit(v3_mad(n, -1.2, away));
                 const double point[3] = {x.x, x.y, x.z}, normal[3] = {n.x, n.y, n.z};
                 fct_receiver rec = fct_lamp_receiver(&lamp, point, normal);
@@ -465,16 +474,17 @@ static hall make_hall(uint64_t seed) {
     fct_mesh ball = make_bumpy(&plain, 4, .2);
     for (uint64_t k = 0; k < 30; ++k) {
         double e = k % 5 ? .05 : 2;
-        const fct_material m = {
-            .emission = {(float)(e * pick(seed, k, 5)), (float)(e * pick(seed, k, 6)), k % 3 ? (float)e : 0},
-            .two_sided = k % 4 == 1};
+        fct_material m = {.two_sided = k % 4 == 1};
+        /* few lamps send the channel seed % 3, so that some receivers send no ray to any of them */
+        for (uint64_t c = 0; c < 3; ++c)
+            m.emission[c] = c == seed % 3 && k % 9 != 7 ? 0 : (float)(e * pick(seed, k, 5 + c));
         uint32_t id;
         float place[12];
         assert_int_equal(fct_scene_add_material(h.scene, &m, &id), FCT_OK);
         memcpy(place, transforms[k % 4], sizeof place);
         for (size_t i = 0; i < 12; ++i)
             place[i] = i % 4 == 3 ? (float)(10 * pick(seed, k, 20 + i) - 5) : .1F * place[i];
-        place[11] = (float)(3 + pick(seed, k, 7));
+        place[11] = (float)(3 + pick(seed, k, 8));
         if (k % 2)
             place_mesh(h.scene, &ball, id, place);
         else

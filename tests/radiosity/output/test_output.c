@@ -1,5 +1,6 @@
 /* Outputs: the smoothing filter against a direct evaluation, borders, sides, sites of probes, radiosities. */
 #include "../place.h"
+#include "../soup.h"
 #include "radiosity/output/output.h"
 #include "radiosity/output/probe.h"
 #include "radiosity/output/smooth.h"
@@ -262,6 +263,105 @@ static void probes_beside_a_rim_know_the_side(void **state) {
     assert_true(fronts > 100 && backs > 50 && none > 50);
 }
 
+/* The point of a triangle nearest to x. */
+static v3 find_nearest_point(const v3 p[3], v3 x) {
+    v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), n = v3_cross(e, f), d = v3_sub(x, p[0]), best = p[0];
+    double u = v3_dot(v3_cross(d, f), n) / v3_norm2(n), v = v3_dot(v3_cross(e, d), n) / v3_norm2(n);
+    if (u >= 0 && v >= 0 && u + v <= 1) return v3_mad(v3_mad(p[0], u, e), v, f);
+    for (int k = 0; k < 3; ++k) {
+        v3 side = v3_sub(p[(k + 1) % 3], p[k]);
+        double t = v3_dot(v3_sub(x, p[k]), side) / v3_norm2(side);
+        v3 y = v3_mad(p[k], t < 0 ? 0 : t > 1 ? 1 : t, side);
+        if (v3_norm(v3_sub(y, x)) < v3_norm(v3_sub(best, x))) best = y;
+    }
+    return best;
+}
+
+/* Sites among random patches against brute force: of the surfaces that the normal's line meets within reach
+ * and that face it or have two sides, the one nearest to the point; else the nearest surface within reach, if
+ * it faces it or has two sides. */
+static void sites_equal_brute_force(void **state) {
+    (void)state;
+    int on_line = 0, beside = 0, backs = 0, none = 0;
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+        fct_scene *scene = begin();
+        uint32_t one = place_material(scene, .5, 0, false), two = place_material(scene, .5, 0, true);
+        fct_mesh patch = make_sheet(&plain, 2, v3_make(0, 0, 0), v3_make(.9, .1, 0), v3_make(0, .8, .1));
+        for (uint64_t k = 0; k < 25; ++k) {
+            float m[12];
+            for (uint64_t i = 0; i < 12; ++i)
+                m[i] =
+                    (float)(fct_uniform(fct_hash3(seed, k, i)) * (i % 4 == 3 ? 1 : 2) - (i % 4 == 3 ? 0 : 1));
+            place_mesh(scene, &patch, k % 3 ? one : two, m);
+        }
+        const float away[12] = {.01F, 0, 0, 80, 0, .01F, 0, 60, 0, 0, .01F, 0}; /* makes the reach about .1 */
+        place_mesh(scene, &patch, one, away);
+        fct_mesh_release(&plain, &patch);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_scene_view view = fct_scene_get(scene);
+        soup s = list_triangles(scene);
+        double diagonal = v3_norm(v3_sub(v3_load(view.bounds.upper), v3_load(view.bounds.lower))),
+               reach = 1e-3 * diagonal;
+        for (uint64_t q = 0; q < 400; ++q) {
+            float point[3], normal[3];
+            for (uint64_t k = 0; k < 3; ++k)
+                point[k] = (float)(1.4 * fct_uniform(fct_hash3(seed, q, 50 + k)) - .2);
+            v3_store(normal, v3_unit(v3_make(fct_uniform(fct_hash3(seed, q, 53)) - .5,
+                                             fct_uniform(fct_hash3(seed, q, 54)) - .5,
+                                             fct_uniform(fct_hash3(seed, q, 55)) - .5)));
+            v3 x = v3_load(point), n = v3_load(normal), at = x;
+            double least = INFINITY, nearest = INFINITY;
+            uint32_t found = FCT_NONE, closest = FCT_NONE;
+            bool back = false;
+            for (uint32_t t = 0; t < s.count; ++t) {
+                const v3 *p = s.corners + 3 * (size_t)t;
+                uint32_t i = t / 8;
+                v3 m = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+                double facing = v3_dot(m, n) * (view.instances[i].mirrored ? -1 : 1);
+                double along = v3_dot(v3_sub(x, p[0]), m) / v3_dot(n, m);
+                bool usable = facing > 0 || view.materials[view.instances[i].material].two_sided;
+                v3 hit = v3_mad(x, -along, n), near = find_nearest_point(p, x);
+                bool inside = v3_norm(v3_sub(find_nearest_point(p, hit), hit)) < 1e-9;
+                if (inside && usable && fabs(along) < reach && fabs(along) < least)
+                    least = fabs(along), found = i, at = hit, back = facing < 0;
+                if (v3_norm(v3_sub(near, x)) < nearest) nearest = v3_norm(v3_sub(near, x)), closest = t;
+            }
+            on_line += found != FCT_NONE;
+            if (found == FCT_NONE && nearest < reach) {
+                const v3 *p = s.corners + 3 * (size_t)closest;
+                uint32_t i = closest / 8;
+                double facing = v3_dot(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), n) *
+                                (view.instances[i].mirrored ? -1 : 1);
+                if (facing > 0 || view.materials[view.instances[i].material].two_sided)
+                    found = i, at = find_nearest_point(p, x), back = facing < 0, ++beside;
+            }
+            fct_site site = fct_probe_site(scene, point, normal);
+            assert_near(site.offset, 1e-3 * reach, 1e-6 * reach);
+            if (found == FCT_NONE) {
+                assert_true(site.instance == FCT_NONE && site.face == FCT_NONE), ++none;
+                continue;
+            }
+            assert_int_equal(site.instance, found), assert_int_equal(site.back, back);
+            assert_true(v3_norm(v3_sub(v3_load(site.point), at)) < 1e-4);
+            backs += back;
+            /* place and barycentrics name the same point; the face is the place's */
+            const fct_instance *in = &view.instances[found];
+            fct_tree_view t = fct_tree_get(view.models[in->model].tree);
+            v3 p[3];
+            for (size_t k = 0; k < 3; ++k)
+                p[k] = fct_transform_point(
+                    in->to_world, v3_load(t.positions + 3 * (size_t)t.triangles[3 * (size_t)site.place + k]));
+            v3 y = v3_mad(v3_mad(p[0], site.u, v3_sub(p[1], p[0])), site.v, v3_sub(p[2], p[0]));
+            assert_true(v3_norm(v3_sub(y, at)) < 1e-4);
+            assert_int_equal(site.face, t.face_ids[site.place]);
+        }
+        free(s.corners);
+        fct_scene_destroy(scene);
+    }
+    printf("    %d on the line, %d beside it, %d on backs, %d in free space\n", on_line, beside, backs, none);
+    assert_true(on_line > 200 && beside > 100 && backs > 50 && none > 300);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(probes_beside_a_rim_know_the_side),
@@ -271,6 +371,7 @@ int main(void) {
         cmocka_unit_test(radiosity_is_emission_plus_reflection),
         cmocka_unit_test(lit_sides_are_shown),
         cmocka_unit_test(probes_find_their_surface),
+        cmocka_unit_test(sites_equal_brute_force),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -372,7 +372,7 @@ static void long_edges_are_split_and_no_others(void **state) {
     (void)state;
     plain = fct_env_default();
     int met[3] = {0};
-    for (uint64_t seed = 0; seed < 12; ++seed) {
+    for (uint64_t seed = 0; seed < 30; ++seed) {
         fct_scene *scene;
         assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &scene), FCT_OK);
         uint32_t grey = place_material(scene, .5, 0, false);
