@@ -83,6 +83,22 @@ static void only_what_is_scattered_is_sorted(void **state) {
     }
 }
 
+/* A needle along an axis: the cells are those of a cube around it. */
+static void needles_are_sorted_along_their_axis(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    for (size_t axis = 0; axis < 3; ++axis) {
+        fct_mesh mesh = make_shuffled(&env, true, true);
+        fct_local_mesh local;
+        for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
+            if (i % 3 != axis) mesh.positions[i] = 0;
+        assert_int_equal(fct_local_mesh_create(&env, &mesh, 0, &local), FCT_OK);
+        assert_true(mean_gap(&local.mesh) < 0.01);
+        fct_local_mesh_release(&env, &local);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 static void survives_no_memory(void **state) {
     (void)state;
     fct_env plain = fct_env_default();
@@ -104,8 +120,8 @@ static void survives_no_memory(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(ids_are_those_of_the_mesh),
-                                       cmocka_unit_test(only_what_is_scattered_is_sorted),
-                                       cmocka_unit_test(survives_no_memory)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ids_are_those_of_the_mesh), cmocka_unit_test(only_what_is_scattered_is_sorted),
+        cmocka_unit_test(needles_are_sorted_along_their_axis), cmocka_unit_test(survives_no_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,9 +3,11 @@
  * two to four points. */
 #include "cluster/shapes.h"
 
+#include "base/math/eigen.h"
 #include "base/math/vec.h"
 #include "facetree/partition.h"
 #include "partition/meshlet/ball.h"
+#include "partition/meshlet/bounds.h"
 
 static fct_meshlets meshlets_of(const fct_env *env, const fct_mesh *mesh, const fct_meshlet_def *def) {
     fct_tree *tree = tree_of(env, mesh, 1);
@@ -295,6 +297,82 @@ static void the_smallest_ball(void **state) {
     assert_true(fabs(radius - sqrt(2)) < 1e-12);
 }
 
+/* The area of the points' box along two unit vectors at a right angle and their product. */
+static double area_along(const v3 *points, uint32_t count, v3 a, v3 b) {
+    const v3 axes[3] = {a, b, v3_cross(a, b)};
+    double e[3];
+    for (int k = 0; k < 3; ++k) {
+        double low = INFINITY, high = -INFINITY;
+        for (uint32_t i = 0; i < count; ++i) {
+            double x = v3_dot(points[i], axes[k]);
+            low = fmin(low, x), high = fmax(high, x);
+        }
+        e[k] = high - low;
+    }
+    return 2 * (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]);
+}
+
+/* The least area of eight turns by 11.25 degrees about the normal, for the worst first angle. */
+static double worst_turned_area(const v3 *points, uint32_t count, v3 normal) {
+    enum { TURNS = 8, STARTS = 40 };
+    v3 t = v3_unit(v3_cross(normal, fabs(normal.x) < 0.6 ? (v3){1, 0, 0} : (v3){0, 1, 0})),
+       b = v3_cross(normal, t);
+    double worst = 0;
+    for (int start = 0; start < STARTS; ++start) {
+        double least = INFINITY;
+        for (int turn = 0; turn < TURNS; ++turn) {
+            double angle = pi / 2 * (turn + (double)start / STARTS) / TURNS;
+            v3 u = v3_add(v3_scale(t, cos(angle)), v3_scale(b, sin(angle)));
+            least = fmin(least, area_along(points, count, normal, u));
+        }
+        worst = fmax(worst, least);
+    }
+    return worst;
+}
+
+/* Random points and triangles, turned by any angles: sheets with bumps, or points in a box. */
+static void boxes_are_the_least_of_their_frames(void **state) {
+    (void)state;
+    enum { POINTS = 24, FACES = 8 };
+    uint32_t random = 3;
+    for (int run = 0; run < 400; ++run) {
+        float positions[3 * POINTS];
+        uint8_t triangles[3 * FACES];
+        v3 points[POINTS], axes[3], mean = {0, 0, 0}, vector = {0, 0, 0}, turn[3];
+        double covariance[6] = {0}, values[3];
+        for (int k = 0; k < 3; ++k)
+            turn[k] =
+                (v3){shape_random(&random) - 0.5, shape_random(&random) - 0.5, shape_random(&random) - 0.5};
+        turn[0] = v3_unit(turn[0]), turn[1] = v3_unit(v3_cross(turn[0], turn[1]));
+        turn[2] = v3_cross(turn[0], turn[1]);
+        for (uint32_t i = 0; i < POINTS; ++i) {
+            double thick = run % 2 ? 0.8 : 0.05, x[3] = {shape_random(&random), shape_random(&random), 0};
+            if (run % 4 == 0) x[0] = i % 4 / 3.0, x[1] = i / 4 / 5.0; /* a rectangle */
+            x[2] = thick * shape_random(&random);
+            points[i] = v3_add(v3_add(v3_scale(turn[0], x[0]), v3_scale(turn[1], 0.7 * x[1])),
+                               v3_scale(turn[2], x[2]));
+            v3_store(positions + 3 * (size_t)i, points[i]);
+            points[i] = v3_load(positions + 3 * (size_t)i);
+            mean = v3_add(mean, v3_scale(points[i], 1.0 / POINTS));
+        }
+        for (uint32_t i = 0; i < 3 * FACES; ++i) triangles[i] = (uint8_t)i;
+        for (uint32_t f = 0; f < FACES; ++f)
+            vector = v3_add(vector, v3_cross(v3_sub(points[3 * f + 1], points[3 * f]),
+                                             v3_sub(points[3 * f + 2], points[3 * f])));
+        for (uint32_t i = 0; i < POINTS; ++i) sym3_add_outer(covariance, 1, v3_sub(points[i], mean));
+        fct_eigen3(covariance, values, axes);
+        fct_meshlet_bounds bounds;
+        fct_meshlet_bound(positions, POINTS, triangles, FACES, &bounds);
+        const float *h = bounds.box.half;
+        double found =
+            8 * ((double)h[0] * (double)h[1] + (double)h[1] * (double)h[2] + (double)h[2] * (double)h[0]);
+        double least = fmin(worst_turned_area(points, POINTS, axes[0]),
+                            worst_turned_area(points, POINTS, v3_unit(vector)));
+        least = fmin(least, area_along(points, POINTS, (v3){1, 0, 0}, (v3){0, 1, 0}));
+        if (found > 1.002 * least) fail_msg("run %d: the box has the area %g, not %g", run, found, least);
+    }
+}
+
 static void bad_options_are_refused(void **state) {
     (void)state;
     recorder r = {0};
@@ -381,6 +459,7 @@ int main(void) {
                                        cmocka_unit_test(flatness_trades_shape_for_cones),
                                        cmocka_unit_test(materials_do_not_mix),
                                        cmocka_unit_test(the_smallest_ball),
+                                       cmocka_unit_test(boxes_are_the_least_of_their_frames),
                                        cmocka_unit_test(bad_options_are_refused),
                                        cmocka_unit_test(same_for_every_thread_count),
                                        cmocka_unit_test(survives_no_memory)};
