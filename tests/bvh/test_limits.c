@@ -53,9 +53,9 @@ static void a_hit_at_t_max_explains_a_difference(void **state) {
     model_release(&env, &m);
 }
 
-/* A row of 100 squares of grey i + 1, shifted up by .5 in the second mesh; 95 % of the area is darker
- * than 96. */
-static fct_mesh make_row(const fct_env *env, uint32_t parts, float add) {
+/* A row of 100 squares of the colours i + 1, shifted up by .5 in the second mesh, times 1, 2 and 4 in the
+ * three channels; 95 % of the area is darker than 96. */
+static fct_mesh make_row(const fct_env *env, uint32_t parts, float add, uint32_t first) {
     fct_mesh mesh;
     assert_int_equal(fct_mesh_create(env, 400 * parts, 200 * parts, FCT_MESH_COLORS, &mesh), FCT_OK);
     for (uint32_t q = 0; q < 100 * parts; ++q) {
@@ -63,7 +63,8 @@ static fct_mesh make_row(const fct_env *env, uint32_t parts, float add) {
         float x0 = (float)q / (float)parts + (float)i * .5f, x1 = x0 + 1 / (float)parts;
         const float p[12] = {x0, 0, 0, x1, 0, 0, x1, 1, 0, x0, 1, 0};
         memcpy(mesh.positions + 12 * q, p, sizeof p);
-        for (int k = 0; k < 12; ++k) mesh.colors[12 * q + k] = (float)(i + 1) + add;
+        for (int k = 0; k < 12; ++k)
+            mesh.colors[12 * q + k] = ((float)(i + 1) + add) * (float)(1 << (k + first) % 3);
         const uint32_t t[6] = {4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3};
         memcpy(mesh.triangles + 6 * q, t, sizeof t);
     }
@@ -73,15 +74,16 @@ static fct_mesh make_row(const fct_env *env, uint32_t parts, float add) {
 static void relative_colour_errors_have_their_bound(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    for (int i = 0; i < 2; ++i) {
-        model a = model_make(&env, make_row(&env, 1, 0), FCT_BACKEND_OBB),
-              b = model_make(&env, make_row(&env, i ? 2 : 1, .5f), FCT_BACKEND_OBB);
+    for (uint32_t i = 0; i < 6; ++i) {
+        model a = model_make(&env, make_row(&env, 1, 0, i % 3), FCT_BACKEND_OBB),
+              b = model_make(&env, make_row(&env, 1 + i / 3, .5f, i % 3), FCT_BACKEND_OBB);
         fct_mesh_error e;
         assert_int_equal(fct_mesh_compare(&env, a.bvh, b.bvh, 0, 1, &e), FCT_OK);
         double ab = 0;
         for (int k = 1; k <= 100; ++k) ab += fmin(k, 96) * fmin(k, 96);
         double expected = .5 / sqrt(ab / 100);
         assert_true(fabs(e.color_rms_relative - expected) < 1e-6);
+        assert_true(fabs((double)e.color_max - 2) < 1e-4 && fabs((double)e.color_rms - .5 * sqrt(7)) < 1e-4);
         model_release(&env, &a);
         model_release(&env, &b);
     }
