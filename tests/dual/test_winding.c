@@ -87,6 +87,20 @@ static void bodies_are_found_and_turned(void **state) {
     fct_mesh_release(&env, &before);
 }
 
+/* Two bodies with a cavity, and 70 small ones between them: the largest bodies are searched. */
+static void cavities_of_the_largest_bodies(void **state) {
+    (void)state;
+    placement places[74] = {{3, 0, false}, {1, 0, true}};
+    for (uint32_t i = 2; i < 72; ++i) places[i] = (placement){0.1f + 0.001f * (float)i, 10 * (float)i, false};
+    places[72] = (placement){4, 900, false}, places[73] = (placement){1, 900, true};
+    for (uint32_t turned = 0; turned < 2; ++turned) {
+        fct_mesh mesh = make_spheres(places, 74, 0);
+        assert_int_equal(count_inward(&mesh), 0);
+        fct_mesh_release(&env, &mesh);
+        places[0].scale = 4, places[72].scale = 3;
+    }
+}
+
 static void other_meshes_are_not_inward(void **state) {
     (void)state;
     const placement inward = {1, 5, true};
@@ -184,6 +198,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_found_and_turned),
+        cmocka_unit_test(cavities_of_the_largest_bodies),
         cmocka_unit_test(other_meshes_are_not_inward),
         cmocka_unit_test(bodies_without_volume_are_not_inward),
         cmocka_unit_test(a_soup_is_a_body),

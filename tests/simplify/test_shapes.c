@@ -57,6 +57,39 @@ static void a_flat_grid_goes_back_to_two_triangles(void **state) {
     fct_mesh_release(&env, &grid);
 }
 
+/* Three flat pages of 6 x 6 quads on one spine, whose edges have three faces. */
+static void pages_go_back_to_two_triangles_each(void **state) {
+    (void)state;
+    enum { PAGES = 3, N = 6, PER_PAGE = N * (N + 1) };
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, N + 1 + PAGES * PER_PAGE, PAGES * 2 * N * N, 0, &mesh), FCT_OK);
+    uint32_t *t = mesh.triangles;
+    for (uint32_t p = 0; p < PAGES; ++p) {
+        double angle = 2 * 3.14159265358979 * p / PAGES;
+        for (uint32_t j = 0; j <= N; ++j) /* row 0 is the spine */
+            for (uint32_t i = 0; i <= N; ++i) {
+                float *at =
+                    mesh.positions + 3 * (size_t)(j ? N + 1 + p * PER_PAGE + (j - 1) * (N + 1) + i : i);
+                at[0] = (float)(j * cos(angle) / N), at[1] = (float)(j * sin(angle) / N),
+                at[2] = (float)i / N;
+            }
+        for (uint32_t j = 0; j < N; ++j)
+            for (uint32_t i = 0; i < N; ++i, t += 6) {
+                uint32_t up = N + 1 + p * PER_PAGE + j * (N + 1) + i, low = j ? up - N - 1 : i;
+                const uint32_t two[6] = {low, up, up + 1, low, up + 1, low + 1};
+                memcpy(t, two, sizeof two);
+            }
+    }
+    fct_simplify_def def = fct_simplify_def_default();
+    def.max_error = 1e-4;
+    fct_mesh out = simplified(&env, &mesh, &def, NULL);
+    assert_int_equal(out.face_count, 2 * PAGES);
+    assert_int_equal(out.vertex_count, 2 + 2 * PAGES);
+    assert_float_equal(mesh_area(&out), PAGES, 1e-4);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* The mean squared distance from the unit sphere, over 36 points per face. */
 static double sphere_error(const fct_mesh *mesh) {
     enum { N = 8 };
@@ -238,6 +271,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_cube_goes_back_to_twelve_triangles),
+        cmocka_unit_test(pages_go_back_to_two_triangles_each),
         cmocka_unit_test(a_flat_grid_goes_back_to_two_triangles),
         cmocka_unit_test(error_on_a_sphere_falls_with_the_square_of_the_faces),
         cmocka_unit_test(refit_lowers_the_error),
