@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
+#include <xxhash.h>
 
 #include "base/io/beside.h"
 #include "mesh/glb/read.h"
@@ -146,5 +147,23 @@ fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool 
     fct_source source = {env, path, file.data, file.size, NULL};
     result = fct_glb_holds_light(&source, out);
     fct_file_close(env, &file);
+    return result;
+}
+
+fct_result fct_mesh_file_hash(const fct_env *env, const char *path, uint64_t *out) {
+    *out = 0;
+    const format *f = find_format(fct_file_format(env, path));
+    fct_file file;
+    char *folder = fct_file_folder(env, path);
+    if (!folder) return FCT_ERROR_MEMORY;
+    fct_result result = fct_file_open(env, path, &file);
+    if (result == FCT_OK && f && f->read == fct_read_glb) {
+        fct_source source = {env, path, file.data, file.size, folder};
+        result = fct_glb_hash(&source, out);
+    } else if (result == FCT_OK) {
+        *out = XXH3_64bits(file.data, file.size);
+    }
+    fct_file_close(env, &file);
+    fct_release(env, folder);
     return result;
 }

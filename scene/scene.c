@@ -142,7 +142,7 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
     fct_model model = {.tree = own->tree,
                        .source_faces = own->source_faces,
                        .source_vertices = own->source_vertices,
-                       .inward = own->inward};
+                       .inward = fct_tree_get(own->tree).inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
     if (result == FCT_OK && depth > FCT_SCENE_TREE_DEPTH)
@@ -163,9 +163,9 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
     return FCT_OK;
 }
 
-/* Adds a model of the listed faces, or of the whole mesh if `faces` is NULL. */
+/* Adds a model of the listed faces, or of the whole mesh if `faces` is NULL. weld: of fct_tree_def. */
 static fct_result add_model_of_faces(fct_scene *scene, const char *name, const fct_mesh *mesh,
-                                     uint32_t *faces, uint32_t count) {
+                                     uint32_t *faces, uint32_t count, bool weld) {
     const fct_env *env = scene->env;
     fct_scene_model own = {0};
     fct_mesh part = {0};
@@ -179,10 +179,10 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     fct_mesh plain = faces ? part : *mesh;
     plain.materials = NULL, plain.material_names = NULL, plain.material_count = 0;
     fct_tree_def def = fct_tree_def_default();
+    def.weld = weld;
     bool moved = false;
     if (result == FCT_OK) result = center_mesh(env, &plain, own.origin, &moved);
     if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
-    if (result == FCT_OK) own.inward = fct_scene_is_inward(&plain, own.tree);
     if (moved) fct_release(env, plain.positions);
     if (faces) fct_mesh_release(env, &part);
     if (result != FCT_OK) {
@@ -197,11 +197,12 @@ static fct_result add_model_of_tree(fct_scene *scene, const char *name, fct_tree
     fct_scene_model own = {.tree = tree};
     memcpy(own.origin, fct_tree_get(tree).origin, sizeof own.origin);
     if (fct_tree_get(tree).root_count <= MOST_ROOTS) return add_model(scene, name, &own);
+    bool weld = fct_tree_get(tree).def.weld;
     fct_mesh mesh;
     fct_result result = fct_tree_mesh(scene->env, tree, &mesh);
     fct_tree_destroy(tree);
     if (result != FCT_OK) return result;
-    result = add_model_of_faces(scene, name, &mesh, NULL, mesh.face_count);
+    result = add_model_of_faces(scene, name, &mesh, NULL, mesh.face_count, weld);
     fct_mesh_release(scene->env, &mesh);
     return result;
 }
@@ -239,7 +240,8 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
     for (uint32_t k = 0; k < label_count && result == FCT_OK; ++k) {
         uint32_t count = starts[k + 1] - starts[k];
         if (count == 0) continue;
-        result = add_model_of_faces(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count);
+        result =
+            add_model_of_faces(scene, name, mesh, used > 1 ? faces + starts[k] : NULL, count, !env->no_weld);
         if (result != FCT_OK) break;
         parts->labels[parts->count++] = k;
         if (bodies > 0 && inward[faces[starts[k]]]) scene->models[scene->model_count - 1].inward = true;
@@ -256,12 +258,13 @@ static fct_result split_turned(fct_scene *scene, const char *name, const fct_mes
                                const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts) {
     const fct_env *env = scene->env;
     fct_mesh own = {0}, turned = {0};
+    bool weld = tree ? fct_tree_get(tree).def.weld : !env->no_weld;
     fct_result result = tree ? fct_tree_mesh(env, tree, &own) : FCT_OK;
     fct_tree_destroy(tree);
     if (result == FCT_OK) result = fct_scene_turn(env, tree ? &own : mesh, &turned);
     if (result == FCT_OK)
         result = labels ? split_by_label(scene, name, &turned, labels, label_count, parts)
-                        : add_model_of_faces(scene, name, &turned, NULL, turned.face_count);
+                        : add_model_of_faces(scene, name, &turned, NULL, turned.face_count, weld);
     fct_release(env, turned.triangles);
     fct_mesh_release(env, &own);
     return result;
@@ -283,7 +286,7 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
         }
         result = env->flip_inward ? split_turned(scene, name, mesh, tree, NULL, 0, parts)
                  : tree           ? add_model_of_tree(scene, name, tree)
-                                  : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count);
+                        : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count, !env->no_weld);
         parts->count = 1;
     }
     if (result != FCT_OK) {

@@ -28,7 +28,6 @@ typedef struct fct_scene_model {
     fct_bvh *points; /* answers closest points if bvh cannot (Embree), else NULL */
     uint32_t *source_faces, *source_vertices;
     double origin[3]; /* the tree's positions are relative to it */
-    bool inward;      /* as in fct_model */
 } fct_scene_model;
 
 /* Instances [first, first + count) are the parts of one object. */

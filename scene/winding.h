@@ -3,13 +3,11 @@
 #define FCT_SCENE_WINDING_H
 
 #include "base/env.h"
-#include "facetree/cluster.h"
+#include "facetree/mesh.h"
 
 /* *out is the mesh with triangles of its own, in which closed bodies are wound outwards, and without normals
  * and texture coordinates. The caller releases only out->triangles. Errors: MEMORY, CANCELLED; then that is
  * NULL. */
 fct_result fct_scene_turn(const fct_env *env, const fct_mesh *mesh, fct_mesh *out);
-/* Whether the mesh of the tree is closed and its volume negative. */
-bool fct_scene_is_inward(const fct_mesh *mesh, const fct_tree *tree);
 
 #endif

@@ -151,6 +151,7 @@ static int run_boxes(tool *t, void *options) {
     uint32_t *nodes = NULL, count = 0;
     fct_cluster *clusters = NULL;
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
+    if (code == TOOL_DONE) tool_warn_inward(t, t->inputs[0], fct_tree_get(tree).inward);
     if (code == TOOL_DONE) code = choose_clusters(t, tree, o, &nodes, &count);
     if (code == TOOL_DONE && !(clusters = tool_allocate(t, count, sizeof *clusters))) code = TOOL_MEMORY;
     for (uint32_t i = 0; code == TOOL_DONE && i < count; ++i)

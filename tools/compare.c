@@ -55,6 +55,7 @@ static int share_origin(tool *t, fct_tree *trees[2]) {
     if (!memcmp(a.origin, b.origin, sizeof a.origin)) return TOOL_DONE;
     fct_mesh mesh;
     fct_tree_def def = fct_tree_def_default();
+    def.weld = b.def.weld;
     int code = tool_result(t, fct_tree_mesh(&t->env, trees[1], &mesh));
     if (code != TOOL_DONE) return code;
     for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)

@@ -92,6 +92,7 @@ static json_t *describe_build(const fct_tree_def *def) {
                   def->cost == FCT_COST_MEAN ? "mean" : "increment", "fit_measure",
                   def->fit_measure == FCT_FIT_POINTS ? "points" : "area", "fit", def->fit_weight, "direction",
                   def->direction_weight, "shape", def->shape_weight, "roots", (json_int_t)def->root_count);
+    json_object_set_new(object, "weld", json_boolean(def->weld));
     if (def->max_cost < 1e300) json_object_set_new(object, "max_cost", json_real(def->max_cost));
     return object;
 }
@@ -129,6 +130,7 @@ static int describe_header(tool *t, const fct_tree *tree, json_t *object) {
     set_count(object, "boundary_edges", view.boundary_edges);
     set_count(object, "nonmanifold_edges", view.nonmanifold_edges);
     set_count(object, "components", view.component_count);
+    json_object_set_new(object, "inward", json_boolean(view.inward));
     set_count(object, "materials", view.material_count);
     json_object_set_new(object, "vertex_colors", json_boolean(view.colors != NULL));
     set_bounds(object, &view.bounds, view.origin);

@@ -175,6 +175,7 @@ static int run_meshlets(tool *t, void *options) {
     fct_meshlets meshlets = {0};
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
     if (code != TOOL_DONE) return code;
+    tool_warn_inward(t, t->inputs[0], fct_tree_get(tree).inward);
     double start = tool_seconds();
     code = tool_result(t, fct_tree_meshlets(&t->env, tree, def, &meshlets));
     double seconds = tool_seconds() - start;

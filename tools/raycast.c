@@ -174,6 +174,7 @@ static int cast_in_model(tool *t, const ray_options *options, const tool_rows *r
     outcome o = {0};
     int code = tool_open_tree(t, t->inputs[0], NULL, &tree);
     if (code != TOOL_DONE) return code;
+    tool_warn_inward(t, t->inputs[0], fct_tree_get(tree).inward);
     code = place_rays(t, rows, fct_tree_get(tree).origin, &rays);
     if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, options->backend, &bvh));
     if (code == TOOL_DONE)

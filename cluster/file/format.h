@@ -14,7 +14,13 @@ enum {
 };
 
 /* Flags. */
-enum { FCT_FORMAT_COLORS = 1, FCT_FORMAT_MATERIALS = 2, FCT_FORMAT_NAMES = 4, FCT_FORMAT_WELD = 8 };
+enum {
+    FCT_FORMAT_COLORS = 1,
+    FCT_FORMAT_MATERIALS = 2,
+    FCT_FORMAT_NAMES = 4,
+    FCT_FORMAT_WELD = 8,
+    FCT_FORMAT_INWARD = 16
+};
 
 typedef struct fct_format_section {
     uint32_t kind, reserved;

@@ -83,6 +83,7 @@ static void fill_view(const fct_format_header *h, fct_tree *tree) {
     view->depth = h->depth, view->mean_depth = h->mean_depth;
     view->boundary_edges = h->boundary_edges, view->nonmanifold_edges = h->nonmanifold_edges;
     view->component_count = h->component_count;
+    view->inward = h->flags & FCT_FORMAT_INWARD;
     view->bounds = h->bounds;
     memcpy(view->origin, h->origin, sizeof view->origin);
     view->material_count = h->material_count;

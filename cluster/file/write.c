@@ -227,6 +227,7 @@ static fct_result write_head(fct_tree_writer *writer, const fct_tree_view *view)
     h->depth = view->depth, h->mean_depth = view->mean_depth;
     h->boundary_edges = view->boundary_edges, h->nonmanifold_edges = view->nonmanifold_edges;
     h->component_count = view->component_count;
+    if (view->inward) h->flags |= FCT_FORMAT_INWARD;
     h->bounds = view->bounds;
     for (int i = 0; i < FCT_SECTION_COUNT; ++i) {
         assert(writer->sections[i].written == h->sections[i].size);

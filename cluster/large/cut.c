@@ -34,6 +34,7 @@ typedef struct cutter {
     uint32_t *used; /* one bit per vertex: a face uses it */
     float *positions;
     uint32_t *triangles, *materials; /* room for ROWS faces */
+    uint32_t *corners;               /* likewise: triangles of the input, if vertices are joined */
     double origin[3], scale;
     uint32_t first;                 /* vertex of the block that code_vertices works on */
     uint32_t *current, group_count; /* per group of stretches: the part that receives its faces */
@@ -145,12 +146,21 @@ static fct_result add_page(cutter *c, uint32_t page) {
     return FCT_OK;
 }
 
+/* Reads faces [first, first + count). */
+static fct_result read_faces(cutter *c, uint32_t first, uint32_t count) {
+    fct_large *l = c->large;
+    uint32_t *input = l->joined ? c->corners : c->triangles;
+    fct_result result = fct_stream_faces(l->stream, first, count, input, c->materials);
+    if (result != FCT_OK || !l->joined) return result;
+    return fct_spool_read(&l->welded, 12 * (uint64_t)first, c->triangles, 12 * (size_t)count);
+}
+
 /* Counts the faces of each stretch, marks used vertices, and raises material_count to the highest id + 1. */
 static fct_result count_faces(cutter *c) {
     fct_large *l = c->large;
     for (uint32_t f = 0; f < l->info.face_count; f += ROWS) {
         uint32_t rows = l->info.face_count - f < ROWS ? l->info.face_count - f : ROWS;
-        fct_result result = fct_stream_faces(l->stream, f, rows, c->triangles, c->materials);
+        fct_result result = read_faces(c, f, rows);
         if (result == FCT_OK) result = fct_progress(l->env, "cut", 0.2 + 0.3 * f / l->info.face_count);
         if (result != FCT_OK) return result;
         for (size_t i = 0; i < 3 * (size_t)rows; ++i)
@@ -181,7 +191,7 @@ static fct_result cut_curve(cutter *c) {
     c->current = fct_allocate(l->env, c->group_count, sizeof *c->current);
     if (!c->current) return fct_fail_memory(l->env, "the parts of a mesh");
     memset(c->current, 0xFF, groups * sizeof *c->current);
-    c->row_words = l->info.materials ? 5 : 4;
+    c->row_words = fct_large_row_words(l);
     uint64_t buffers = l->budget / 8 < 32 << 20 ? l->budget / 8 : 32 << 20;
     uint64_t rows = buffers / (groups * c->row_words * 4);
     c->run_rows = (uint32_t)(rows < 16 ? 16 : rows > 8192 ? 8192 : rows);
@@ -233,7 +243,8 @@ static fct_result put_face(cutter *c, uint32_t face, size_t row) {
     uint32_t part = *current;
     uint32_t *to = c->buffers + (size_t)c->row_words * ((size_t)part * c->run_rows + c->fills[part]);
     to[0] = face, to[1] = t[0], to[2] = t[1], to[3] = t[2];
-    if (c->materials) to[4] = c->materials[row];
+    if (l->joined) memcpy(to + 4, c->corners + 3 * row, 12);
+    if (c->materials) to[c->row_words - 1] = c->materials[row];
     for (int k = 0; k < 3; ++k) {
         uint16_t *owner = &c->owners[t[k]];
         if (*owner == UINT16_MAX)
@@ -250,7 +261,7 @@ static fct_result spool_faces(cutter *c) {
     fct_result result = FCT_OK;
     for (uint32_t f = 0; f < l->info.face_count && result == FCT_OK; f += ROWS) {
         uint32_t rows = l->info.face_count - f < ROWS ? l->info.face_count - f : ROWS;
-        result = fct_stream_faces(l->stream, f, rows, c->triangles, c->materials);
+        result = read_faces(c, f, rows);
         if (result == FCT_OK) result = fct_progress(l->env, "cut", 0.5 + 0.5 * f / l->info.face_count);
         for (uint32_t i = 0; i < rows && result == FCT_OK; ++i) result = put_face(c, f + i, i);
     }
@@ -281,9 +292,10 @@ fct_result fct_large_cut(fct_large *large) {
     c.positions = fct_allocate(env, ROWS, 3 * sizeof *c.positions);
     c.triangles = fct_allocate(env, ROWS, 3 * sizeof *c.triangles);
     if (large->info.materials) c.materials = fct_allocate(env, ROWS, sizeof *c.materials);
+    if (large->joined) c.corners = fct_allocate(env, ROWS, 3 * sizeof *c.corners);
     fct_result result;
     if (!c.codes || !c.owners || !c.pages || !c.used || !large->shared || !c.positions || !c.triangles ||
-        (large->info.materials && !c.materials)) {
+        (large->info.materials && !c.materials) || (large->joined && !c.corners)) {
         result = fct_fail_memory(env, "the parts of a mesh");
     } else {
         memset(c.owners, 0xFF, vertices * sizeof *c.owners);
@@ -297,6 +309,8 @@ fct_result fct_large_cut(fct_large *large) {
     fct_release(env, c.positions);
     fct_release(env, c.triangles);
     fct_release(env, c.materials);
+    fct_release(env, c.corners);
+    fct_spool_close(&large->welded);
     fct_release(env, c.current);
     fct_release(env, c.buffers);
     fct_release(env, c.fills);

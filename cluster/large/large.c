@@ -13,6 +13,7 @@ enum {
     PART_BYTES = 235,        /* per face of a part */
     VERTEX_BYTES = 32,       /* per vertex of a part */
     MEAN_BYTES = 168,        /* more per face with the cost MEAN: an fct_mean_record */
+    CORNER_BYTES = 12,       /* more per face where vertices are joined */
     TOP_BYTES = 640,         /* per top */
     BUFFER_BYTES = 12 << 20, /* of all buffers */
     LEAST_PART = 1 << 16     /* faces of the smallest part that least_bytes plans for */
@@ -65,7 +66,7 @@ static fct_result plan(fct_large *l, const fct_large_def *def) {
                         (unsigned long long)(least >> 20) + 1);
     uint64_t room = limit / 8 * 7 - fixed_bytes(vertices);
     l->budget = (size_t)room;
-    uint64_t part = room / face_bytes(faces, vertices, mean);
+    uint64_t part = room / (face_bytes(faces, vertices, mean) + (l->joined ? CORNER_BYTES : 0));
     part = part / 5 * 4; /* because cut.c lets a part have a quarter more */
     l->part_faces = (uint32_t)(def->part_faces ? def->part_faces : part < INT32_MAX ? part : INT32_MAX);
     uint64_t tops = room / 2 / TOP_BYTES;
@@ -74,8 +75,9 @@ static fct_result plan(fct_large *l, const fct_large_def *def) {
 }
 
 static void release(fct_large *l) {
-    fct_spool *spools[] = {&l->faces, &l->nodes, &l->costs, &l->face_ids, &l->triangles, &l->materials,
-                           &l->tops,  &l->sums,  &l->means, &l->edges,    &l->sides};
+    fct_spool *spools[] = {&l->faces,     &l->nodes,  &l->costs,  &l->face_ids, &l->triangles,
+                           &l->materials, &l->tops,   &l->sums,   &l->means,    &l->edges,
+                           &l->sides,     &l->welded, &l->corners};
     for (size_t i = 0; i < sizeof spools / sizeof *spools; ++i) fct_spool_close(spools[i]);
     fct_stream_close(l->stream);
     fct_release(l->env, l->shared);
@@ -96,6 +98,9 @@ static fct_result build(fct_large *l, const char *mesh_path, const fct_large_def
     if (l->info.face_count == 0)
         return fct_fail(l->env, FCT_ERROR_DATA, "%s: expected at least one face, found none", mesh_path);
     result = plan(l, def);
+    if (result == FCT_OK && l->def->weld) result = fct_large_weld(l);
+    l->joined = l->welded.env != NULL;
+    if (result == FCT_OK && l->joined) result = plan(l, def);
     if (result == FCT_OK) result = fct_large_cut(l);
     stats->seconds_read = fct_seconds() - start;
     if (result == FCT_OK) result = fct_large_pieces(l);
@@ -108,13 +113,6 @@ static fct_result build(fct_large *l, const char *mesh_path, const fct_large_def
     if (result == FCT_OK) result = fct_large_write(l, view);
     stats->seconds_write = fct_seconds() - described;
     return result;
-}
-
-/* Whether the surface has far more open edges than the rim of a square grid of its faces (2.8 per root of the
- * number of faces), as where vertices are doubled along seams. */
-static bool is_torn(const fct_tree_view *view) {
-    enum { RIMS = 16 };
-    return (double)view->boundary_edges * view->boundary_edges > (double)RIMS * RIMS * view->face_count;
 }
 
 fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const char *tree_path,
@@ -132,16 +130,10 @@ fct_result fct_tree_build_file(const fct_env *env, const char *mesh_path, const 
     if (result != FCT_OK) return result;
     fct_large l = {.env = env, .def = &options, .folder = limits.temporary_folder, .path = tree_path};
     fct_tree_view view = {0};
-    bool weld = options.weld;
-    options.weld = false; /* the vertices of a place can be in different parts */
     result = build(&l, mesh_path, &limits, stats, &view);
-    if (result == FCT_OK && weld && is_torn(&view))
-        fct_note(env, FCT_MESSAGE_WARNING,
-                 "%s: %u edges have one face; vertices of equal position are not joined in a mesh that is "
-                 "clustered in parts",
-                 mesh_path, view.boundary_edges);
     stats->face_count = l.info.face_count, stats->vertex_count = l.info.vertex_count;
     stats->root_count = view.root_count, stats->depth = view.depth, stats->mean_depth = view.mean_depth;
+    stats->inward = view.inward;
     stats->part_count = (uint32_t)l.part_count, stats->top_count = l.top_count;
     stats->seconds_dual = l.seconds_dual, stats->seconds_contract = l.seconds_contract;
     stats->seconds_boxes = l.seconds_boxes;

@@ -1,5 +1,5 @@
 /* cluster/large/large.h: the tree of a mesh that does not fit into memory, in six steps. Spools (temporary
- * files) hold the data between the steps.
+ * files) hold the data between the steps. Before them, weld.c joins vertices of equal position.
  *
  * 1. cut.c cuts the mesh along a space-filling curve into parts.
  * 2. piece.c contracts and describes one part after another. Merges that depend on another part wait. The
@@ -17,6 +17,7 @@
 #include "cluster/merge/work.h"
 #include "cluster/tree/describe/outline.h"
 #include "cluster/tree/describe/single.h"
+#include "cluster/tree/tree.h"
 #include "mesh/stream.h"
 
 /* A cluster that remains after the contraction of its part. */
@@ -80,16 +81,21 @@ typedef struct fct_large {
     fct_bounds bounds;     /* of the vertices that faces use */
     fct_bounds all_bounds; /* of all vertices */
     uint32_t *shared;      /* one bit per vertex: faces of several parts use it */
-    fct_spool faces;       /* u32 per face: id, three vertices, and the material if the mesh has materials */
+    fct_spool welded;      /* u32 x 3 per face in the order of the input; not open: no vertex is joined */
+    bool joined;           /* some vertices are: the triangles of the parts are not those of the input */
+    fct_spool faces;       /* u32 per face: id, three vertices, those of the input if some are joined, and the
+                              material if the mesh has materials */
     fct_face_run *runs;    /* in order of writing */
     size_t run_count, run_capacity;
     fct_part *parts;
     size_t part_count, part_capacity;
     fct_spool nodes, costs, face_ids, triangles, materials;
+    fct_spool corners; /* u32 x 3 per face: vertices of the input; only if some are joined */
     fct_spool tops, sums, means, edges, sides;
     uint32_t top_count;
     uint32_t loose_joins; /* merges inside parts of clusters that no edge connects */
     int64_t boundary_edges, nonmanifold_edges;
+    fct_enclosed enclosed;
     uint32_t component_count;
     double seconds_dual, seconds_contract, seconds_boxes;
     /* The tops of all parts and the tree above them. The child of an upper node is an upper node, or
@@ -102,10 +108,18 @@ typedef struct fct_large {
     uint32_t *top_places; /* per entry of top_order: place of its first face; then the number of faces */
 } fct_large;
 
+/* u32 per row of the spool of faces. */
+static inline uint32_t fct_large_row_words(const fct_large *large) {
+    return 4 + (large->joined ? 3 : 0) + (large->info.materials ? 1 : 0);
+}
+
 enum { FCT_CURVE_BITS = 10 };
 /* Number on a Hilbert curve through 2^30 cells of the cell with the coordinates x[k] < 2^10. Overwrites x. */
 uint32_t fct_curve_code(uint32_t x[3]);
 
+/* Joins vertices of equal position; opens large->welded if there are some. Errors: INPUT, DATA, OUTPUT,
+ * MEMORY, CANCELLED. */
+fct_result fct_large_weld(fct_large *large);
 /* Finds bounds, parts and shared vertices, and spools the faces of each part. Errors: INPUT, DATA, OUTPUT,
  * MEMORY, CANCELLED. */
 fct_result fct_large_cut(fct_large *large);

@@ -1,7 +1,8 @@
 /* cluster/large/mesh.c: writes the faces and vertices of a large mesh to its hierarchy file.
  *
  * Faces are in the order of the roots, and within a root in the order of the tops. A vertex is numbered and
- * written with the first face that uses it; unused vertices come last. Memory: 4 bytes per vertex.
+ * written with the first face that uses it; unused vertices come last, and so do those that others replace.
+ * Memory: 4 bytes per vertex.
  */
 #include <string.h>
 
@@ -116,10 +117,11 @@ static fct_result name_vertex(vertex_writer *w, uint32_t vertex) {
     return w->waiting == ROWS ? flush_vertices(w) : FCT_OK;
 }
 
-static fct_result write_triangles(vertex_writer *w, uint32_t *rows) {
+/* Names the vertices of the triangles in a spool. put: writes the triangles too. */
+static fct_result visit_triangles(vertex_writer *w, const fct_spool *spool, bool put, uint32_t *rows) {
     const mesh_writer *m = w->mesh;
     uint32_t got = ROWS, done = 0;
-    face_order o = open_order(m, &m->large->triangles, 12);
+    face_order o = open_order(m, spool, 12);
     while (got == ROWS) {
         fct_result result = read_rows(&o, rows, ROWS, &got);
         if (result == FCT_OK)
@@ -128,14 +130,20 @@ static fct_result write_triangles(vertex_writer *w, uint32_t *rows) {
             if (w->renamed[rows[i]] == FCT_NONE) result = name_vertex(w, rows[i]);
             rows[i] = w->renamed[rows[i]];
         }
-        if (result == FCT_OK)
+        if (result == FCT_OK && put)
             result = fct_tree_writer_put(m->out, FCT_SECTION_TRIANGLES, rows, (size_t)got * 12);
         if (result != FCT_OK) return result;
         done += got;
     }
-    fct_result result = FCT_OK;
-    for (uint32_t v = 0; v < m->large->info.vertex_count && result == FCT_OK; ++v)
+    return FCT_OK;
+}
+
+static fct_result write_triangles(vertex_writer *w, uint32_t *rows) {
+    const fct_large *l = w->mesh->large;
+    fct_result result = visit_triangles(w, &l->triangles, !l->joined, rows);
+    for (uint32_t v = 0; v < l->info.vertex_count && result == FCT_OK; ++v)
         if (w->renamed[v] == FCT_NONE) result = name_vertex(w, v);
+    if (result == FCT_OK && l->joined) result = visit_triangles(w, &l->corners, true, rows);
     return result == FCT_OK ? flush_vertices(w) : result;
 }
 

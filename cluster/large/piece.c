@@ -29,6 +29,7 @@ typedef struct piece {
     fct_part *part;
     uint32_t number;
     uint32_t *face_ids;   /* per face: id in the input */
+    uint32_t *corners;    /* per face: its vertices in the input, if vertices are joined */
     uint32_t *vertex_ids; /* per vertex: id in the input, ascending */
     fct_mesh mesh;
     fct_work work;
@@ -67,7 +68,7 @@ static bool show_progress(void *user, const char *phase, double done) {
 /* Reads the faces of the part. Their corners are vertices of the whole mesh. */
 static fct_result load_faces(piece *p, uint32_t *rows) {
     fct_large *l = p->large;
-    size_t words = l->info.materials ? 5 : 4, at = 0;
+    size_t words = fct_large_row_words(l), at = 0;
     for (size_t r = 0; r < l->run_count; ++r) {
         const fct_face_run *run = &l->runs[r];
         if (run->part != p->number) continue;
@@ -77,7 +78,8 @@ static fct_result load_faces(piece *p, uint32_t *rows) {
         for (size_t i = 0; i < run->count; ++i, ++at) {
             p->face_ids[at] = rows[words * i];
             memcpy(p->mesh.triangles + 3 * at, rows + words * i + 1, 3 * sizeof(uint32_t));
-            if (p->mesh.materials) p->mesh.materials[at] = rows[words * i + 4];
+            if (p->corners) memcpy(p->corners + 3 * at, rows + words * i + 4, 3 * sizeof(uint32_t));
+            if (p->mesh.materials) p->mesh.materials[at] = rows[words * i + words - 1];
         }
     }
     return FCT_OK;
@@ -145,7 +147,7 @@ static fct_result load_mesh(piece *p) {
     size_t faces = p->part->face_count, words = (size_t)l->info.vertex_count / 32 + 1, row_words = 0;
     for (size_t r = 0; r < l->run_count; ++r)
         if (l->runs[r].part == p->number && l->runs[r].count > row_words) row_words = l->runs[r].count;
-    uint32_t *rows = fct_allocate(env, row_words, 5 * sizeof *rows);
+    uint32_t *rows = fct_allocate(env, row_words, fct_large_row_words(l) * sizeof *rows);
     uint32_t *bits = fct_allocate(env, words, sizeof *bits),
              *counts = fct_allocate(env, words, sizeof *counts);
     float *buffer = fct_allocate(env, ROWS, 3 * sizeof *buffer);
@@ -154,11 +156,12 @@ static fct_result load_mesh(piece *p) {
     p->face_ids = fct_allocate(env, faces, sizeof *p->face_ids);
     p->mesh.triangles = fct_allocate(env, faces, 3 * sizeof *p->mesh.triangles);
     if (l->info.materials) p->mesh.materials = fct_allocate(env, faces, sizeof *p->mesh.materials);
+    if (l->joined) p->corners = fct_allocate(env, faces, 3 * sizeof *p->corners);
     p->frozen = fct_allocate(env, faces, 1);
     p->on_cut = fct_allocate(env, faces, 1);
     fct_result result;
     if (!rows || !bits || !counts || !buffer || !p->face_ids || !p->mesh.triangles ||
-        (l->info.materials && !p->mesh.materials) || !p->frozen || !p->on_cut)
+        (l->info.materials && !p->mesh.materials) || (l->joined && !p->corners) || !p->frozen || !p->on_cut)
         result = fct_fail_memory(env, "a part of a mesh");
     else
         result = load_faces(p, rows);
@@ -466,6 +469,19 @@ static fct_result put_edges(piece *p) {
     return result;
 }
 
+/* Spools the triangles of the input. */
+static fct_result put_corners(piece *p) {
+    fct_large *l = p->large;
+    size_t faces = p->tree->view.face_count;
+    uint32_t *rows = fct_allocate(l->env, faces, 3 * sizeof *rows);
+    if (!rows) return fct_fail_memory(l->env, "a part of a mesh");
+    for (size_t i = 0; i < faces; ++i)
+        memcpy(rows + 3 * i, p->corners + 3 * (size_t)p->tree->face_ids[i], 3 * sizeof *rows);
+    fct_result result = fct_spool_append(&l->corners, rows, 3 * faces * sizeof *rows);
+    fct_release(l->env, rows);
+    return result;
+}
+
 /* Spools nodes, costs (alone, for write.c), tops, and faces with the ids of the input. */
 static fct_result put_tree(piece *p) {
     fct_large *l = p->large;
@@ -474,10 +490,13 @@ static fct_result put_tree(piece *p) {
     float *costs = fct_allocate(l->env, nodes, sizeof *costs);
     uint32_t *ids = p->tree->face_ids, *triangles = p->tree->triangles;
     if (!costs) return fct_fail_memory(l->env, "a part of a mesh");
+    fct_result result = p->corners ? put_corners(p) : FCT_OK;
+    fct_enclosed_add(&l->enclosed, &view, v3_load(l->bounds.lower));
     for (size_t i = 0; i < nodes; ++i) costs[i] = p->tree->nodes[i].cost;
     for (size_t i = 0; i < faces; ++i) ids[i] = p->face_ids[ids[i]];
     for (size_t i = 0; i < 3 * faces; ++i) triangles[i] = p->vertex_ids[view.vertex_ids[triangles[i]]];
-    fct_result result = fct_spool_append(&l->nodes, p->tree->nodes, nodes * sizeof *p->tree->nodes);
+    if (result == FCT_OK)
+        result = fct_spool_append(&l->nodes, p->tree->nodes, nodes * sizeof *p->tree->nodes);
     if (result == FCT_OK) result = fct_spool_append(&l->costs, costs, nodes * sizeof *costs);
     if (result == FCT_OK) result = fct_spool_append(&l->face_ids, ids, faces * sizeof *ids);
     if (result == FCT_OK) result = fct_spool_append(&l->triangles, triangles, 3 * faces * sizeof *triangles);
@@ -497,6 +516,7 @@ static void release_piece(piece *p) {
     if (p->work.env) fct_work_release(&p->work);
     fct_tree_destroy(p->tree);
     fct_release(env, p->face_ids);
+    fct_release(env, p->corners);
     fct_release(env, p->vertex_ids);
     fct_release(env, p->frozen);
     fct_release(env, p->on_cut);
@@ -560,7 +580,7 @@ static fct_result run(piece *p) {
 fct_result fct_large_pieces(fct_large *large) {
     fct_spool *spools[] = {&large->nodes,     &large->costs, &large->face_ids, &large->triangles,
                            &large->materials, &large->tops,  &large->sums,     &large->means,
-                           &large->edges,     &large->sides};
+                           &large->edges,     &large->sides, &large->corners};
     fct_result result = FCT_OK;
     for (size_t i = 0; i < sizeof spools / sizeof *spools && result == FCT_OK; ++i)
         result = fct_spool_open(large->env, large->folder, large->path, spools[i]);

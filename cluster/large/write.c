@@ -396,6 +396,8 @@ static void fill_view(assembler *a) {
     a->view.def.direction_weight = (double)metric.direction_weight;
     a->view.def.shape_weight = (double)metric.shape_weight;
     a->view.def.source = NULL;
+    a->view.def.weld = l->joined;
+    a->view.inward = fct_enclosed_is_inward(&l->enclosed, &a->view);
     memcpy(a->view.origin, l->info.origin, sizeof a->view.origin);
 }
 

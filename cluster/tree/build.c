@@ -161,6 +161,7 @@ static fct_result build_tree(const fct_env *env, const fct_mesh *mesh, const fct
     double contracted = fct_seconds();
     if (result == FCT_OK) result = fct_tree_describe(tree);
     if (result == FCT_OK && joined) result = restore_triangles(env, mesh, tree);
+    if (result == FCT_OK) tree->view.inward = fct_tree_is_inward(&tree->view);
     if (stats) *stats = (fct_tree_stats){dual - start, contracted - dual, fct_seconds() - contracted};
     return result;
 }

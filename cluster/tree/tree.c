@@ -50,6 +50,28 @@ void fct_tree_measure_bounds(fct_tree *tree) {
     view->bounds = b;
 }
 
+void fct_enclosed_add(fct_enclosed *sum, const fct_tree_view *view, v3 origin) {
+    for (size_t f = 0; f < view->face_count; ++f) {
+        v3 p[3];
+        for (size_t k = 0; k < 3; ++k)
+            p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * f + k]), origin);
+        double term = v3_dot(p[0], v3_cross(p[1], p[2]));
+        sum->volume += term, sum->magnitude += fabs(term);
+    }
+}
+
+bool fct_enclosed_is_inward(const fct_enclosed *sum, const fct_tree_view *view) {
+    bool closed = view->boundary_edges == 0 && view->nonmanifold_edges == 0;
+    return closed && sum->volume < -1e-9 * sum->magnitude;
+}
+
+bool fct_tree_is_inward(const fct_tree_view *view) {
+    fct_enclosed sum = {0};
+    if (view->boundary_edges || view->nonmanifold_edges) return false;
+    fct_enclosed_add(&sum, view, v3_load(view->bounds.lower));
+    return fct_enclosed_is_inward(&sum, view);
+}
+
 fct_result fct_tree_mesh(const fct_env *env, const fct_tree *tree, fct_mesh *out) {
     const fct_tree_view *view = &tree->view;
     unsigned arrays = (view->colors ? FCT_MESH_COLORS : 0u) | (view->materials ? FCT_MESH_MATERIALS : 0u);

@@ -6,6 +6,7 @@
 
 #include "base/env.h"
 #include "base/io/file.h"
+#include "base/math/vec.h"
 #include "facetree/cluster.h"
 
 /* The members of an inner node that ordering sets; the description sets the others. */
@@ -42,6 +43,18 @@ fct_tree *fct_tree_new(const fct_env *env);
 
 /* Sets view.bounds from the positions. */
 void fct_tree_measure_bounds(fct_tree *tree);
+
+/* Six times the volume inside a closed surface: the sum over its faces of a signed term. magnitude: the sum
+ * of the terms' magnitudes. */
+typedef struct fct_enclosed {
+    double volume, magnitude;
+} fct_enclosed;
+/* Adds the faces of the view. origin: any point, the same for all faces of a surface. */
+void fct_enclosed_add(fct_enclosed *sum, const fct_tree_view *view, v3 origin);
+/* The value of view.inward. A volume below 1e-9 of the magnitude is 0. */
+bool fct_enclosed_is_inward(const fct_enclosed *sum, const fct_tree_view *view);
+/* The value of view.inward for a whole mesh. O(F) for a closed one. */
+bool fct_tree_is_inward(const fct_tree_view *view);
 
 /* Copies links and cost into a node's record. */
 static inline void fct_node_link_store(const fct_node_link *link, fct_cluster *out) {

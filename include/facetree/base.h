@@ -77,6 +77,10 @@ typedef struct fct_env {
     /* Whether scenes turn the closed bodies of their models that are wound inwards (fct_inward_flip of
      * dual.h). Default: false. */
     bool flip_inward;
+
+    /* Whether scenes cluster their models with fct_tree_def.weld false, so that vertices of equal position
+     * stay apart. Hierarchy files keep the choice of their build. Default: false. */
+    bool no_weld;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);

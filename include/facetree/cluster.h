@@ -70,7 +70,7 @@ typedef struct fct_tree_def {
     bool weld; /* vertices of equal position count as one for the dual graph (fct_weld_build); default true */
     double max_cost;      /* no merge costs more; default INFINITY; clusters that cannot merge become roots */
     const char *source;   /* name of the mesh, recorded in the file; NULL: none */
-    uint64_t source_hash; /* XXH3-64 of the mesh file, recorded in the file; 0: unknown */
+    uint64_t source_hash; /* fct_mesh_file_hash of the mesh file, recorded in the file; 0: unknown */
 } fct_tree_def;
 FCT_API fct_tree_def fct_tree_def_default(void);
 
@@ -97,6 +97,7 @@ typedef struct fct_tree_view {
     double mean_depth; /* mean over the leaves */
     /* Edges of the mesh with one face, with three or more, and the parts that edges connect (dual.h). */
     uint32_t boundary_edges, nonmanifold_edges, component_count;
+    bool inward;                /* closed (no such edges) and wound inwards: the volume inside is negative */
     fct_bounds bounds;          /* of all vertices; empty if there are none */
     const uint32_t *roots;      /* root_count node ids, ascending */
     const uint32_t *face_ids;   /* face_count: place -> input face */
@@ -177,6 +178,7 @@ typedef struct fct_large_stats {
     uint32_t part_count; /* parts that the mesh was cut into */
     uint32_t top_count;  /* clusters that the parts left for the last contraction */
     double seconds_read, seconds_dual, seconds_contract, seconds_boxes, seconds_write;
+    bool inward; /* as in fct_tree_view */
 } fct_large_stats;
 
 /* Builds a hierarchy file from a mesh file while neither is in memory:

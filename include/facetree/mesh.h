@@ -102,6 +102,11 @@ FCT_API fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bo
  * once. Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool *out);
 
+/* A hash that changes when the mesh of a file does: XXH3-64 of the bytes of the file and, for glTF, of the
+ * files of its buffers behind them, in the order of the document. Buffers that cannot be read do not count:
+ * whether the mesh needs them is for fct_mesh_load to say. Errors: INPUT, MEMORY. */
+FCT_API fct_result fct_mesh_file_hash(const fct_env *env, const char *path, uint64_t *out);
+
 typedef struct fct_mesh_save_def {
     uint32_t size;
     float exposure; /* factor on colours before they are clamped for display: PLY bytes, GLB COLOR_0; default

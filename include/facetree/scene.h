@@ -35,7 +35,7 @@ typedef struct fct_model {
     /* Input face of the tree -> face of the mesh that was added; NULL if they are the same. */
     const uint32_t *source_faces;
     const uint32_t *source_vertices; /* likewise for vertices */
-    bool inward;                     /* closed and wound inwards, as rooms are; false if the tree was given */
+    bool inward; /* closed and wound inwards, as rooms are: the tree is, or the mesh before it was split */
 } fct_model;
 
 typedef struct fct_instance {

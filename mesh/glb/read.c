@@ -1,9 +1,13 @@
 /* mesh/glb/read.c: joins the meshes of a glTF file, placed by their nodes, to one soup. */
+#define XXH_STATIC_LINKING_ONLY /* for the size of XXH3_state_t */
 #include "mesh/glb/read.h"
 
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
+#include <xxhash.h>
 
+#include "mesh/glb/document/buffer.h"
 #include "mesh/glb/features.h"
 #include "mesh/glb/primitive.h"
 
@@ -67,4 +71,32 @@ fct_result fct_glb_holds_light(const fct_source *source, bool *out) {
         json_object_get(json_object_get(object, "attributes"), "_RADIOSITY") != NULL;
     fct_glb_close(&glb);
     return result;
+}
+
+fct_result fct_glb_hash(const fct_source *source, uint64_t *out) {
+    fct_env env = *source->env;
+    env.message = NULL;
+    fct_source quiet = *source;
+    quiet.env = &env;
+    fct_glb glb;
+    json_t *object;
+    size_t i;
+    XXH3_state_t state;
+    XXH3_64bits_reset(&state);
+    XXH3_64bits_update(&state, source->data, source->size);
+    fct_result result = fct_glb_open(&quiet, &glb);
+    json_array_foreach(json_object_get(glb.root, "buffers"), i, object) {
+        const json_t *uri = json_object_get(object, "uri");
+        fct_glb_buffer buffer = {0};
+        if (result != FCT_OK || !json_is_string(uri)) continue;
+        if (!strncasecmp(json_string_value(uri), "data:", 5)) continue;
+        fct_result opened = fct_glb_open_uri(&glb, uri, &buffer);
+        if (opened == FCT_OK) XXH3_64bits_update(&state, buffer.data, buffer.size);
+        if (opened == FCT_ERROR_MEMORY) result = opened;
+        fct_file_close(&env, &buffer.file);
+        fct_release(&env, buffer.own);
+    }
+    fct_glb_close(&glb);
+    *out = XXH3_64bits_digest(&state);
+    return result == FCT_ERROR_MEMORY ? fct_fail_memory(source->env, "a hash") : FCT_OK;
 }

@@ -9,5 +9,7 @@
 fct_result fct_read_glb(const fct_source *source, fct_soup *out);
 /* Whether a primitive has _RADIOSITY. Errors: DATA, MEMORY. */
 fct_result fct_glb_holds_light(const fct_source *source, bool *out);
+/* XXH3-64 of the file and of the files of its buffers, without messages about them. Errors: MEMORY. */
+fct_result fct_glb_hash(const fct_source *source, uint64_t *out);
 
 #endif

@@ -4,13 +4,12 @@
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include "base/io/file.h"
 #include "scene/read/path.h"
 
-/* Opens NAME.fct beside a mesh file if it records the hash of that file. *out is NULL if there is none or the
- * hash differs. */
+/* Opens NAME.fct beside a mesh file if it records the hash of that file. *out is NULL if there is none, if
+ * the hash differs, or if it is welded and env->no_weld is set. */
 static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fct_tree **out) {
     *out = NULL;
     const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
@@ -20,18 +19,19 @@ static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fc
     if (!beside) return fct_fail_memory(env, "a path");
     memcpy(beside, path, stem);
     memcpy(beside + stem, ".fct", 5);
-    fct_file file = {0};
+    uint64_t hash = 0;
     fct_result result = FCT_OK;
     if (access(beside, F_OK) == 0) {
-        result = fct_file_open(env, path, &file);
+        result = fct_mesh_file_hash(env, path, &hash);
         if (result == FCT_OK) result = fct_tree_open(env, beside, out);
-        if (result == FCT_OK && fct_tree_get(*out).source_hash != XXH3_64bits(file.data, file.size)) {
+        const bool same = result == FCT_OK && fct_tree_get(*out).source_hash == hash;
+        if (result == FCT_OK && !same)
             fct_note(env, FCT_MESSAGE_NOTE, "%s does not match %s and is not used", beside, path);
+        if (result == FCT_OK && (!same || (env->no_weld && fct_tree_get(*out).def.weld))) {
             fct_tree_destroy(*out);
             *out = NULL;
         }
     }
-    fct_file_close(env, &file);
     fct_release(env, beside);
     return result;
 }

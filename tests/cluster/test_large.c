@@ -83,7 +83,6 @@ static void check_counts(const fct_env *env, const fct_mesh *mesh, const fct_tre
                          const fct_tree *tree) {
     fct_tree *whole;
     fct_tree_def options = def ? *def : fct_tree_def_default();
-    options.weld = false; /* as in parts */
     assert_int_equal(fct_tree_build(env, mesh, &options, NULL, &whole), FCT_OK);
     fct_tree_view a = fct_tree_get(tree), b = fct_tree_get(whole);
     assert_int_equal(a.boundary_edges, b.boundary_edges);
@@ -529,27 +528,6 @@ static void progress_never_falls(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* A warning where vertices should be joined but cannot be: more open edges than 16 times the root of the
- * number of faces. 28 loose triangles have 84 of 84.7, 29 have 87 of 86.2. */
-static void torn_meshes_are_told(void **state) {
-    (void)state;
-    recorder r = {0};
-    fct_env env = recorder_env(&r);
-    fct_large_def large = parts_of(10);
-    for (uint32_t n = 28; n <= 29; ++n)
-        for (int weld = 0; weld < 2; ++weld) {
-            fct_tree_def def = fct_tree_def_default();
-            fct_mesh mesh = make_loose(&env, n);
-            def.weld = weld;
-            save(&env, &mesh);
-            fct_mesh_release(&env, &mesh);
-            r.text[0] = 0, r.messages = 0;
-            assert_int_equal(fct_tree_build_file(&env, mesh_path, tree_path, &def, &large, NULL), FCT_OK);
-            assert_int_equal(r.messages, n == 29 && weld);
-            if (r.messages) assert_non_null(strstr(r.text, "87 edges"));
-        }
-}
-
 static void errors_are_told(void **state) {
     (void)state;
     recorder r = {0};
@@ -605,7 +583,6 @@ int main(void) {
                                        cmocka_unit_test(no_memory_anywhere),
                                        cmocka_unit_test(can_be_cancelled_anywhere),
                                        cmocka_unit_test(progress_never_falls),
-                                       cmocka_unit_test(torn_meshes_are_told),
                                        cmocka_unit_test(errors_are_told)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -112,6 +112,23 @@ static fct_result find_light(const fct_env *env) {
     return STARVE(fct_mesh_file_holds_light(env, IN "sheet.glb", &lit));
 }
 
+static fct_result hash_file(const fct_env *env, const char *path) {
+    uint64_t hash, whole;
+    fct_env plain = fct_env_default();
+    fct_result result = STARVE(fct_mesh_file_hash(env, path, &hash));
+    assert_int_equal(fct_mesh_file_hash(&plain, path, &whole), FCT_OK);
+    if (result == FCT_OK) assert_true(hash == whole);
+    return result;
+}
+
+static fct_result hash_glb(const fct_env *env) {
+    return hash_file(env, IN "sheet.glb");
+}
+
+static fct_result hash_gltf(const fct_env *env) {
+    return hash_file(env, IN "corner.gltf");
+}
+
 static fct_result save_ply(const fct_env *env) {
     return STARVE(fct_mesh_save(env, OUT "sheet.ply", &inputs.sheet, NULL));
 }
@@ -231,6 +248,8 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_mesh_load", "gltf", load_gltf, false},
                                   {"fct_mesh_file_counts", "", count_file, false},
                                   {"fct_mesh_file_holds_light", "", find_light, false},
+                                  {"fct_mesh_file_hash", "glb", hash_glb, false},
+                                  {"fct_mesh_file_hash", "gltf", hash_gltf, false},
                                   {"fct_mesh_save", "ply", save_ply, false},
                                   {"fct_mesh_save", "text ply", save_text_ply, false},
                                   {"fct_mesh_save", "obj", save_obj, false},

@@ -316,6 +316,55 @@ static void opens_the_hierarchy_beside_a_mesh(void **unused) {
     assert_int_equal(r.alive, 0);
 }
 
+/* A model of one soup of two triangles at one side. */
+static void expect_weld(const fct_env *env, const char *name, bool weld) {
+    fct_scene *scene;
+    assert_int_equal(load(env, name, &scene), FCT_OK);
+    fct_tree_view v = fct_tree_get(fct_scene_get(scene).models[0].tree);
+    assert_int_equal(v.def.weld, weld);
+    assert_int_equal(v.component_count, weld ? 1 : 2);
+    fct_scene_destroy(scene);
+}
+
+static void models_follow_the_choice_of_the_weld(void **unused) {
+    (void)unused;
+    recorder r = {0};
+    fct_env welding = recorder_env(&r), apart = recorder_env(&r);
+    fct_mesh mesh;
+    fct_tree *tree;
+    fct_file file;
+    fct_tree_def def = fct_tree_def_default();
+    apart.no_weld = true;
+    write_text("soup.obj", "mtllib soup.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+                           "usemtl a\nf 1 2 3\nf 4 5 6\n");
+    write_text("soup.mtl", "newmtl a\nKd .5 .5 .5\n");
+    write_text("soup.json", HEAD "\"models\": {\"t\": \"soup.obj\"}, \"instances\": [{\"model\": \"t\", "
+                                 "\"material\": \"a\"}]}");
+    assert_int_equal(fct_mesh_load(&welding, path_of("soup.obj"), &mesh), FCT_OK);
+    assert_int_equal(fct_mesh_save(&welding, path_of("soup.glb"), &mesh, NULL), FCT_OK);
+    static const char *const names[] = {"soup.obj", "soup.json", "soup.glb"};
+    for (int k = 0; k < 3; ++k) {
+        expect_weld(&welding, names[k], true);
+        expect_weld(&apart, names[k], false);
+    }
+    /* A hierarchy file keeps the choice of its build. The welded one beside a mesh is not used. */
+    assert_int_equal(fct_file_open(&welding, path_of("soup.obj"), &file), FCT_OK);
+    def.source_hash = XXH3_64bits(file.data, file.size);
+    fct_file_close(&welding, &file);
+    for (int weld = 1; weld >= 0; --weld) {
+        def.weld = weld;
+        assert_int_equal(fct_tree_build(&welding, &mesh, &def, NULL, &tree), FCT_OK);
+        assert_int_equal(fct_tree_save(&welding, tree, path_of("soup.fct")), FCT_OK);
+        fct_tree_destroy(tree);
+        expect_weld(&welding, "soup.fct", weld);
+        expect_weld(&apart, "soup.fct", weld);
+        expect_weld(&welding, "soup.json", weld);
+        expect_weld(&apart, "soup.json", false);
+    }
+    fct_mesh_release(&welding, &mesh);
+    assert_int_equal(r.alive, 0);
+}
+
 static void missing_files_are_told(void **unused) {
     (void)unused;
     static const char *const names[] = {"gone.json", "gone.obj", "gone.ply", "gone.fct"};
@@ -376,6 +425,7 @@ int main(void) {
         cmocka_unit_test(refuses_bad_scenes_and_says_where),
         cmocka_unit_test(fails_cleanly_at_every_allocation),
         cmocka_unit_test(opens_the_hierarchy_beside_a_mesh),
+        cmocka_unit_test(models_follow_the_choice_of_the_weld),
         cmocka_unit_test(missing_files_are_told),
         cmocka_unit_test(scenes_made_by_calls_are_checked),
     };

@@ -121,7 +121,17 @@ expect 0 cluster doubled.off --no-weld -o doubled.fct
 expect 0 partition doubled.fct --charts 50 -o labels.txt --json
 check "--no-weld: each face is a chart" test "$(value charts)" = "$(sed -n 2p doubled.off | cut -d ' ' -f 2)"
 expect 0 info doubled.fct --verify
+expect 0 info doubled.fct --json
+check "info: the choice of the weld" test "$(value weld)" = false
 expect 64 info doubled.off --no-weld
+cp doubled.off soup.off # no hierarchy file is beside it
+printf '{"materials": {"light": {"emission": 1}}, "models": {"m": "soup.off"}, "instances": [{"model": "m", "material": "light"}, {"model": "m", "material": "light", "translate": [2.5, 0, 0]}]}' >scene.json
+for how in '' --no-weld; do
+    # shellcheck disable=SC2086 # nothing or a word
+    expect 0 bake scene.json -o lit.ply --final none --error 1e-4 --json $how
+    echo "$(value elements)" >"elements$how"
+done
+check "bake --no-weld: other clusters" sh -c '! cmp -s elements elements--no-weld'
 
 # --- odd meshes: every face gets an answer ---
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >one.off

@@ -62,6 +62,20 @@ parts() {
     says "needs at least"
     check "nothing is left" test -z "$(ls folder)"
     check "the old file" cmp parts.fct again.fct
+    # Doubled vertices are joined, as in memory.
+    expect 0 make sphere --triangles 200000 -o ball.off
+    awk 'NR == 2 { n = $1; f = $2 } NR > 2 && NR <= n + 2 { p[NR - 3] = $0 }
+        NR > n + 2 { for (i = 2; i <= 4; ++i) q[c++] = p[$i] }
+        END { print "OFF"; print c, f, 0; for (i = 0; i < c; ++i) print q[i]; for (i = 0; i < f; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }' \
+        ball.off >torn.off
+    expect 0 cluster torn.off -o parts.fct --max-memory 50M --json
+    holds "$(value parts) > 1"
+    expect 0 info parts.fct --verify --json
+    check "doubled vertices in parts" test "$(value boundary_edges) $(value components) $(value weld)" = "0 1 true"
+    expect 0 cluster torn.off -o parts.fct --max-memory 50M --no-weld
+    expect 0 info parts.fct --json
+    check "--no-weld in parts" test "$(value components)" = 200000
+    rm -f ball.off torn.off
     # An edge that all faces share takes more than the estimate.
     awk -v n=200000 'BEGIN { print "OFF"; print n + 2, n, 0; print 0, 0, 0; print 0, 0, 1
         for (i = 0; i < n; ++i) print cos(i / 10000) * (1 + i % 7 / 10), sin(i / 10000), i % 13 / 100

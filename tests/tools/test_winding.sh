@@ -20,6 +20,25 @@ expect 0 convert outward.off --flip-inward -o same.off
 expect 0 convert outward.off -o plain.off
 check "outward bodies stay" cmp same.off plain.off
 expect 64 info inward.off --flip-inward
+
+# Every command that builds or opens a tree of a model tells it, also of a hierarchy file.
+echo '0 0 5 0 0 -1' >rays.txt
+expect 0 cluster inward.off -o inward.fct
+says "inward.off: the surface is closed and wound inwards"
+expect 0 cluster outward.off -o outward.fct
+expect 0 info inward.fct --verify --json
+check "a hierarchy file holds the winding" test "$(value inward)" = true
+for ending in off fct; do
+    for how in 'boxes -k 9 -o x.json' 'meshlets -o x.json' 'raycast --rays rays.txt -o x.txt'; do
+        # shellcheck disable=SC2086 # several words
+        expect 0 $how inward.$ending
+        says "inward.$ending: the surface is closed and wound inwards"
+        # shellcheck disable=SC2086 # several words
+        expect 0 $how outward.$ending
+        check "$how: nothing is wound inwards" sh -c '! grep -q "wound inwards" err'
+    done
+done
+expect 64 info inward.off --flip-inward
 says "unknown option '--flip-inward'"
 
 # A lamp in a room, beside a ball that is wound inwards.
@@ -43,8 +62,9 @@ expect 0 bake free.json -o lit/ --final direct --error 1e-3 --flip-inward
 check "nothing is wound inwards" sh -c '! grep -q "wound inwards" err'
 expect 0 info lit/ball.ply --json
 check "the bake turns the ball" test "$(value inward_bodies)" = 0
-expect 0 cluster inward.off -o inward.fct
 sed 's/inward.off/inward.fct/' free.json >tree.json
+expect 0 bake tree.json -o lit/ --final direct --error 1e-3
+says '1 closed object is wound inwards, such as "ball"'
 expect 0 bake tree.json -o lit/ --final direct --error 1e-3 --flip-inward
 expect 0 info lit/ball.ply --json
 check "the bake turns a tree" test "$(value inward_bodies)" = 0

@@ -353,6 +353,7 @@ int tool_bake(int argc, char **argv) {
         .run = run_bake,
         .stages = stages,
         .turns_bodies = true,
+        .builds_tree = true,
         .inputs_min = 1,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,

@@ -118,7 +118,7 @@ int tool_cluster(int argc, char **argv) {
                 "of triangles can be "
                 "larger than memory themselves. 100 million triangles need at least 1 GB. More memory makes "
                 "fewer parts, not "
-                "better clusters. Vertices of equal position are not joined in parts, as with --no-weld.\n\n"
+                "better clusters.\n\n"
                 "JSON keys: faces, vertices, roots, depth, mean_depth, parts, seconds{read, dual, contract, "
                 "boxes, write, total}, "
                 "peak_bytes, file_bytes; for several files their sums, and files[].",

@@ -65,12 +65,19 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     if (code == TOOL_DONE) code = tool_check_inputs(t);
     if (code == TOOL_DONE) code = tool_result(t, fct_tree_save(&t->env, tree, output));
     fct_tree_view view = fct_tree_get(tree);
-    *s = (fct_large_stats){view.face_count,     view.vertex_count,
-                           view.root_count,     view.depth,
-                           view.mean_depth,     1,
-                           view.root_count,     read - start,
-                           stats.seconds_dual,  stats.seconds_contract,
-                           stats.seconds_boxes, tool_seconds() - built};
+    *s = (fct_large_stats){.face_count = view.face_count,
+                           .vertex_count = view.vertex_count,
+                           .root_count = view.root_count,
+                           .depth = view.depth,
+                           .mean_depth = view.mean_depth,
+                           .part_count = 1,
+                           .top_count = view.root_count,
+                           .seconds_read = read - start,
+                           .seconds_dual = stats.seconds_dual,
+                           .seconds_contract = stats.seconds_contract,
+                           .seconds_boxes = stats.seconds_boxes,
+                           .seconds_write = tool_seconds() - built,
+                           .inward = view.inward};
 done:
     fct_tree_destroy(tree);
     fct_mesh_release(&t->env, &mesh);
@@ -106,7 +113,7 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
                 t, TOOL_MEMORY, "%s: --max-memory %zu: a tree of %u faces needs at least %llu bytes", input,
                 t->max_memory, faces, (unsigned long long)(least + (t->max_memory - limits.max_memory)));
         limits.temporary_folder = options->temporary;
-        static const tool_stage stages[] = {{"read", 3},
+        static const tool_stage stages[] = {{"read|weld", 3},
                                             {"cut", 10},
                                             {"parts|dual graph|clusters", 60},
                                             {"boxes of joins", 3},
@@ -122,6 +129,7 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
         tool_context(t, code, input);
     }
     stats.seconds_read += hashed;
+    if (code == TOOL_DONE) tool_warn_inward(t, input, stats.inward);
     if (code == TOOL_DONE) *out = describe_build(&stats, tool_seconds() - start, output);
     return code;
 }

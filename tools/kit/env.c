@@ -378,6 +378,7 @@ void tool_env_open(tool *t, const tool_stage *stages) {
     t->env.message = take_message;
     t->env.allow_outside = t->allow_outside;
     t->env.flip_inward = t->flip_inward;
+    t->env.no_weld = t->no_weld;
     t->env.memory_user = t->env.progress_user = t->env.message_user = t;
     if (t->max_memory) {
         t->memory_now = read_status_bytes("VmRSS: %zu"); /* the program itself counts too */

@@ -166,9 +166,11 @@ int tool_writer_close(tool *t, tool_writer *writer, int code) {
     return keep && result != FCT_OK ? tool_result(t, result) : code;
 }
 
+/* Reads by blocks, because a mapped file counts as memory of the program. */
 int tool_hash_file(tool *t, const char *path, uint64_t *hash) {
     enum { CHUNK = 1 << 18 };
     int code = TOOL_DONE;
+    if (tool_is_gltf(t, path)) return tool_result(t, fct_mesh_file_hash(&t->env, path, hash));
     FILE *file = fopen(path, "rbe");
     if (file) code = tool_note_input(t, path);
     XXH3_state_t *state = XXH3_createState();

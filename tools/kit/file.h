@@ -49,7 +49,7 @@ int tool_writer_open(tool *t, const char *path, tool_writer *writer);
 /* code: the outcome so far. Keeps the file for TOOL_DONE and TOOL_NO. Returns the outcome. */
 int tool_writer_close(tool *t, tool_writer *writer, int code);
 
-/* The xxh3 hash of a file's bytes. Returns an exit code. */
+/* The value of fct_mesh_file_hash. Returns an exit code. */
 int tool_hash_file(tool *t, const char *path, uint64_t *hash);
 
 #endif

@@ -25,6 +25,13 @@ int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree 
     return tool_context(t, code, path);
 }
 
+void tool_warn_inward(tool *t, const char *path, bool inward) {
+    if (inward)
+        tool_warn(t,
+                  "%s: the surface is closed and wound inwards; --flip-inward of cluster or convert turns it",
+                  path);
+}
+
 int tool_tree_mesh(tool *t, const fct_tree *tree, fct_mesh *mesh) {
     int code = tool_result(t, fct_tree_mesh(&t->env, tree, mesh));
     if (code != TOOL_DONE || !fct_tree_get(tree).def.weld) return code;

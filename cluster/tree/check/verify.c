@@ -213,6 +213,9 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
                         "has %u, %u and %u",
                         view->boundary_edges, view->nonmanifold_edges, view->component_count, counts.boundary,
                         counts.nonmanifold, counts.components);
+    if (fct_tree_is_inward(view) != view->inward)
+        return fct_fail(env, FCT_ERROR_DATA, "the header says that the surface is %swound inwards",
+                        view->inward ? "" : "not ");
     return FCT_OK;
 }
 

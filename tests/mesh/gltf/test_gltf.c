@@ -2,6 +2,8 @@
  * URIs, scenes, versions, features that are left out, files outside of the folder. */
 #include "mesh/mesh_support.h"
 
+#include <xxhash.h>
+
 #ifdef FCT_HAS_MESHOPT
 #include <meshoptimizer.h>
 #endif
@@ -122,6 +124,42 @@ static void reads_buffers_of_every_kind(void **state) {
         assert_int_equal(parse_text(&r, "gltf", text, &mesh), FCT_ERROR_DATA);
         assert_non_null(strstr(r.text, "has no folder"));
     }
+}
+
+/* The hash of in/s.gltf. Its messages are those of the reader, not of the hash. */
+static uint64_t hash_document(const char *text) {
+    char path[200];
+    messages m = {0};
+    uint64_t hash;
+    fct_env env = fct_env_default();
+    env.message = take, env.message_user = &m;
+    if (text) write_bytes("in/s.gltf", text, strlen(text));
+    snprintf(path, sizeof path, "%s/in/s.gltf", folder);
+    assert_int_equal(fct_mesh_file_hash(&env, path, &hash), FCT_OK);
+    assert_string_equal(m.text, "");
+    return hash;
+}
+
+static void hashes_the_buffers_too(void **state) {
+    (void)state;
+    static const char square[] = "{\"buffers\":[{\"uri\":\"a.bin\"}]," VIEWS ACCESSORS MESH ASSET,
+                      embedded[] = "{\"buffers\":[{\"uri\":\"data:;base64," SQUARE
+                                   "AAECAAIDAAA=\"}]," VIEWS ACCESSORS MESH ASSET;
+    unsigned char data[56];
+    fill_square(data);
+    uint64_t missing = hash_document(square);
+    write_bytes("in/a.bin", data, sizeof data);
+    uint64_t first = hash_document(square);
+    assert_true(first == hash_document(NULL) && first != missing);
+    data[0] ^= 1;
+    write_bytes("in/a.bin", data, sizeof data);
+    assert_true(hash_document(NULL) != first);
+    assert_true(hash_document(embedded) == XXH3_64bits(embedded, strlen(embedded)));
+    assert_true(hash_document("{no JSON") == XXH3_64bits("{no JSON", 8));
+    uint64_t hash;
+    fct_env env = fct_env_default();
+    assert_int_equal(fct_mesh_file_hash(&env, "missing.gltf", &hash), FCT_ERROR_INPUT);
+    assert_int_equal(fct_mesh_file_hash(&env, "missing.ply", &hash), FCT_ERROR_INPUT);
 }
 
 static void reads_only_files_of_the_folder(void **state) {
@@ -429,10 +467,15 @@ static void decompresses_meshopt(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reads_buffers_of_every_kind), cmocka_unit_test(reads_only_files_of_the_folder),
-        cmocka_unit_test(replaces_sparse_elements),    cmocka_unit_test(chooses_the_scene),
-        cmocka_unit_test(reports_each_feature_once),   cmocka_unit_test(leaves_out_incomplete_primitives),
-        cmocka_unit_test(reads_a_padded_glb),          cmocka_unit_test(drops_attributes_that_are_not_finite),
+        cmocka_unit_test(hashes_the_buffers_too),
+        cmocka_unit_test(reads_buffers_of_every_kind),
+        cmocka_unit_test(reads_only_files_of_the_folder),
+        cmocka_unit_test(replaces_sparse_elements),
+        cmocka_unit_test(chooses_the_scene),
+        cmocka_unit_test(reports_each_feature_once),
+        cmocka_unit_test(leaves_out_incomplete_primitives),
+        cmocka_unit_test(reads_a_padded_glb),
+        cmocka_unit_test(drops_attributes_that_are_not_finite),
 #ifdef FCT_HAS_MESHOPT
         cmocka_unit_test(decompresses_meshopt),
 #endif
