@@ -139,7 +139,7 @@ static void load_corners(const fct_elements *set, uint32_t triangle, v3 p[3]) {
     for (int k = 0; k < 3; ++k) p[k] = v3_load(set->corners + 9 * (size_t)triangle + 3 * k);
 }
 
-/* Appends the element of a tree node. The caller has reserved its place. */
+/* Appends the element of a tree node. The caller has reserved its place, and sets the power. */
 static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance, uint32_t node,
                            uint8_t back) {
     const fct_instance *in = &set->view.instances[instance];
@@ -164,7 +164,6 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
         e.reflectance[k] = material->reflectance[k];
         e.emission[k] = material->emission[k];
         e.radiosity[k] = e.emission[k];
-        e.power[k] = v3_scale(e.vector, e.radiosity[k]);
     }
     set->ranges[set->count] = (fct_element_range){.first = c->first, .count = c->count};
     set->items[set->count++] = e;

@@ -44,7 +44,7 @@ static fct_scene *make_scene(void) {
     const float egg[12] = {.3F, 0, 0, .6F, 0, .4F, 0, 2, .1F, 0, .5F, .6F};
     place_mesh(scene, &ball, floor, egg);
     fct_mesh_release(&plain, &ball);
-    place_sheet(&plain, scene, floor, 1, v3_make(0, 0, 2.5), v3_make(0, 3, 0), v3_make(3, 0, 0));
+    place_sheet(&plain, scene, both, 1, v3_make(0, 0, 2.5), v3_make(0, 3, 0), v3_make(3, 0, 0));
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
     return scene;
 }

@@ -636,15 +636,15 @@ static void halls_are_lit_by_the_rules(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < 6; ++seed) {
         hall h = make_hall(seed);
-        for (uint64_t i = 0; i < 50; ++i) {
-            static const uint32_t bases[5] = {4, 0, 2, 16, 9};
-            const uint32_t base = bases[i % 5];
+        for (uint64_t i = 0; i < 60; ++i) {
+            static const uint32_t bases[6] = {4, 0, 1, 16, 9, 2};
+            const uint32_t base = bases[i % 6];
             v3 n = v3_unit(
                 v3_make(pick(seed, i, 40) - .5, pick(seed, i, 41) - .5, i % 4 ? 1 : pick(seed, i, 42) - .5));
             const double point[3] = {8 * pick(seed, i, 43) - 4, 8 * pick(seed, i, 44) - 4,
                                      3 * pick(seed, i, 45) - 2},
                          normal[3] = {n.x, n.y, n.z}, offset = .1 * pick(seed, i, 46);
-            bool fixed = base && i % 3 == 0;
+            bool fixed = base && i / 6 % 2 == 0;
             double e[3], expected[3], open[3], expected_open[3];
             uint64_t rays = 3;
             eye q = {.h = &h, .seed = i, .rays = 3};

@@ -48,18 +48,18 @@ static fct_mesh make_odd(uint64_t seed) {
     return mesh;
 }
 
-/* A steep screw around vertex 0: no direction is in front of all its faces. */
-static fct_mesh make_screw(void) {
-    enum { N = 14 };
+/* A steep screw or a closed needle around vertex 0: no direction is in front of all its faces. */
+static fct_mesh make_needle(bool closed) {
+    uint32_t n = closed ? 24 : 14;
     fct_mesh mesh;
-    assert_int_equal(fct_mesh_create(&plain, N + 2, N, 0, &mesh), FCT_OK);
+    assert_int_equal(fct_mesh_create(&plain, n + 2, n, 0, &mesh), FCT_OK);
     v3_store(mesh.positions, v3_make(0, 0, 0));
-    for (uint32_t i = 0; i <= N; ++i) {
-        double angle = FCT_PI / 9 * i;
+    for (uint32_t i = 0; i <= n; ++i) {
+        double angle = closed ? FCT_PI / 12 * i : FCT_PI / 9 * i;
         v3_store(mesh.positions + 3 * (size_t)(i + 1), v3_make(.001 * cos(angle), .001 * sin(angle), -5));
     }
-    for (uint32_t i = 0; i < N; ++i) {
-        const uint32_t t[3] = {0, i + 1, i + 2};
+    for (uint32_t i = 0; i < n; ++i) {
+        const uint32_t t[3] = {0, i + 1, closed && i + 1 == n ? 1 : i + 2};
         memcpy(mesh.triangles + 3 * (size_t)i, t, sizeof t);
     }
     return mesh;
@@ -108,7 +108,7 @@ static void label_corners(const fct_corners *m, uint32_t *label, bool *open) {
 
 static void assert_foothold(const fct_surface *s, uint32_t v, const fct_foothold *e) {
     assert_true(v3_norm(v3_sub(at(s->normals, v), e->normal)) < 1e-5);
-    assert_true(v3_norm(v3_sub(at(s->sample_points, v), e->sample)) < 1e-6);
+    assert_true(v3_norm(v3_sub(at(s->sample_points, v), e->sample)) < 1e-6 + 6e-8 * v3_norm(e->sample));
     assert_near(s->offsets[v], e->offset, 1e-5 * e->offset);
     assert_int_equal(s->flat[v], e->flat);
     assert_int_equal(s->places[v], s->face_places[e->face]);
@@ -118,8 +118,8 @@ static void corners_share_vertices_by_the_rules(void **state) {
     (void)state;
     plain = fct_env_default();
     int broken = 0, rims = 0, added = 0;
-    for (uint64_t seed = 0; seed < 11; ++seed) {
-        fct_mesh mesh = seed < 10 ? make_odd(seed) : make_screw();
+    for (uint64_t seed = 0; seed < 12; ++seed) {
+        fct_mesh mesh = seed < 10 ? make_odd(seed) : make_needle(seed == 11);
         const fct_corners m = {mesh.vertex_count, mesh.face_count, mesh.positions, mesh.triangles};
         uint32_t corners = 3 * m.face_count, *label = malloc(corners * sizeof *label),
                  *sources = malloc(corners * sizeof *sources), *places = malloc(corners * sizeof *places),
@@ -183,8 +183,11 @@ static void refinement_splits_the_chosen_edges(void **state) {
     (void)state;
     plain = fct_env_default();
     int cut[4] = {0}, turned = 0, rims = 0;
-    for (uint64_t seed = 0; seed < 8; ++seed) {
+    for (uint64_t seed = 0; seed < 11; ++seed) {
         fct_mesh mesh = make_odd(seed);
+        if (seed >= 8) /* as small as the rounding of its coordinates, so that midpoints turn faces over */
+            for (size_t k = 0; k < 3 * (size_t)mesh.vertex_count; ++k)
+                mesh.positions[k] = 100 + (seed == 8 ? 3e-5F : 1e-4F) * mesh.positions[k];
         const fct_corners m = {mesh.vertex_count, mesh.face_count, mesh.positions, mesh.triangles};
         uint32_t *numbers = malloc(m.face_count * sizeof *numbers), added, face = 0, seen = 0;
         for (uint32_t f = 0; f < m.face_count; ++f) numbers[f] = f + 9;
@@ -285,7 +288,7 @@ static void refinement_splits_the_chosen_edges(void **state) {
             fct_foothold expected = fct_corner_foothold(&fine, around, count, normal, rim);
             assert_foothold(&s, v, &expected);
             v3 middle = v3_scale(v3_add(at(old.mesh.positions, e[0]), at(old.mesh.positions, e[1])), .5);
-            assert_true(v3_norm(v3_sub(middle, at(s.mesh.positions, v))) < 1e-6);
+            assert_true(v3_norm(v3_sub(middle, at(s.mesh.positions, v))) < 1e-6 + 6e-8 * v3_norm(middle));
             for (size_t c = 0; c < 3; ++c)
                 assert_near(s.mesh.colors[3 * (size_t)v + c],
                             .5 * (double)old.mesh.colors[3 * (size_t)e[0] + c] +
