@@ -258,6 +258,13 @@ static void walls_hide_anchors(void **state) {
     rays = 0;
     blend(&t, &set, v3_make(0, 0, 0), up, true, &rays);
     assert_int_equal(rays, 0);
+    /* If all are hidden, the nearest one decides. */
+    t.count = 2;
+    set_anchor(&t.items[0], v3_make(.3, 0, 0), up, .3, 10);
+    set_anchor(&t.items[1], v3_make(.6, 0, 0), up, .6, 2);
+    fct_anchors_order(&t);
+    assert_near(blend(&t, &set, v3_make(0, 0, 0), up, true, &rays), 10, 1e-6);
+    assert_int_equal(rays, 2);
     fct_anchors_release(&plain, &t);
     fct_elements_release(&set);
     fct_scene_destroy(scene);
