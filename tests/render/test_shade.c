@@ -178,6 +178,65 @@ static void normals_are_sums_of_area_vectors(void **state) {
     }
 }
 
+/* The faces of other clusters across the side opposite a corner. Returns their number. */
+static uint32_t list_across(const drawing *d, uint32_t face, uint32_t corner, uint32_t *found) {
+    const uint32_t *t = d->mesh.triangles;
+    uint32_t a = t[3 * face + (corner + 1) % 3], b = t[3 * face + (corner + 2) % 3], count = 0;
+    for (uint32_t f = 0; f < d->mesh.face_count; ++f) {
+        bool has_a = false, has_b = false;
+        for (uint32_t k = 0; k < 3; ++k) has_a |= t[3 * f + k] == a, has_b |= t[3 * f + k] == b;
+        if (has_a && has_b && d->labels[f] != d->labels[face]) found[count++] = f;
+    }
+    return count;
+}
+
+/* Random triangles between 20 points in clusters of 1 to 4 faces, so that a cluster has neighbours of all
+ * colours. Each cluster, in order, has the colour that occurs least along its borders: the first of those
+ * from its number on. Borders have lines. */
+static void clusters_have_the_rarest_color_around(void **state) {
+    (void)state;
+    enum { FACES = 240, POINTS = 20 };
+    float positions[3 * POINTS], paint[3 * FACES], palette[PALETTE][3];
+    uint32_t triangles[3 * FACES], labels[FACES], found[FACES], random = 1, label = 0;
+    uint8_t colors[FACES];
+    for (uint32_t i = 0; i < PALETTE; ++i) drawing_color(i, palette[i]);
+    for (uint32_t i = 0; i < 3 * POINTS; ++i)
+        positions[i] = (float)((random = random * 1664525u + 1013904223u) >> 8) * 0x1p-24F;
+    for (uint32_t f = 0; f < FACES; ++f) {
+        uint32_t first = (random = random * 1664525u + 1013904223u) >> 12,
+                 second = (random = random * 1664525u + 1013904223u) >> 12;
+        triangles[3 * f] = first % POINTS, triangles[3 * f + 1] = (first + 1 + second % 6) % POINTS;
+        triangles[3 * f + 2] = (first + 7 + second / 6 % 6) % POINTS;
+        if (f && second / 36 % 4 == 0) ++label;
+        labels[f] = label;
+    }
+    drawing d = {
+        .mesh = {.vertex_count = POINTS, .face_count = FACES, .positions = positions, .triangles = triangles},
+        .paint = paint,
+        .labels = labels,
+        .shading = DRAWING_FLAT};
+    assert_int_equal(drawing_prepare(&test_tool, &d, 0, false), TOOL_DONE);
+    for (uint32_t begin = 0, end; begin < FACES; begin = end) {
+        unsigned used[PALETTE] = {0};
+        for (end = begin; end < FACES && labels[end] == labels[begin]; ++end)
+            for (uint32_t k = 0; k < 3; ++k) {
+                uint32_t count = list_across(&d, end, k, found);
+                assert_int_equal(d.lines[end] >> k & 1, count > 0);
+                for (uint32_t i = 0; i < count; ++i)
+                    if (labels[found[i]] < labels[begin]) ++used[colors[labels[found[i]]]];
+            }
+        uint32_t best = labels[begin] % PALETTE;
+        for (uint32_t i = 1; i < PALETTE; ++i) {
+            uint32_t other = (labels[begin] + i) % PALETTE;
+            if (used[other] < used[best]) best = other;
+        }
+        colors[labels[begin]] = (uint8_t)best;
+        for (uint32_t f = begin; f < end; ++f)
+            assert_memory_equal(paint + 3 * f, palette[best], sizeof palette[best]);
+    }
+    tool_release(&test_tool, d.lines);
+}
+
 static void baked_colors_are_shown_as_light(void **state) {
     (void)state;
     float positions[18], colors[18] = {0}, glow[12] = {0}, rgb[3];
@@ -239,6 +298,7 @@ int main(void) {
         cmocka_unit_test(the_palette_has_twelve_even_hues),
         cmocka_unit_test(normals_are_smooth_below_the_crease_angle),
         cmocka_unit_test(normals_are_sums_of_area_vectors),
+        cmocka_unit_test(clusters_have_the_rarest_color_around),
         cmocka_unit_test(baked_colors_are_shown_as_light),
         cmocka_unit_test(studio_light_is_a_sum_of_lamps),
     };
