@@ -220,7 +220,7 @@ static fct_result join_slots(piece *p, const uint32_t *slots, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         owner[work->nodes[slots[i]]] = i;
         tops[i].record = work->records[slots[i]];
-        tops[i].count = work->records[slots[i]].count, tops[i].height = work->heights[slots[i]];
+        tops[i].height = work->heights[slots[i]];
         if (means) means[i] = work->means[slots[i]];
     }
     for (uint32_t m = work->merge_count; m-- > 0;)

@@ -413,6 +413,41 @@ static void a_limit_of_clusters(void **state) {
     }
 }
 
+/* A terrain with as many loose triangles above it. Where it suffices to join these, the faces on the cut
+ * wait. */
+static void loose_clusters_are_joined_first(void **state) {
+    (void)state;
+    fct_env env = single();
+    fct_mesh terrain = make_terrain(&env, 20, 0.1, 5);
+    uint32_t faces = terrain.face_count, vertices = terrain.vertex_count, random = 3, joined = 0, waiting = 0;
+    fct_mesh mesh = shape_of(&env, vertices + 3 * faces, 2 * faces);
+    memcpy(mesh.positions, terrain.positions, 12 * (size_t)vertices);
+    memcpy(mesh.triangles, terrain.triangles, 12 * (size_t)faces);
+    for (uint32_t f = 0; f < faces; ++f) {
+        double x = shape_random(&random), y = shape_random(&random);
+        for (uint32_t k = 0; k < 3; ++k)
+            set_vertex(&mesh, vertices + 3 * f + k, x + 0.01 * shape_random(&random), y + 0.01 * k,
+                       0.02 * shape_random(&random));
+        set_face(&mesh, faces + f, vertices + 3 * f, vertices + 3 * f + 1, vertices + 3 * f + 2);
+    }
+    steps r;
+    open_run(&r, "terrain under triangles", &mesh, 1, mesh.face_count / 6, 3 * mesh.face_count / 4);
+    check_faces(&r);
+    check_shared(&r);
+    assert_int_equal(fct_large_pieces(&r.l), FCT_OK);
+    remains m = open_remains(&r);
+    for (uint32_t i = 0; i < r.l.top_count; ++i) {
+        const cluster *c = &m.clusters[i];
+        joined += c->top.phase == 2, waiting += c->frozen;
+        if (c->frozen) assert_int_equal(c->top.count, 1);
+    }
+    assert_true(joined > 0 && waiting > 100);
+    close_remains(&m);
+    close_run(&r);
+    fct_mesh_release(&env, &mesh);
+    fct_mesh_release(&env, &terrain);
+}
+
 /* Two neighbours of 2048 faces and height 33. Their union is higher than 2 log2 n + 8 but not than 3 log2 n -
  * 1, so they merge along their edge. With height 35 they are joined by proximity. */
 static void tall_tops_use_the_reserve(void **state) {
@@ -450,8 +485,8 @@ static void tall_tops_use_the_reserve(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_cut), cmocka_unit_test(what_remains),
-                                       cmocka_unit_test(a_limit_of_clusters),
-                                       cmocka_unit_test(tall_tops_use_the_reserve)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_cut), cmocka_unit_test(what_remains), cmocka_unit_test(a_limit_of_clusters),
+        cmocka_unit_test(loose_clusters_are_joined_first), cmocka_unit_test(tall_tops_use_the_reserve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
