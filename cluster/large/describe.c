@@ -251,7 +251,7 @@ static bool find_cone(describer *d, uint32_t node, const float samples[][9]) {
         const fct_cluster *below = cluster_at(d, p);
         if (!below) return false;
         v3 own = v3_unit(v3_load(below->area_vector));
-        double reach = v3_norm2(own) > 0 ? angle_between(own, axis) + (double)below->cone_angle : pi;
+        double reach = angle_between(own, axis) + (double)below->cone_angle; /* above pi where S is 0 */
         if (fmin(reach, pi) <= widest + slack) continue;
         if (++opened > FEW || top + 2 > STACK) {
             widest = fmin(reach, pi);
