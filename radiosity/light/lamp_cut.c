@@ -19,7 +19,7 @@
 #include <string.h>
 
 /* Error allowed to a node: a share of its own light, or SHARE_ERROR of the lamp's. With these two values,
- * tests/radiosity/test_lamp.c finds the light of dense lamps within .6 % of the sum over their triangles. */
+ * test_lamp.c finds the light of dense lamps within .6 % of the sum over their triangles. */
 #define RELATIVE_ERROR .02
 #define SHARE_ERROR    7e-4
 /* rms^2 / r^2 (1 + 1 / cos) below which a table of projected areas replaces the cut. */

@@ -492,7 +492,7 @@ static hall make_hall(uint64_t seed) {
                         v3_make(.6, .1, 0));
     }
     if (seed % 2) {
-        const float large[12] = {7, 2, 0, 0, 0, 5, 0, 0, 0, 0, 6, 9};
+        const float large[12] = {4.5F, 1, 0, 0, 0, 3.5F, 0, 0, 0, 0, 4, 9};
         place_mesh(h.scene, &ball, place_material(h.scene, 0, 1, false), large);
     }
     fct_mesh_release(&plain, &ball);
@@ -518,9 +518,11 @@ static hall make_hall(uint64_t seed) {
         bool bent = v3_norm(vectors[i])<.9 * areas[i], sampled = e[0] + e[1] + e[2]> 0 &&
                     !(bent && areas[i] > total / 4);
         assert_int_equal(fct_lamps_sampled(h.lamps, i), sampled);
+        if (bent && e[0] + e[1] + e[2] > 0 && !sampled) assert_in_range(100 * areas[i] / total, 26, 48);
         if (sampled) assert_int_equal(fct_lamp_init(&plain, &view, i, &h.own[h.count++]), FCT_OK);
     }
     assert_int_equal(fct_lamps_count(h.lamps), h.count);
+    if (seed % 2) assert_false(fct_lamps_sampled(h.lamps, view.instance_count - 1));
     return h;
 }
 
