@@ -492,8 +492,9 @@ static hall make_hall(uint64_t seed) {
                         v3_make(.6, .1, 0));
     }
     if (seed % 2) {
-        const float large[12] = {4.5F, 1, 0, 0, 0, 3.5F, 0, 0, 0, 0, 4, 9};
-        place_mesh(h.scene, &ball, place_material(h.scene, 0, 1, false), large);
+        const float even[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 9};
+        const float bent[12] = {4.5F, 1, 0, 0, 0, 3.5F, 0, 0, 0, 0, 4, 9};
+        place_mesh(h.scene, &ball, place_material(h.scene, 0, 1, false), seed % 4 == 1 ? even : bent);
     }
     fct_mesh_release(&plain, &ball);
     assert_int_equal(fct_scene_commit(h.scene), FCT_OK);
