@@ -89,6 +89,7 @@ fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out
     if (result != FCT_OK) return result;
     size_t vertices = mesh->vertex_count, faces = mesh->face_count;
     memcpy(out->origin, mesh->origin, sizeof out->origin);
+    out->source_count = mesh->source_count;
     copy(out->positions, mesh->positions, vertices, 3 * sizeof(float));
     copy(out->colors, mesh->colors, vertices, 3 * sizeof(float));
     copy(out->normals, mesh->normals, vertices, 3 * sizeof(float));
@@ -174,6 +175,7 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
         result = fct_fail_memory(env, "vertex ids");
     if (result == FCT_OK) {
         memcpy(out->origin, mesh->origin, sizeof out->origin);
+        out->source_count = mesh->source_count;
         extract_vertices(mesh, &span, out, ids);
         extract_faces(mesh, &span, faces, count, out);
         result = copy_names(env, mesh, out);

@@ -156,6 +156,7 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
         cut_polygons(env, name, soup, &scratch, local, &faces);
         fct_release(env, faces.positions);
         *out = faces;
+        out->source_count = soup->polygon_count;
     }
     fct_release_all(env, lists, FCT_LENGTH(lists));
     return result;

@@ -26,6 +26,7 @@ typedef struct fct_mesh {
     float *face_colors;     /* face_count x 3, linear, or NULL */
     uint32_t *materials;    /* face_count, index into material_names, or NULL */
     uint32_t *source_faces; /* face_count, polygon of each triangle, or NULL: the face number */
+    uint32_t source_count;  /* polygons of the file, also those left out; 0 without source_faces */
     uint32_t material_count;
     char **material_names; /* material_count strings, or NULL */
     double origin[3];      /* the vertex is at origin + position; 0 unless a reader set it (docs/mesh.md) */

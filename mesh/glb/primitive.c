@@ -110,6 +110,8 @@ static fct_result append_vertices(fct_glb_builder *b, const fct_glb_transform *t
         b->without_color += index < 0 ? positions->count : 0;
         for (size_t v = 0; v < positions->count; ++v)
             for (int k = 0; k < 3; ++k) to[3 * v + k] = index < 0 ? 1 : (float)fct_glb_value(values, v, k);
+        for (size_t v = 0; index >= 0 && index == p->color && values->width == 4 && v < positions->count; ++v)
+            b->clear += fct_glb_value(values, v, 3) < 1;
     }
     soup->vertex_count += (uint32_t)positions->count;
     return FCT_OK;
@@ -294,6 +296,8 @@ void fct_glb_end_soup(const fct_glb_builder *b) {
 
 void fct_glb_report_builder(const fct_glb_builder *b) {
     if (b->without_color) fct_glb_warn(b->glb, "%zu vertices have no colour and get white", b->without_color);
+    if (b->clear && !b->by_primitive) /* else fct_glb_report_losses says it */
+        fct_glb_warn(b->glb, "%zu vertices have a colour with an alpha below 1, which is left out", b->clear);
     if (b->without_texcoord)
         fct_glb_warn(b->glb, "%zu corners have no texture coordinate and get 0 0", b->without_texcoord);
     if (b->incomplete)

@@ -21,6 +21,7 @@ typedef struct fct_glb_builder {
     uint32_t primitive_count; /* so far */
 
     size_t without_color, without_texcoord; /* vertices and corners without a value in the file */
+    size_t clear;                           /* vertices whose colour has an alpha below 1 */
     size_t incomplete;                      /* primitives that end with an incomplete triangle */
 
     size_t vertex_capacity, color_capacity, normal_capacity, corner_capacity, texcoord_capacity,

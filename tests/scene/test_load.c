@@ -316,6 +316,42 @@ static void opens_the_hierarchy_beside_a_mesh(void **unused) {
     assert_int_equal(r.alive, 0);
 }
 
+/* face_materials has a name for every polygon of the file, also for those that are left out. */
+static void names_polygons_that_are_left_out(void **unused) {
+    (void)unused;
+    write_text("short.off",
+               "OFF\n4 5 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 0 1\n4 0 1 2 3\n2 0 1\n3 2 3 0\n2 2 3\n");
+    for (int count = 3; count <= 6; ++count) {
+        recorder r = {0};
+        fct_env env = recorder_env(&r);
+        fct_scene *scene;
+        static const char *const names[] = {"",
+                                            "",
+                                            "",
+                                            "\"b\", \"a\", \"a\"",
+                                            "\"b\", \"a\", \"a\", \"b\"",
+                                            "\"b\", \"a\", \"a\", \"b\", \"a\"",
+                                            "\"b\", \"a\", \"a\", \"b\", \"a\", \"a\""};
+        char text[600];
+        snprintf(text, sizeof text,
+                 HEAD "\"models\": {\"t\": \"short.off\"}, \"instances\": [{\"model\": \"t\", "
+                      "\"face_materials\": [%s]}]}",
+                 names[count]);
+        assert_int_equal(parse(&env, text, &scene), count == 5 ? FCT_OK : FCT_ERROR_DATA);
+        if (count != 5) {
+            assert_non_null(strstr(r.text, "an array of 5 materials"));
+            continue;
+        }
+        fct_scene_view v = fct_scene_get(scene);
+        assert_int_equal(v.instance_count, 2);
+        for (uint32_t i = 0; i < 2; ++i) /* the square has material a, the triangle b */
+            assert_int_equal(fct_tree_get(v.models[v.instances[i].model].tree).face_count,
+                             v.materials[v.instances[i].material].name[0] == 'a' ? 2 : 1);
+        fct_scene_destroy(scene);
+        assert_int_equal(r.alive, 0);
+    }
+}
+
 /* A model of one soup of two triangles at one side. */
 static void expect_weld(const fct_env *env, const char *name, bool weld) {
     fct_scene *scene;
@@ -425,6 +461,7 @@ int main(void) {
         cmocka_unit_test(refuses_bad_scenes_and_says_where),
         cmocka_unit_test(fails_cleanly_at_every_allocation),
         cmocka_unit_test(opens_the_hierarchy_beside_a_mesh),
+        cmocka_unit_test(names_polygons_that_are_left_out),
         cmocka_unit_test(models_follow_the_choice_of_the_weld),
         cmocka_unit_test(missing_files_are_told),
         cmocka_unit_test(scenes_made_by_calls_are_checked),

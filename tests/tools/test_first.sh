@@ -31,6 +31,12 @@ for format in off ply obj stl om glb fct; do
     cat cube.$format >pipe &
     expect 0 partition pipe --format $format -k 2 -o labels.txt
     wait
+    if [ $format != fct ]; then
+        cat cube.$format >pipe &
+        expect 0 cluster pipe --format $format -o piped.fct --max-memory 100M --json
+        holds "$(value faces) == 12"
+        wait
+    fi
     rm pipe
 done
 expect 0 info - --json <cube.ply

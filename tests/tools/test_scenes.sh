@@ -20,6 +20,10 @@ expect 0 info furnace.json --json
 keys faces objects instances materials
 holds "$(value faces) == 528 && $(value instances) == 1 && $(value emitting_instances) == 1"
 
+{ printf '\357\273\277'; cat furnace.json; } >marked.json
+expect 0 info marked.json --json
+check "a byte order mark" test "$(value faces)" = 528
+
 # A closed furnace: radiosity 1 / (1 - rho) = 2 everywhere.
 printf '# position, normal\n0 0 -1  0 0 1\n0 0 0  1 0 0\n' >probes.txt
 expect 0 bake furnace.json -o lit.ply --probe probes.txt --json

@@ -47,13 +47,13 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     if (code == TOOL_DONE) code = check_faces(t, def, input, mesh.face_count);
     if (code != TOOL_DONE) goto done;
     *large =
-        strcmp(input, "-") != 0 && !fits_memory(t, def, mesh.face_count, 0); /* the mesh is loaded already */
+        !tool_is_stream(input) && !fits_memory(t, def, mesh.face_count, 0); /* the mesh is loaded already */
     if (*large) goto done;
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     double read = tool_seconds();
     code = tool_result(t, fct_tree_build(&t->env, &mesh, def, &stats, &tree));
-    *large = code == TOOL_MEMORY && t->max_memory && strcmp(input, "-") != 0;
+    *large = code == TOOL_MEMORY && t->max_memory && !tool_is_stream(input);
     if (*large) { /* the build needed more than the estimate */
         t->error[0] = 0, t->memory_refused = false;
         code = TOOL_DONE;
@@ -90,10 +90,10 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
     def.weld = !t->no_weld;
     fct_large_stats stats = {0};
     double start = tool_seconds();
-    bool standard = strcmp(input, "-") == 0, known = false, large = false;
+    bool standard = strcmp(input, "-") == 0, once = tool_is_stream(input), known = false, large = false;
     uint32_t faces = 0, vertices = 0;
-    int code = standard ? TOOL_DONE : tool_hash_file(t, input, &def.source_hash);
-    if (code == TOOL_DONE && t->max_memory && tool_ends(input, "ply"))
+    int code = once ? TOOL_DONE : tool_hash_file(t, input, &def.source_hash);
+    if (code == TOOL_DONE && t->max_memory && !once && tool_ends(input, "ply"))
         code = tool_result(t, fct_mesh_file_counts(&t->env, input, &known, &faces, &vertices));
     if (code == TOOL_DONE && known) code = check_faces(t, &def, input, faces);
     if (code != TOOL_DONE) return code;
@@ -129,6 +129,7 @@ int tool_cluster_file(tool *t, const cluster_options *options, const char *input
         tool_context(t, code, input);
     }
     stats.seconds_read += hashed;
+    t->wrote |= code == TOOL_DONE;
     if (code == TOOL_DONE) tool_warn_inward(t, input, stats.inward);
     if (code == TOOL_DONE) *out = describe_build(&stats, tool_seconds() - start, output);
     return code;

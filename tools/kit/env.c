@@ -232,7 +232,8 @@ int tool_check_inputs(tool *t) {
     const char *path = guard_find_shortened(&t->read);
     if (!path) return TOOL_DONE;
     t->error[0] = 0;
-    return tool_fail(t, TOOL_INPUT, "%s: was shortened while it was read", path);
+    return tool_fail(t, TOOL_INPUT, "%s: was shortened while it was read%s", path,
+                     t->wrote ? "; outputs that exist are complete" : "");
 }
 
 int tool_result(tool *t, fct_result result) {

@@ -35,6 +35,7 @@ typedef struct tool {
     bool in_place;    /* an output may replace an input */
     bool flip_inward; /* loaded meshes turn closed bodies that are wound inwards */
     bool no_weld;     /* trees keep vertices of equal position apart */
+    bool wrote;       /* an output is complete and has its name */
     uint32_t threads; /* 0: all cores */
     uint64_t seed;
     size_t max_memory; /* bytes; 0: no limit */

@@ -85,6 +85,10 @@ static bool is_device(const char *path) {
     return stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
 }
 
+bool tool_is_stream(const char *path) {
+    return !strcmp(path, "-") || is_device(path);
+}
+
 int tool_check_kind(tool *t, const char *path, const char *endings, const char *other) {
     if (!strcmp(path, "-") || is_device(path) || ends_in_one(path, endings)) return TOOL_DONE;
     if (other && !ends_in_one(path, kinds)) return TOOL_DONE;
@@ -163,6 +167,7 @@ int tool_writer_close(tool *t, tool_writer *writer, int code) {
     if (keep && tool_check_inputs(t) != TOOL_DONE) keep = false, code = TOOL_INPUT; /* mapped until here */
     fct_result result = fct_writer_close(writer->file, keep);
     *writer = (tool_writer){0};
+    t->wrote |= keep && result == FCT_OK;
     return keep && result != FCT_OK ? tool_result(t, result) : code;
 }
 

@@ -15,6 +15,8 @@ bool tool_is_gltf(const tool *t, const char *path);
 /* Whether the input is a scene.json. A glTF file is a scene where materials matter, else a mesh. */
 bool tool_is_scene(const tool *t, const char *path);
 bool tool_is_folder(const char *path);
+/* Whether an input can be read only once: standard input, a pipe or a device. */
+bool tool_is_stream(const char *path);
 /* The last part of a path without its ending. */
 void tool_stem(const char *path, char *stem, size_t size);
 

@@ -91,13 +91,17 @@ int tool_open_gltf(tool *t, const char *path, fct_gltf **gltf, fct_mesh *mesh) {
 int tool_save_gltf(tool *t, fct_gltf *gltf, const char *path, const fct_mesh *mesh) {
     int code = tool_refuse_input(t, path);
     if (code == TOOL_DONE) code = tool_check_inputs(t);
-    return code == TOOL_DONE ? tool_result(t, fct_gltf_save(gltf, path, mesh, NULL)) : code;
+    if (code == TOOL_DONE) code = tool_result(t, fct_gltf_save(gltf, path, mesh, NULL));
+    t->wrote |= code == TOOL_DONE;
+    return code;
 }
 
 int tool_save_mesh_as(tool *t, const char *path, const fct_mesh *mesh, const fct_mesh_save_def *def) {
     int code = tool_refuse_input(t, path);
     if (code == TOOL_DONE) code = tool_check_inputs(t);
-    return code == TOOL_DONE ? tool_result(t, fct_mesh_save(&t->env, path, mesh, def)) : code;
+    if (code == TOOL_DONE) code = tool_result(t, fct_mesh_save(&t->env, path, mesh, def));
+    t->wrote |= code == TOOL_DONE;
+    return code;
 }
 
 int tool_save_mesh(tool *t, const char *path, const fct_mesh *mesh, double exposure) {

@@ -9,7 +9,7 @@
 
 /* The word at `text`, shortened for a message. */
 static const char *copy_word(const char *text, char word[40]) {
-    size_t length = strcspn(text, " \t\r\n,;#");
+    size_t length = strcspn(text, " \t\r\n#");
     if (length > 32)
         snprintf(word, 40, "%.29s...", text);
     else

@@ -159,7 +159,7 @@ static fct_result check_material_map(fct_document *d, const fct_document_model *
 static fct_result read_face_materials(fct_document *d, const json_t *value, const fct_mesh *mesh,
                                       uint32_t *labels) {
     uint32_t polygons = mesh->face_count;
-    if (mesh->source_faces && mesh->face_count) polygons = mesh->source_faces[mesh->face_count - 1] + 1;
+    if (mesh->source_faces) polygons = mesh->source_count;
     if (!json_is_array(value) || json_array_size(value) != polygons) {
         char expected[64];
         snprintf(expected, sizeof expected, "an array of %u materials, one per face", polygons);

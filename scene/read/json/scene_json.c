@@ -1,6 +1,8 @@
 /* scene/read/json/scene_json.c: scene.json, as docs/scene.md describes it. */
 #include "scene/read/json/scene_json.h"
 
+#include <string.h>
+
 #include "base/io/json.h"
 #include "base/math/vec.h"
 #include "scene/read/json/instances.h"
@@ -61,8 +63,9 @@ fct_result fct_scene_read_json(fct_scene *scene, const char *name, const char *t
     fct_result result = FCT_OK;
     if (!d.material_ids || !d.group_ids || !d.model_ids || !d.instance_names)
         result = fct_fail_memory(scene->env, "names");
+    const size_t mark = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0;
     if (result == FCT_OK)
-        result = fct_json_load(scene->env, name, text, size, JSON_REJECT_DUPLICATES, &d.root);
+        result = fct_json_load(scene->env, name, text + mark, size - mark, JSON_REJECT_DUPLICATES, &d.root);
     if (result == FCT_OK) result = read_scene_members(&d);
     release_document(&d);
     return result;

@@ -268,6 +268,12 @@ static void alpha_is_reported_and_an_asset_is_made(void **state) {
         assert_int_equal(r.messages, clear);
         assert_true(!clear || strstr(r.text, "alpha"));
         assert_int_equal(fct_gltf_save(gltf, path_of("colors.glb"), &mesh, NULL), FCT_OK);
+        fct_mesh plain; /* a plain mesh loses the alpha too */
+        r.text[0] = 0, r.messages = 0;
+        assert_int_equal(fct_mesh_load(&env, path_of("colors.gltf"), &plain), FCT_OK);
+        assert_int_equal(r.messages, clear);
+        assert_true(!clear || strstr(r.text, "1 vertices have a colour with an alpha below 1"));
+        fct_mesh_release(&env, &plain);
         json_t *root = read_root("colors.glb");
         assert_string_equal(json_string_value(json_object_get(json_object_get(root, "asset"), "version")),
                             "2.0");

@@ -39,6 +39,7 @@ COMMANDS = [
     ("boxes", ["boxes", "ground.fct", "-k", "2000", "-o", "out/boxes.json"], True),
     ("meshlets", ["meshlets", "ground.fct", "-o", "out/meshlets.bin"], True),
     ("partition", ["partition", "ground.fct", "-k", "500", "-o", "out/parts.ply"], True),
+    ("convert", ["convert", "ground.ply", "-o", "out/ground.glb"], True),
     ("make", ["make", "terrain", "--triangles", "SIZE", "-o", "out/ground.obj"], False),
 ]
 

@@ -45,7 +45,7 @@ for preloaded in '' $preload; do
     done
     ends TERM .3 compare ball.ply ground.ply --samples 100000
     ends HUP .4 make bust -o new.ply --triangles 4000000
-    ends TERM .5 cluster ball.ply ground.ply pipe -o .
+    ends TERM .5 cluster ball.ply ground.ply pipe --format ply -o .
     unset LD_PRELOAD
 done
 check "no output" test -z "$(find . -name 'new.*')"
@@ -96,4 +96,9 @@ expect 0 cluster ball.ply -o tree.fct
 shortened 'partition long.fct -k 9 -o pipe' 'cat pipe >labels.txt'
 shortened 'compare long.fct pipe --format ply' 'cat ball.ply >pipe'
 check "no answer" test ! -s out
+# The first output is complete before the second one waits for its reader.
+expect 0 partition tree.fct -k 9 -o labels.txt
+shortened 'partition long.fct -k 9 -o whole.txt --adjacency pipe' 'cat pipe >pairs.txt'
+says "outputs that exist are complete"
+check "a complete output stays" cmp labels.txt whole.txt
 finish
