@@ -7,6 +7,7 @@
 #include "base/io/file.h"
 #include "cluster/file/format.h"
 #include "cluster/tree/check/edges.h"
+#include "cluster/tree/check/structure.h"
 
 typedef struct mistake {
     const char *message;
@@ -273,10 +274,39 @@ static void wrong_faces_of_the_cut_are_found(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
+/* Trees in which each node adds one face are F - 1 deep; from 12 faces on, that is more than 3 log2 F. */
+static void deep_trees_are_found(void **state) {
+    (void)state;
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    for (uint32_t faces = 8; faces <= 16; ++faces) {
+        fct_tree *tree;
+        fct_mesh mesh = make_grid(&env, 3);
+        mesh.face_count = faces;
+        assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+        uint32_t nodes = tree->view.node_count, total = faces - 1;
+        for (uint32_t i = 0; i < nodes; ++i) {
+            fct_cluster *c = &tree->clusters[i];
+            c->first = i, c->count = faces - i, c->cost = 1, total += i + 1;
+            c->child[0] = nodes + i, c->child[1] = i + 1 < nodes ? i + 1 : nodes + i + 1;
+        }
+        tree->view.depth = faces - 1, tree->view.mean_depth = (double)total / faces;
+        r.text[0] = 0;
+        fct_result result = fct_tree_check_structure(&env, tree);
+        assert_int_equal(result, faces >= 12 ? FCT_ERROR_DATA : FCT_OK);
+        assert_true(faces < 12 || strstr(r.text, "3 log2"));
+        fct_tree_destroy(tree);
+        fct_mesh_release(&env, &mesh);
+    }
+    assert_int_equal(r.alive, 0);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_wrong_number_is_found), cmocka_unit_test(the_first_mistake_is_told),
-        cmocka_unit_test(wrong_counts_are_found), cmocka_unit_test(a_build_counts_as_verifying_does),
-        cmocka_unit_test(wrong_faces_of_the_cut_are_found)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_wrong_number_is_found),
+                                       cmocka_unit_test(the_first_mistake_is_told),
+                                       cmocka_unit_test(wrong_counts_are_found),
+                                       cmocka_unit_test(a_build_counts_as_verifying_does),
+                                       cmocka_unit_test(wrong_faces_of_the_cut_are_found),
+                                       cmocka_unit_test(deep_trees_are_found)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -129,6 +129,17 @@ static inline fct_mesh make_degenerate(const fct_env *env, uint32_t n) {
     return mesh;
 }
 
+/* Triangles between any of 50 vertices: most edges have several faces, some faces are equal or have no area.
+ */
+static inline fct_mesh make_tangle(const fct_env *env, uint32_t n) {
+    fct_mesh mesh = shape_of(env, 60, n);
+    uint32_t state = 9;
+    for (uint32_t v = 0; v < 60; ++v)
+        set_vertex(&mesh, v, shape_random(&state), shape_random(&state), shape_random(&state));
+    for (uint32_t i = 0; i < 3 * n; ++i) mesh.triangles[i] = 5 + (uint32_t)(50 * shape_random(&state));
+    return mesh;
+}
+
 /* Three faces whose corners are one vertex each: neither area nor perimeter. */
 static inline fct_mesh make_points(const fct_env *env) {
     fct_mesh mesh = shape_of(env, 3, 3);

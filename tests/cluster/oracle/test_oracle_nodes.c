@@ -45,11 +45,13 @@ static fct_mesh make_mesh(const fct_env *env, int which, const char **name) {
         mesh = make_terrain(env, 50, 0.05, 8);
         turn(&mesh);
         return *name = "turned terrain", mesh;
+    case 16:
+        return *name = "tangle", make_tangle(env, 1500); /* most spans of faces have no new vertex */
     default:
         return *name = "large pages", make_pages(env, 5, 24, 24);
     }
 }
-enum { MESHES = 17 };
+enum { MESHES = 18 };
 
 static void nodes(void **state) {
     (void)state;

@@ -347,12 +347,35 @@ static void a_hub_does_not_move(void **state) {
     fct_mesh_release(&env, &fan);
 }
 
+/* The first wedge of a group at an end, or its first wedge if it has none there: all groups of three of four
+ * wedges. */
+static void a_group_has_the_attributes_of_its_end(void **state) {
+    (void)state;
+    double attributes[4] = {10, 11, 12, 13};
+    fct_simplifier s = {.attributes = attributes, .channel_count = 1};
+    for (uint32_t bits = 0; bits < 16; ++bits)
+        for (uint32_t other = 0; other < 4; ++other)
+            for (uint32_t end = 0; end < 2; ++end) {
+                fct_groups g = {.wedge_count = 4, .group_count = 2, .wedges = {0, 1, 2, 3}};
+                uint32_t first = FCT_NONE, at_end = FCT_NONE;
+                for (uint32_t i = 4; i-- > 0;) {
+                    g.second[i] = bits >> i & 1, g.group_of[i] = i == other;
+                    if (i == other) continue;
+                    first = i;
+                    if ((bits >> i & 1) == end) at_end = i;
+                }
+                double wanted = attributes[at_end == FCT_NONE ? first : at_end];
+                assert_true(*fct_groups_end(&s, &g, 0, end) == wanted);
+            }
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(candidates_solve_the_dense_system),
         cmocka_unit_test(free_directions_stay_at_the_midpoint),
         cmocka_unit_test(a_hub_does_not_move),
+        cmocka_unit_test(a_group_has_the_attributes_of_its_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
