@@ -16,7 +16,6 @@
 enum {
     ROWS = 1 << 16,         /* vertices or faces per read */
     LEAST_SLOTS = 1 << 12,  /* of a table */
-    MOST_PASSES = 1 << 16,  /* more are not tried: the hashes collide on purpose */
     SEVERAL = FCT_NONE - 1, /* in place of a face: several faces have the side */
 };
 
@@ -40,8 +39,7 @@ typedef struct welder {
     void *table;
     size_t slots, used;
     uint32_t pass, passes;
-    bool full;   /* the table is: more passes are needed */
-    double done; /* the largest share that was shown */
+    bool full; /* the table is, as only hashes that collide on purpose can make it */
 } welder;
 
 static bool is_set(const uint32_t *bits, uint32_t i) {
@@ -73,14 +71,8 @@ static void note_slot(welder *w) {
     if (++w->used >= w->slots / 8 * 7) w->full = true;
 }
 
-/* The share never falls, also where passes start again. */
-static fct_result show_progress(welder *w, double done) {
-    if (done > w->done) w->done = done;
-    return fct_progress(w->large->env, "weld", w->done);
-}
-
-/* Runs `visit` once per pass over an empty table for about `keys` keys of `size` bytes. Starts again with
- * twice as many passes if a table becomes full. begin: the share of the weld that is done before. */
+/* Runs `visit` once per pass over an empty table for about `keys` keys of `size` bytes. begin: the share of
+ * the weld that is done before. */
 static fct_result run_passes(welder *w, uint64_t keys, size_t size, double begin,
                              fct_result (*visit)(welder *)) {
     fct_large *l = w->large;
@@ -88,19 +80,16 @@ static fct_result run_passes(welder *w, uint64_t keys, size_t size, double begin
     uint64_t wanted = keys + keys / 2 + LEAST_SLOTS, slots = room / size;
     if (slots > wanted) slots = wanted;
     if (slots < LEAST_SLOTS) slots = LEAST_SLOTS;
-    w->slots = (size_t)slots;
+    w->slots = (size_t)slots, w->full = false;
     w->table = fct_allocate(l->env, w->slots, size);
     fct_result result = w->table ? FCT_OK : fct_fail_memory(l->env, "a table of vertices");
     w->passes = (uint32_t)(keys / (slots / 4 * 3)) + 1;
-    for (w->pass = 0; result == FCT_OK && w->pass < w->passes;) {
+    for (w->pass = 0; result == FCT_OK && w->pass < w->passes; ++w->pass) {
         memset(w->table, 0xff, w->slots * size);
-        w->used = 0, w->full = false;
+        w->used = 0;
         result = visit(w);
-        if (result == FCT_OK) result = show_progress(w, begin + .4 * w->pass / w->passes);
-        ++w->pass;
-        if (result != FCT_OK || !w->full) continue;
-        w->pass = 0, w->passes *= 2;
-        if (w->passes > MOST_PASSES) result = fct_fail_memory(l->env, "a table of vertices");
+        if (result == FCT_OK && w->full) result = fct_fail_memory(l->env, "a table of vertices");
+        if (result == FCT_OK) result = fct_progress(l->env, "weld", begin + .4 * w->pass / w->passes);
     }
     fct_release(l->env, w->table);
     w->table = NULL;
@@ -223,7 +212,7 @@ static fct_result spool_triangles(welder *w) {
         for (size_t i = 0; i < 3 * (size_t)rows && result == FCT_OK; ++i)
             if (is_set(w->open, w->triangles[i])) w->triangles[i] = w->places[w->triangles[i]];
         if (result == FCT_OK) result = fct_spool_append(&l->welded, w->triangles, 12 * (size_t)rows);
-        if (result == FCT_OK) result = show_progress(w, .8 + .2 * f / l->info.face_count);
+        if (result == FCT_OK) result = fct_progress(l->env, "weld", .8 + .2 * f / l->info.face_count);
     }
     return result;
 }

@@ -48,10 +48,11 @@ static fct_mesh make_seam(const fct_mesh *mesh) {
     return seam;
 }
 
-/* Two copies of a mesh at one place. */
+/* Two copies of a mesh at one place, and one face of one vertex on each. */
 static fct_mesh make_twins(const fct_mesh *mesh) {
     uint32_t n = mesh->vertex_count, corners = 3 * mesh->face_count;
-    fct_mesh twins = make_empty(2 * n, 2 * mesh->face_count);
+    fct_mesh twins = make_empty(2 * n, 2 * mesh->face_count + 2);
+    for (uint32_t k = 0; k < 6; ++k) twins.triangles[2 * (size_t)corners + k] = k < 3 ? 0 : n;
     for (size_t i = 0; i < 6 * (size_t)n; ++i) twins.positions[i] = mesh->positions[i % (3 * (size_t)n)];
     for (uint32_t c = 0; c < 2 * corners; ++c)
         twins.triangles[c] = mesh->triangles[c % corners] + (c < corners ? 0 : n);
@@ -64,7 +65,9 @@ static fct_mesh make_random(uint32_t faces, uint32_t places, uint32_t seed) {
     for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
         uint32_t place = hash_of(v + seed) % places;
         for (uint32_t k = 0; k < 3; ++k)
-            mesh.positions[3 * (size_t)v + k] = (float)(hash_of(3 * place + k) % 64) - 32;
+            mesh.positions[3 * (size_t)v + k] = (float)(hash_of(3 * place + k) % 8) - 4;
+        for (uint32_t k = 0; k < 3; ++k)
+            if (v % 2 && mesh.positions[3 * (size_t)v + k] == 0) mesh.positions[3 * (size_t)v + k] = -0.0f;
     }
     for (uint32_t c = 0; c < 3 * faces; ++c) mesh.triangles[c] = hash_of(c * 7 + seed) % mesh.vertex_count;
     return mesh;

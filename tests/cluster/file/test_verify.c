@@ -180,6 +180,10 @@ static void wrong_counts_are_found(void **state) {
     assert_int_equal(fct_tree_verify(&env, tree), FCT_ERROR_DATA);
     assert_non_null(strstr(r.text, "bounds"));
     *view = right;
+    view->inward = !right.inward;
+    assert_int_equal(fct_tree_verify(&env, tree), FCT_ERROR_DATA);
+    assert_non_null(strstr(r.text, "wound inwards"));
+    *view = right;
     ++view->depth;
     assert_int_equal(fct_tree_verify(&env, tree), FCT_ERROR_DATA);
     assert_non_null(strstr(r.text, "deep"));
