@@ -315,7 +315,7 @@ int tool_info(int argc, char **argv) {
                 "duplicate faces. For a hierarchy it "
                 "prints the header, which is "
                 "fast for files of any size: vertices, faces, boundary and non-manifold edges, components, "
-                "bounds, depth, roots, and "
+                "bounds, depth, roots, whether the surface is wound inwards, and "
                 "the source and options of the build.\n\n"
                 "--verify reads the whole hierarchy. It checks checksums, links, ranges and depth. For every "
                 "node it checks that box "

@@ -147,5 +147,9 @@ done
 { sphere 6; } >twice.off # every face a second time, turned over
 awk 'NR == 2 { $2 *= 2; print; next } NF == 4 { print; print $1, $3, $2, $4; next } { print }' twice.off >duplicate.off
 accepted duplicate.off
+# A hierarchy file has vertex colours only.
+printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n' >red.ply
+expect 0 cluster red.ply -o red.fct
+says "red.ply: face colours are left out"
 leftovers
 finish

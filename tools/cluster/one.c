@@ -49,6 +49,8 @@ static int cluster_in_memory(tool *t, const fct_tree_def *def, const char *input
     *large =
         !tool_is_stream(input) && !fits_memory(t, def, mesh.face_count, 0); /* the mesh is loaded already */
     if (*large) goto done;
+    if (mesh.face_colors)
+        tool_warn(t, "%s: face colours are left out, because a hierarchy file has no place for them", input);
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     double read = tool_seconds();
