@@ -16,6 +16,9 @@
 /* Factors on numbers of rays for errors far from the default. */
 #define LEAST_FINENESS .25
 #define MOST_FINENESS  16
+/* Factor by which one pass may lower the final epsilon. Without a limit, a coarse solution in which hardly
+ * any light arrives would open everything. */
+#define MOST_FALL 8
 /* Tolerances of the iterations over links and over rays; leaves split where direct light varies by this
  * multiple of the last epsilon. */
 #define LINK_TOLERANCE      1e-3
@@ -52,13 +55,31 @@ static double sum_emitted_power(const fct_elements *set) {
     return power;
 }
 
-/* Refines and solves over the links. `last`: the final epsilon, power. */
-static fct_result solve_links(fct_bake *bake, double last) {
+/* What the surfaces absorb: the emitted power less what leaves an open scene. */
+static double sum_absorbed_power(const fct_elements *set) {
+    double power = 0;
+    for (size_t id = 0; id < set->count; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->child_count > 0 || e->kind == FCT_ELEMENT_VOLUME) continue;
+        for (int c = 0; c < 3; ++c) power += (1 - e->reflectance[c]) * e->irradiance[c] * e->area;
+    }
+    return power;
+}
+
+/* Refines and solves over the links. *last: the final epsilon, power. Epsilon is a share of the absorbed
+ * power, which early passes do not know, so the first one takes the emitted power. */
+static fct_result solve_links(fct_bake *bake, double *last) {
     fct_solution *s = &bake->solution;
     fct_bake_stats *stats = &bake->stats;
     fct_result result = fct_links_create(s->env, &s->links);
-    for (int pass = 0; pass < PASSES && last > 0 && result == FCT_OK; ++pass) {
-        double epsilon = last * (1 << (PASSES - 1 - pass)), start = fct_seconds();
+    const double emitted = sum_emitted_power(&s->elements);
+    *last = s->def.error * emitted;
+    for (int pass = 0; pass < PASSES && emitted > 0 && result == FCT_OK; ++pass) {
+        if (pass > 0) {
+            double absorbed = fct_min(sum_absorbed_power(&s->elements), emitted);
+            *last = fct_max(s->def.error * absorbed, *last / MOST_FALL);
+        }
+        double epsilon = *last * (1 << (PASSES - 1 - pass)), start = fct_seconds();
         result = fct_links_refine(&s->elements, &s->links, epsilon, "links", pass / (double)PASSES);
         stats->seconds_open += fct_seconds() - start;
         if (result != FCT_OK) break;
@@ -85,10 +106,22 @@ static void fill_stats(fct_bake *bake) {
     stats->error_estimate = t->noise + t->change;
 }
 
+/* The mean of rho E over area and channels. */
+static double find_mean_reflection(const fct_elements *set) {
+    double power = 0, area = 0;
+    for (size_t id = 0; id < set->count; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->child_count > 0 || e->kind == FCT_ELEMENT_VOLUME) continue;
+        for (int c = 0; c < 3; ++c) power += e->area * (e->radiosity[c] - e->emission[c]) / 3;
+        area += e->area;
+    }
+    return area > 0 ? power / area : 0;
+}
+
 static fct_result solve_scene(fct_bake *bake) {
     fct_solution *s = &bake->solution;
-    double begin = fct_seconds(), last = s->def.error * sum_emitted_power(&s->elements);
-    fct_result result = solve_links(bake, last);
+    double begin = fct_seconds(), last;
+    fct_result result = solve_links(bake, &last);
     if (result != FCT_OK) return result;
     double start = fct_seconds();
     fct_transport_def def = {.seed = s->def.seed,
@@ -100,8 +133,7 @@ static fct_result solve_scene(fct_bake *bake) {
     bake->stats.seconds_solve += fct_seconds() - start;
     bake->stats.seconds_total = fct_seconds() - begin;
     fill_stats(bake);
-    const fct_element *root = &s->elements.items[0];
-    for (int c = 0; c < 3; ++c) s->mean_radiosity += root->radiosity[c] / 3;
+    s->mean_radiosity = find_mean_reflection(&s->elements);
     return FCT_OK;
 }
 

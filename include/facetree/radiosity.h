@@ -27,13 +27,13 @@ typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
     fct_final final; /* default GATHER */
-    double error; /* epsilon, default 2e-5: share of the emitted power that a link may carry as uncertainty.
+    double error; /* epsilon, default 2e-5: share of the absorbed power that a link may carry as uncertainty.
                      Numbers of rays and anchors of the output grow with 1 / sqrt(error) */
     uint32_t samples; /* REFERENCE: paths per vertex, default 256; FACE: gather rays per anchor; 0: default */
     uint64_t seed;    /* of all random numbers; equal seeds give equal results */
     bool indirect_only; /* the output leaves out emission and direct light */
-    double max_edge; /* longest edge of the output's triangles far from other instances, world units; 0: the
-                        scene's diagonal / 72 */
+    double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
+                           72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);
 

@@ -8,10 +8,8 @@
 /* Least cosine in the gradient's weight 1 / cosine. Without it, single grazing rays dominate the gradient. */
 #define LEAST_COSINE .15
 /* Clamp of an anchor's reach: at least this many root areas of its vertex, because anchors cannot be denser
- * than vertices; at most the scene's diagonal over LONGEST_REACH, because one far hit makes no wall smooth.
- */
+ * than vertices. */
 #define SHORTEST_REACH 1.5
-#define LONGEST_REACH  8
 /* Extent of a group's normals along an axis from which the group is halved by normals and not by space. */
 #define WIDE_TURN .8
 /* World units per |n - n'| in the search for anchors, over the anchors' harmonic mean reach: as in the blend.
@@ -28,11 +26,9 @@ typedef struct group {
 } group;
 
 typedef struct grouping {
-    const fct_elements *set;
-    const float *stored;
+    const fct_source *source;
     const fct_surface *surface;
     const fct_anchors_def *def;
-    double longest;     /* upper clamp of reach */
     uint32_t *vertices; /* each group has a range of these */
     group *groups, *next;
     uint32_t *scratch;
@@ -40,8 +36,7 @@ typedef struct grouping {
     uint64_t *chunk_rays;
 } grouping;
 
-void fct_anchor_gather(const fct_elements *set, const float *stored, uint32_t rays, uint64_t seed,
-                       fct_anchor *a) {
+void fct_anchor_gather(const fct_source *source, uint32_t rays, uint64_t seed, fct_anchor *a) {
     v3 n = v3_load(a->normal), p = v3_mad(v3_load(a->position), a->offset, n);
     double sum[3] = {0, 0, 0}, inverse = 0;
     v3 vector[3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
@@ -52,8 +47,8 @@ void fct_anchor_gather(const fct_elements *set, const float *stored, uint32_t ra
         fct_plane_point(k, seed, plane);
         v3 d = fct_cosine_direction(n, plane[0], plane[1]);
         v3_store(direction, d);
-        fct_found found = fct_transport_look(set, stored, origin, direction);
-        if (found.distance > 0) inverse += 1 / found.distance;
+        fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
+        if (found.distance > 0) inverse += 1 / fct_min(found.distance, source->longest);
         double weight = 1 / fct_max(v3_dot(d, n), LEAST_COSINE);
         for (int c = 0; c < 3; ++c) {
             sum[c] += found.radiosity[c];
@@ -94,15 +89,17 @@ static bool group_is_too_wide(const grouping *g, const group *k, const fct_ancho
     const fct_surface *s = g->surface;
     v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)middle);
     double worst = 0, least_cosine = 1;
+    bool hidden = false; /* a surface that the anchor may not see is in front of a vertex */
     for (uint32_t m = k->begin; m < k->end; ++m) {
         const size_t w = g->vertices[m];
-        double apart = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p)) / a->reach;
+        double distance = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p)), apart = distance / a->reach;
         double cosine = v3_dot(n, v3_load(s->normals + 3 * w));
         worst = fct_max(worst, apart + sqrt(fct_max(1 - cosine, 0)));
         least_cosine = fct_min(cosine, least_cosine);
+        hidden |= g->def->nearest && s->flat[w] && distance > g->def->nearest[w];
     }
     bool turned = 2 - 2 * least_cosine > .9 * FCT_MOST_TURN2; /* the search rounds normals to floats */
-    return k->end - k->begin > 1 && (turned || worst > g->def->tolerance);
+    return k->end - k->begin > 1 && (turned || hidden || worst > g->def->tolerance);
 }
 
 /* Places the group's anchor on its middle vertex and gathers. Returns the number of rays. */
@@ -115,10 +112,9 @@ static uint32_t gather_group(const grouping *g, group *k) {
     a->offset = s->offsets[v];
     while (doublings < MOST_DOUBLINGS && size >> doublings > 1) ++doublings;
     uint32_t count = g->def->rays + g->def->rays * doublings / 4;
-    fct_anchor_gather(g->set, g->stored, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count),
-                      a);
+    fct_anchor_gather(g->source, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count), a);
     double least = SHORTEST_REACH * sqrt(s->areas[v]);
-    a->reach = (float)fct_min(fct_max(a->reach, least), g->longest);
+    a->reach = (float)fct_min(fct_max(a->reach, least), g->source->longest);
     k->halve = group_is_too_wide(g, k, a, v);
     return count;
 }
@@ -169,11 +165,12 @@ static uint32_t halve_group(const grouping *g, const group *k) {
     return mid == k->begin || mid == k->end ? k->begin + (k->end - k->begin) / 2 : mid;
 }
 
-/* Lists the vertices with a face and a normal. Returns their number. */
-static uint32_t list_vertices(const fct_surface *s, uint32_t *vertices) {
+/* Lists the vertices with a face and a normal that are not covered. Returns their number. */
+static uint32_t list_vertices(const fct_surface *s, const uint8_t *covered, uint32_t *vertices) {
     uint32_t n = 0;
     for (uint32_t v = 0; v < s->mesh.vertex_count; ++v) {
         const float *d = s->normals + 3 * (size_t)v;
+        if (covered && covered[v]) continue;
         if (s->places[v] != FCT_NONE && (d[0] != 0 || d[1] != 0 || d[2] != 0)) vertices[n++] = v;
     }
     return n;
@@ -201,7 +198,7 @@ static fct_result anchor_groups(const fct_env *env, grouping *g, uint32_t pendin
 
 /* Makes all anchors. */
 static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *out) {
-    uint32_t total = list_vertices(g->surface, g->vertices), pending = total > 0 ? 1 : 0;
+    uint32_t total = list_vertices(g->surface, g->def->covered, g->vertices), pending = total > 0 ? 1 : 0;
     size_t capacity = 0;
     g->groups[0] = (group){.begin = 0, .end = total};
     while (pending > 0) {
@@ -218,17 +215,12 @@ static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *ou
     return out->axes ? FCT_OK : fct_fail_memory(env, "anchors");
 }
 
-fct_result fct_anchors_create(const fct_env *env, const fct_elements *set, const float *stored,
-                              const fct_surface *surface, const fct_anchors_def *def, fct_anchors *out) {
+fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
+                              const fct_anchors_def *def, fct_anchors *out) {
     *out = (fct_anchors){0};
     uint32_t most = surface->mesh.vertex_count;
     size_t chunks = fct_chunk_count(most, GROUP_GRAIN) + 1;
-    v3 extent = v3_sub(v3_load(set->view.bounds.upper), v3_load(set->view.bounds.lower));
-    grouping g = {.set = set,
-                  .stored = stored,
-                  .surface = surface,
-                  .def = def,
-                  .longest = v3_norm(extent) / LONGEST_REACH};
+    grouping g = {.source = source, .surface = surface, .def = def};
     const fct_array arrays[] = {FCT_ARRAY(g.scratch, most), FCT_ARRAY(g.next, most),
                                 FCT_ARRAY(g.vertices, most), FCT_ARRAY(g.groups, most),
                                 FCT_ARRAY_ZERO(g.chunk_rays, chunks)};

@@ -13,20 +13,30 @@
 #include "radiosity/solve/element.h"
 #include "radiosity/surface/surface.h"
 
+/* The stored solution that gather rays look up. */
+typedef struct fct_source {
+    const fct_elements *set;
+    const float *stored; /* as in fct_transport */
+    double longest;      /* hits farther away, and misses, count as if at this distance; also the longest
+                            reach. One far hit makes no wall smooth */
+} fct_source;
+
 typedef struct fct_anchors_def {
     uint32_t rays;    /* least number per anchor; anchors of large groups send up to three times as many */
     double tolerance; /* of distance / reach + sqrt(1 - n . n'), within a group */
     double side;      /* 1: front of the surface; -1: back */
+    const uint8_t *covered; /* per vertex: it needs no light. NULL: none is covered */
+    const float *nearest;   /* per vertex: distance to some surface in front of it, which limits how far away
+                               its   anchor may be. NULL: infinity */
     uint64_t seed;
 } fct_anchors_def;
 
-/* stored: as in fct_transport. Errors: MEMORY, CANCELLED. */
-fct_result fct_anchors_create(const fct_env *env, const fct_elements *set, const float *stored,
-                              const fct_surface *surface, const fct_anchors_def *def, fct_anchors *out);
+/* Errors: MEMORY, CANCELLED. */
+fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
+                              const fct_anchors_def *def, fct_anchors *out);
 
 /* Sends `rays` cosine-distributed rays from position + offset * normal. Sets reach, irradiance and gradient:
  *   E = mean b,  gradient = mean b d / max(d . n, .15)   over the rays' directions d. */
-void fct_anchor_gather(const fct_elements *set, const float *stored, uint32_t rays, uint64_t seed,
-                       fct_anchor *anchor);
+void fct_anchor_gather(const fct_source *source, uint32_t rays, uint64_t seed, fct_anchor *anchor);
 
 #endif

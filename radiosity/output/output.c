@@ -1,56 +1,61 @@
 /* radiosity/output/output.c: see output.h.
  *
- * 1. Tessellate the instance, and place its anchors.
- * 2. Light each vertex at its sample point: direct light by shadow rays, indirect light from the anchors.
- * With FCT_FINAL_NONE, the links bring both.
- * 3. Split flat edges across which the light changes, and light the new vertices, up to BORDER_ROUNDS times.
- * So the edges of the mesh follow shadow borders.
- * 4. Smooth the colours on flat surfaces (smooth.h).
+ * 1. Tessellate the instance, find the vertices that other surfaces cover (cover.h), cut surfaces along the
+ * border of their cover, and place anchors.
+ * 2. Light each other vertex at its sample point: direct light by shadow rays, indirect light from the
+ * anchors. With FCT_FINAL_NONE, the links bring both.
+ * 3. Split edges across which the light changes, cut new covers, and light the new vertices, up to
+ * BORDER_ROUNDS times. So the edges of the mesh follow shadow borders.
+ * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices are black.
  */
 #include "radiosity/output/output.h"
+
+#include <string.h>
 
 #include "mesh/mesh.h"
 
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/blend.h"
 #include "radiosity/output/smooth.h"
+#include "radiosity/surface/cover.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/tessellate.h"
 #include "scene/transform.h"
 
 /* Rounds of splits at shadow borders: each halves the width of a border's blur. */
-enum { BORDER_ROUNDS = 2 };
+enum { BORDER_ROUNDS = 4 };
 /* Edges below max_edge over this are not split again. */
-#define SHORT_EDGES 7
+#define SHORT_EDGES 24
 /* Least differences across a border: of the two vertices' sum, and of the scene's mean radiosity. Smaller
  * values split edges because of noise. */
 #define BORDER_SHARE .1
 #define BORDER_LEVEL .04
-/* Rays per anchor and per lamp at the default error in large scenes. */
+/* Rays per anchor and per lamp at the default error. */
 enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4 };
+/* Length of an edge from before the border of a cover to behind it, over that of the edge that it cuts. */
+#define CUT_WIDTH (1. / 256)
+enum { VERTEX_GRAIN = 64 }; /* vertices per chunk */
 /* Tolerance of the groups of vertices per anchor. Vertices of one group turn at most acos(1 - .4^2) = 33
  * degrees from their anchor with GATHER, so the blend uses it; up to 79 degrees with DIRECT, where some
  * vertices of strongly bent models find no anchor and stay dark. */
 #define GATHER_TOLERANCE .4
 #define DIRECT_TOLERANCE .9
-/* Scenes below this number of faces take more rays per vertex, at most MOST_RAY_FACTOR times as many. */
-#define SMALL_SCENE     2e5
-#define MOST_RAY_FACTOR 4
-
 typedef struct lighting {
     const fct_solution *s;
     fct_surface *surface;
     const fct_anchors *anchors;
     uint32_t instance;
     bool back;
-    uint32_t first; /* lower vertices have their light */
+    uint32_t first;           /* lower vertices have their light */
+    float *direct, *indirect; /* irradiance, per vertex x 3; `indirect` holds all of it with FCT_FINAL_NONE */
+    uint8_t *covered;         /* per vertex */
+    uint8_t *cut;             /* per vertex: it was made to cut an edge at the border of a cover */
+    float *nearest;           /* per vertex: see fct_point_is_covered */
+    uint32_t known;           /* lower vertices have room in these arrays */
+    uint32_t cut_first;       /* of the vertices before the border of a cover */
+    uint64_t *rays;           /* of the cuts */
     uint64_t *chunk_rays;
 } lighting;
-
-double fct_output_ray_factor(const fct_solution *s) {
-    double faces = fct_max((double)s->elements.view.face_count, 1);
-    return fct_min(fct_max(sqrt(SMALL_SCENE / faces), 1), MOST_RAY_FACTOR);
-}
 
 /* Barycentrics of a point's projection onto the face at `place`. Sample points lie on faces with an area. */
 static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t place, const float point[3],
@@ -78,19 +83,38 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-/* Direct light by shadow rays plus the anchors' indirect light. */
-static void gather_lamps_and_anchors(const lighting *l, size_t v, const float normal[3], double irradiance[3],
-                                     uint64_t *rays) {
+static void gather_lamps(const lighting *l, size_t v, const float normal[3], double irradiance[3],
+                         uint64_t *rays) {
     const fct_solution *s = l->s;
     const fct_surface *f = l->surface;
-    const float *point = f->sample_points + 3 * v;
-    double indirect[3];
-    uint64_t seed = fct_hash3(s->def.seed + 1, l->instance, v);
-    uint32_t rays_each = fct_solution_lamp_rays(s, (uint32_t)(LAMP_RAYS * fct_output_ray_factor(s)));
-    fct_solution_direct(s, point, normal, f->offsets[v], seed, rays_each, irradiance, rays);
-    fct_anchors_irradiance(l->anchors, &s->elements, point, normal, f->offsets[v], f->flat[v], indirect,
-                           rays);
-    for (int c = 0; c < 3; ++c) irradiance[c] += indirect[c];
+    uint32_t rays_each = fct_solution_lamp_rays(s, LAMP_RAYS);
+    fct_solution_direct(s, f->sample_points + 3 * v, normal, f->offsets[v],
+                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, irradiance, rays);
+}
+
+/* The normal on the side that receives the light. */
+static void load_normal(const lighting *l, size_t v, float normal[3]) {
+    for (size_t c = 0; c < 3; ++c)
+        normal[c] = l->back ? -l->surface->normals[3 * v + c] : l->surface->normals[3 * v + c];
+}
+
+static bool has_surface(const lighting *l, size_t v) {
+    const float *n = l->surface->normals + 3 * v;
+    return l->surface->places[v] != FCT_NONE && (n[0] != 0 || n[1] != 0 || n[2] != 0);
+}
+
+static void cover_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    lighting *l = user;
+    const fct_surface *f = l->surface;
+    (void)thread;
+    for (size_t v = l->first + begin; v < l->first + end; ++v) {
+        float normal[3];
+        load_normal(l, v, normal);
+        l->covered[v] = has_surface(l, v) &&
+                        fct_point_is_covered(l->s->scene, f->sample_points + 3 * v, normal, f->offsets[v],
+                                             fct_hash3(l->s->def.seed + 3, l->instance, v), &l->nearest[v],
+                                             &l->chunk_rays[chunk]);
+    }
 }
 
 static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -98,31 +122,139 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     const fct_surface *f = l->surface;
     (void)thread;
     for (size_t v = l->first + begin; v < l->first + end; ++v) {
-        float *color = f->mesh.colors + 3 * v, normal[3];
-        for (size_t c = 0; c < 3; ++c) normal[c] = l->back ? -f->normals[3 * v + c] : f->normals[3 * v + c];
-        if (f->places[v] == FCT_NONE || (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)) {
-            color[0] = color[1] = color[2] = 0;
-            continue;
+        float normal[3];
+        double direct[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
+        load_normal(l, v, normal);
+        if (has_surface(l, v) && !l->covered[v]) {
+            if (l->s->def.final == FCT_FINAL_NONE) {
+                gather_links(l, v, normal, indirect);
+            } else {
+                gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
+                fct_anchors_irradiance(l->anchors, &l->s->elements, f->sample_points + 3 * v, normal,
+                                       f->offsets[v], f->flat[v], indirect, &l->chunk_rays[chunk]);
+            }
         }
+        for (size_t c = 0; c < 3; ++c)
+            l->direct[3 * v + c] = (float)direct[c], l->indirect[3 * v + c] = (float)indirect[c];
+    }
+}
+
+/* Sets the colours of the vertices from `first` on. A vertex without a surface is black. */
+static void color_vertices(const lighting *l, uint32_t first) {
+    const fct_surface *f = l->surface;
+    for (size_t v = first; v < f->mesh.vertex_count; ++v) {
+        float *color = f->mesh.colors + 3 * v;
         double irradiance[3];
-        if (l->s->def.final == FCT_FINAL_NONE)
-            gather_links(l, v, normal, irradiance);
-        else
-            gather_lamps_and_anchors(l, v, normal, irradiance, &l->chunk_rays[chunk]);
+        color[0] = color[1] = color[2] = 0;
+        if (!has_surface(l, v)) continue;
+        for (size_t c = 0; c < 3; ++c)
+            irradiance[c] = (double)l->direct[3 * v + c] + (double)l->indirect[3 * v + c];
         fct_solution_radiosity(l->s, l->instance, irradiance, color);
     }
 }
 
-/* Lights the vertices from l->first on. */
-static fct_result light_vertices(lighting *l, uint64_t *rays) {
+typedef void run_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
+
+/* Runs the function for vertices [first, vertex_count), less `first`. Errors: MEMORY, CANCELLED. */
+static fct_result run_vertices(lighting *l, const char *phase, uint32_t first, run_chunk *run,
+                               uint64_t *rays) {
     const fct_env *env = l->s->env;
-    size_t count = l->surface->mesh.vertex_count - l->first, chunks = fct_chunk_count(count, 64);
+    size_t count = l->surface->mesh.vertex_count - first, chunks = fct_chunk_count(count, VERTEX_GRAIN);
     l->chunk_rays = fct_allocate_zero(env, chunks + 1, sizeof *l->chunk_rays);
     if (!l->chunk_rays) return fct_fail_memory(env, "the output");
-    fct_result result = fct_parallel_for_progress(env, "vertices", count, 64, light_chunk, l);
+    fct_result result = fct_parallel_for_progress(env, phase, count, VERTEX_GRAIN, run, l);
     for (size_t c = 0; c < chunks; ++c) *rays += l->chunk_rays[c];
     fct_release(env, l->chunk_rays);
+    return result;
+}
+
+/* Makes room for the light of all vertices. The new ones are covered or not, and made by a cut or not. */
+static fct_result grow_light(lighting *l, bool covered, bool cut) {
+    const fct_env *env = l->s->env;
+    const size_t count = l->surface->mesh.vertex_count;
+    size_t capacity[5] = {l->known, l->known, l->known, l->known, l->known};
+    fct_result result = fct_grow(env, (void **)&l->direct, &capacity[0], count, 3 * sizeof *l->direct);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&l->indirect, &capacity[1], count, 3 * sizeof *l->indirect);
+    if (result == FCT_OK) result = fct_grow(env, (void **)&l->covered, &capacity[2], count, 1);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&l->nearest, &capacity[3], count, sizeof *l->nearest);
+    if (result == FCT_OK) result = fct_grow(env, (void **)&l->cut, &capacity[4], count, 1);
+    for (size_t v = l->known; result == FCT_OK && v < count; ++v)
+        l->covered[v] = covered, l->cut[v] = cut, l->nearest[v] = INFINITY;
+    l->known = (uint32_t)count;
+    return result;
+}
+
+/* Finds which of the new vertices are covered. */
+static fct_result cover_vertices(lighting *l, uint64_t *rays) {
+    fct_result result = grow_light(l, false, false);
+    return result == FCT_OK ? run_vertices(l, "covered vertices", l->first, cover_chunk, rays) : result;
+}
+
+/* Lights the vertices from l->first on. */
+static fct_result light_vertices(lighting *l, uint64_t *rays) {
+    fct_result result = run_vertices(l, "vertices", l->first, light_chunk, rays);
+    if (result == FCT_OK) color_vertices(l, l->first);
     l->first = l->surface->mesh.vertex_count;
+    return result;
+}
+
+/* On an edge from an uncovered to a covered vertex: just before the point where the cover begins. */
+static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
+    lighting *l = user;
+    const fct_surface *f = l->surface;
+    if (l->covered[a] == l->covered[b] || (l->cut[a] && l->cut[b])) return 0;
+    if (!has_surface(l, a) || !has_surface(l, b)) return 0;
+    const uint32_t from = l->covered[a] ? b : a, to = l->covered[a] ? a : b;
+    const v3 p = v3_load(f->mesh.positions + 3 * (size_t)from);
+    const v3 way = v3_sub(v3_load(f->mesh.positions + 3 * (size_t)to), p);
+    const float offset = fmaxf(f->offsets[a], f->offsets[b]);
+    const uint64_t seed = fct_hash3(l->s->def.seed + 4, l->instance, from);
+    float normals[2][3], normal[3], point[3];
+    double bare = 0, covered = 1;
+    load_normal(l, from, normals[0]);
+    load_normal(l, to, normals[1]);
+    while (covered - bare > CUT_WIDTH) {
+        const double middle = .5 * (bare + covered);
+        const v3 first = v3_scale(v3_load(normals[0]), 1 - middle);
+        v3_store(normal, v3_unit(v3_mad(first, middle, v3_load(normals[1]))));
+        v3_store(point, v3_mad(p, middle, way));
+        bool hidden = fct_point_is_covered(l->s->scene, point, normal, offset, seed, NULL, l->rays);
+        *(hidden ? &covered : &bare) = middle;
+    }
+    if (bare < CUT_WIDTH || bare > 1 - 4 * CUT_WIDTH) return 0;
+    return from == a ? bare : 1 - bare;
+}
+
+/* On the rest of such an edge: just behind it. */
+static double cut_behind_cover(void *user, uint32_t a, uint32_t b) {
+    const lighting *l = user;
+    bool leaves_cover = a < l->cut_first && b >= l->cut_first && l->covered[a] && !l->covered[b];
+    return leaves_cover ? 1 - 2 * CUT_WIDTH : 0;
+}
+
+/* Cuts surfaces along the border of their cover: first a row of vertices before the border, then one
+ * behind it. So neither light nor darkness shows beyond the border. */
+static fct_result cut_covers(lighting *l, uint64_t *rays) {
+    uint32_t added = 0;
+    l->rays = rays;
+    l->cut_first = l->surface->mesh.vertex_count;
+    fct_result result = fct_surface_refine(l->s->env, l->surface, cut_before_cover, l, &added);
+    if (result == FCT_OK && added > 0) result = grow_light(l, false, true);
+    if (result == FCT_OK && added > 0)
+        result = fct_surface_refine(l->s->env, l->surface, cut_behind_cover, l, &added);
+    if (result == FCT_OK && added > 0) result = grow_light(l, true, true);
+    return result;
+}
+
+/* Final colours, from smoothed indirect light. */
+static fct_result finish_colors(const lighting *l) {
+    const fct_env *env = l->s->env;
+    fct_result result = FCT_OK;
+    if (l->s->def.final != FCT_FINAL_NONE)
+        result = fct_light_smooth(env, l->surface, l->covered, l->indirect);
+    if (result == FCT_OK) color_vertices(l, 0);
     return result;
 }
 
@@ -136,13 +268,15 @@ bool fct_output_crosses_border(const float a[3], const float b[3], double mean_r
     return difference > BORDER_SHARE * level + BORDER_LEVEL * mean_radiosity;
 }
 
-static bool edge_crosses_border(void *user, uint32_t a, uint32_t b) {
+static double cut_at_border(void *user, uint32_t a, uint32_t b) {
     const lighting *l = user;
     const fct_mesh *m = &l->surface->mesh;
     const size_t i = 3 * (size_t)a, j = 3 * (size_t)b;
+    if (l->covered[a] || l->covered[b]) return 0;
     double length = v3_norm(v3_sub(v3_load(m->positions + i), v3_load(m->positions + j)));
-    return length >= l->s->max_edge / SHORT_EDGES &&
-           fct_output_crosses_border(m->colors + i, m->colors + j, l->s->mean_radiosity);
+    bool crosses = length >= l->s->max_edge / SHORT_EDGES &&
+                   fct_output_crosses_border(m->colors + i, m->colors + j, l->s->mean_radiosity);
+    return crosses ? .5 : 0;
 }
 
 uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]) {
@@ -162,13 +296,16 @@ uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]
 static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     const fct_solution *s = l->s;
     bool dense = s->def.final == FCT_FINAL_GATHER;
-    uint32_t rays = (uint32_t)(ANCHOR_RAYS * s->fineness * fct_output_ray_factor(s));
+    uint32_t rays = (uint32_t)(ANCHOR_RAYS * s->fineness);
     double tolerance = dense ? GATHER_TOLERANCE : DIRECT_TOLERANCE;
     fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : rays,
                            .tolerance = tolerance / sqrt(fct_max(s->fineness, .5)),
                            .side = l->back ? -1 : 1,
+                           .covered = l->covered,
+                           .nearest = l->nearest,
                            .seed = fct_hash2(s->def.seed, l->instance)};
-    return fct_anchors_create(s->env, &s->elements, s->transport.stored, l->surface, &def, anchors);
+    const fct_source source = fct_solution_source(s);
+    return fct_anchors_create(s->env, &source, l->surface, &def, anchors);
 }
 
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
@@ -180,20 +317,26 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     fct_result result = fct_surface_build(env, s->scene, instance, s->max_edge, &surface);
     if (result != FCT_OK) return result;
     lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
-    if (gathers) result = make_anchors(&l, &anchors);
+    result = cover_vertices(&l, rays);
+    if (result == FCT_OK) result = cut_covers(&l, rays);
+    if (result == FCT_OK && gathers) result = make_anchors(&l, &anchors);
     *rays += anchors.rays;
     for (int round = 0; result == FCT_OK; ++round) {
         uint32_t added = 0;
         if ((result = light_vertices(&l, rays)) != FCT_OK || round == BORDER_ROUNDS) break;
-        result = fct_surface_refine(env, &surface, edge_crosses_border, &l, &added);
+        result = fct_surface_refine(env, &surface, cut_at_border, &l, &added);
+        if (result == FCT_OK && added > 0) result = cover_vertices(&l, rays);
+        if (result == FCT_OK && added > 0) result = cut_covers(&l, rays);
         if (added == 0) break;
     }
-    if (result == FCT_OK && gathers) result = fct_colors_smooth(env, &surface);
+    if (result == FCT_OK) result = finish_colors(&l);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};
         if (back) fct_mesh_turn_over(out);
     }
+    fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
+    fct_release(env, l.covered), fct_release(env, l.cut);
     fct_anchors_release(env, &anchors);
     fct_surface_release(env, &surface);
     return result;

@@ -16,10 +16,6 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
  * instance has its front, a two-sided one also its other side unless that is dark. */
 uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]);
 
-/* Factor on the rays of a vertex: sqrt(200,000 / faces of the scene), in [1, 4]. A small scene has few
- * vertices, so more rays per vertex cost little time. */
-double fct_output_ray_factor(const fct_solution *s);
-
 /* True if the radiosities of two neighbouring vertices differ so much that the edge must be split: by more
  * than 10 % of their sum plus 4 % of the scene's mean radiosity, summed over channels. */
 bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity);

@@ -94,7 +94,8 @@ static void gather_at_site(const fct_solution *s, const fct_site *site, const fl
     fct_anchor a = {.offset = site->offset};
     memcpy(a.position, site->point, sizeof a.position);
     memcpy(a.normal, normal, sizeof a.normal);
-    fct_anchor_gather(&s->elements, s->transport.stored, gather_rays, fct_hash(seed), &a);
+    const fct_source source = fct_solution_source(s);
+    fct_anchor_gather(&source, gather_rays, fct_hash(seed), &a);
     *rays += gather_rays;
     for (int c = 0; c < 3; ++c) irradiance[c] += a.irradiance[c];
 }

@@ -1,7 +1,12 @@
 /* radiosity/output/solution.c: see solution.h. */
 #include "radiosity/output/solution.h"
 
+#include "radiosity/surface/tessellate.h"
+
 enum { MOST_LAMP_RAYS = 64 };
+/* The longest reach of an anchor over the longest edge of the output: an eighth of the diagonal of most
+ * scenes. */
+#define LONGEST_REACH 9
 
 uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least) {
     return (uint32_t)fct_min(fct_max(least * s->fineness, least), MOST_LAMP_RAYS);
@@ -13,6 +18,11 @@ void fct_solution_direct(const fct_solution *s, const float point[3], const floa
     if (s->def.indirect_only) return;
     double p[3] = {point[0], point[1], point[2]}, n[3] = {normal[0], normal[1], normal[2]};
     fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, irradiance, rays);
+}
+
+fct_source fct_solution_source(const fct_solution *s) {
+    return (fct_source){&s->elements, s->transport.stored,
+                        LONGEST_REACH * fct_surface_default_edge(s->scene)};
 }
 
 void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const double irradiance[3],

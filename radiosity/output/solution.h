@@ -3,6 +3,7 @@
 #define FCT_RADIOSITY_SOLUTION_H
 
 #include "facetree/radiosity.h"
+#include "radiosity/output/anchor.h"
 #include "radiosity/solve/link.h"
 #include "radiosity/solve/transport.h"
 
@@ -14,9 +15,10 @@ typedef struct fct_solution {
     fct_elements elements;
     fct_links links;
     fct_transport transport;
-    double max_edge;       /* def.max_edge, or the default of the scene */
-    double fineness;       /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
-    double mean_radiosity; /* over the scene's area and channels: the scale of visible differences */
+    double max_edge; /* def.max_edge, or the default of the scene */
+    double fineness; /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
+    double
+        mean_radiosity; /* reflected, over the scene's area and channels: the scale of visible differences */
 } fct_solution;
 
 /* Rays per lamp: `least` at the default error and above, more for smaller errors, at most 64. */
@@ -25,6 +27,9 @@ uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least);
 /* Direct irradiance (RGB) at a point with a unit normal; 0 for def.indirect_only. *rays grows. */
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
                          uint64_t seed, uint32_t rays_each, double irradiance[3], uint64_t *rays);
+
+/* The stored solution for gathers. */
+fct_source fct_solution_source(const fct_solution *s);
 
 /* Radiosity b = e + rho E of an instance's material; rho E for def.indirect_only. */
 void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const double irradiance[3],

@@ -10,40 +10,70 @@
 
 #include <string.h>
 
-/* Marks the edges to split: bit k of a face is the edge from corner k to corner k + 1. */
-static fct_result mark_faces(const fct_env *env, const fct_mesh *mesh, fct_edge_test *test, void *user,
-                             uint8_t *marks) {
-    const uint32_t *t = mesh->triangles;
-    size_t corners = 3 * (size_t)mesh->face_count, wanted = 0;
-    fct_edge_table edges = {0};
-    bool fresh;
-    uint32_t *first = fct_allocate(env, mesh->vertex_count, sizeof *first);
-    if (!first) return fct_fail_memory(env, "a refined surface");
-    fct_result result = fct_weld(env, mesh->vertex_count, mesh->positions, first);
-    if (result != FCT_OK) goto done;
-    memset(marks, 0, mesh->face_count);
+/* The edges to split, by the lowest vertices at their ends. */
+typedef struct cut_list {
+    const fct_mesh *mesh;
+    uint32_t *first;      /* per vertex: the lowest one at its position */
+    fct_edge_table edges; /* -> place in `shares` */
+    float *shares;        /* of the way from the lower to the higher end */
+} cut_list;
+
+static uint32_t next_corner(const uint32_t *t, size_t c) {
+    return t[c % 3 == 2 ? c - 2 : c + 1];
+}
+
+/* The share of the way from vertex a to b at which their edge is split. */
+static double find_share(const cut_list *c, uint32_t a, uint32_t b) {
+    const uint32_t *place = fct_edge_table_find(&c->edges, c->first[a], c->first[b]);
+    double share = c->shares[*place];
+    return c->first[a] < c->first[b] ? share : 1 - share;
+}
+
+/* Collects the edges to split, and marks them: bit k of a face is the edge from corner k to corner k + 1. */
+static fct_result collect_cuts(const fct_env *env, fct_edge_cut *cut, void *user, uint8_t *marks,
+                               cut_list *out) {
+    const uint32_t *t = out->mesh->triangles, *first = out->first;
+    const size_t corners = 3 * (size_t)out->mesh->face_count;
+    float *shares = fct_allocate(env, corners, sizeof *shares);
+    size_t wanted = 0;
+    if (!shares) return fct_fail_memory(env, "a refined surface");
+    memset(marks, 0, out->mesh->face_count);
     for (size_t c = 0; c < corners; ++c) {
-        uint32_t a = t[c], b = t[c % 3 == 2 ? c - 2 : c + 1];
-        if (first[a] == first[b] || !(a < b ? test(user, a, b) : test(user, b, a))) continue;
+        uint32_t a = t[c], b = next_corner(t, c);
+        if (first[a] == first[b]) continue;
+        double share = a < b ? cut(user, a, b) : cut(user, b, a);
+        if (share <= 0) continue;
+        shares[c] = (float)((a < b) == (first[a] < first[b]) ? share : 1 - share);
         marks[c / 3] |= (uint8_t)(1 << c % 3);
         ++wanted;
     }
-    result = fct_edge_table_init(env, wanted, &edges);
-    if (result != FCT_OK) goto done;
-    for (size_t c = 0; c < corners; ++c)
-        if (marks[c / 3] >> c % 3 & 1)
-            *fct_edge_table_insert(&edges, first[t[c]], first[t[c % 3 == 2 ? c - 2 : c + 1]], &fresh) = 1;
-    for (size_t c = 0; wanted && c < corners; ++c)
-        if (fct_edge_table_find(&edges, first[t[c]], first[t[c % 3 == 2 ? c - 2 : c + 1]]))
+    fct_result result = fct_edge_table_init(env, wanted, &out->edges);
+    if (result == FCT_OK && !(out->shares = fct_allocate(env, wanted, sizeof *out->shares)))
+        result = fct_fail_memory(env, "a refined surface");
+    uint32_t count = 0;
+    for (size_t c = 0; result == FCT_OK && c < corners; ++c) {
+        if (!(marks[c / 3] >> c % 3 & 1)) continue;
+        bool fresh;
+        uint32_t *place = fct_edge_table_insert(&out->edges, first[t[c]], first[next_corner(t, c)], &fresh);
+        if (!fresh) continue;
+        *place = count;
+        out->shares[count++] = shares[c];
+    }
+    for (size_t c = 0; result == FCT_OK && wanted && c < corners; ++c)
+        if (fct_edge_table_find(&out->edges, first[t[c]], first[next_corner(t, c)]))
             marks[c / 3] |= (uint8_t)(1 << c % 3);
-done:
-    fct_edge_table_release(env, &edges);
-    fct_release(env, first);
+    fct_release(env, shares);
     return result;
 }
 
-/* Copies the old vertices and the faces of the split, and appends the midpoints. */
-static void copy_surface(const fct_surface *old, const fct_split *split, fct_surface *out) {
+/* The point at a share of the way from a to b; the same from both sides where the share is 1/2. */
+static v3 mix(v3 a, v3 b, double share) {
+    return v3_add(v3_scale(a, 1 - share), v3_scale(b, share));
+}
+
+/* Copies the old vertices and the faces of the split, and appends the new vertices. */
+static void copy_surface(const fct_surface *old, const fct_split *split, const cut_list *cuts,
+                         fct_surface *out) {
     size_t count = old->mesh.vertex_count;
     memcpy(out->mesh.positions, old->mesh.positions, 3 * count * sizeof(float));
     memcpy(out->mesh.colors, old->mesh.colors, 3 * count * sizeof(float));
@@ -53,14 +83,13 @@ static void copy_surface(const fct_surface *old, const fct_split *split, fct_sur
     memcpy(out->places, old->places, count * sizeof *out->places);
     memcpy(out->flat, old->flat, count);
     for (size_t i = 0; i < split->vertex_count; ++i) {
-        size_t a = 3 * (size_t)split->ends[2 * i], b = 3 * (size_t)split->ends[2 * i + 1],
-               to = 3 * (count + i);
-        for (size_t k = 0; k < 3; ++k) {
-            float ca = old->mesh.colors[a + k], cb = old->mesh.colors[b + k];
-            out->mesh.colors[to + k] = .5f * ca + .5f * cb;
-        }
-        v3 pa = v3_load(old->mesh.positions + a), pb = v3_load(old->mesh.positions + b);
-        v3_store(out->mesh.positions + to, v3_scale(v3_add(pa, pb), .5));
+        const uint32_t *ends = split->ends + 2 * i;
+        const size_t a = 3 * (size_t)ends[0], b = 3 * (size_t)ends[1], to = 3 * (count + i);
+        const double share = find_share(cuts, ends[0], ends[1]);
+        v3_store(out->mesh.colors + to,
+                 mix(v3_load(old->mesh.colors + a), v3_load(old->mesh.colors + b), share));
+        v3_store(out->mesh.positions + to,
+                 mix(v3_load(old->mesh.positions + a), v3_load(old->mesh.positions + b), share));
     }
     memcpy(out->mesh.triangles, split->triangles, split->face_count * 3 * sizeof *split->triangles);
     for (size_t f = 0; f < split->face_count; ++f) {
@@ -81,21 +110,9 @@ static void add_areas(fct_surface *s) {
     }
 }
 
-/* The mean of the ends' normals if it is in front of all faces, else the corners' own normal. */
-static v3 find_middle_normal(const fct_surface *s, const fct_corners *mesh, const uint32_t ends[2],
-                             const uint32_t *corners, size_t count) {
-    v3 half =
-        v3_unit(v3_add(v3_load(s->normals + 3 * (size_t)ends[0]), v3_load(s->normals + 3 * (size_t)ends[1])));
-    v3 own;
-    if (fct_corner_front(mesh, corners, count, half)) return half;
-    fct_corner_normal(mesh, corners, count, &own);
-    return own;
-}
-
-/* Sets the footholds of the new vertices from the corners around them. A midpoint is on the rim if only one
+/* Sets the footholds of the new vertices from the corners around them. A new vertex is on the rim if only one
  * face of the old surface has its edge. */
-static fct_result place_middles(const fct_env *env, const fct_split *split, uint32_t old_count,
-                                fct_surface *s) {
+static fct_result place_cuts(const fct_env *env, const fct_split *split, uint32_t old_count, fct_surface *s) {
     size_t corners = 3 * (size_t)s->mesh.face_count;
     fct_corners mesh = {s->mesh.vertex_count, s->mesh.face_count, s->mesh.positions, s->mesh.triangles};
     size_t *begin = fct_allocate_zero(env, (size_t)split->vertex_count + 2, sizeof *begin);
@@ -118,7 +135,8 @@ static fct_result place_middles(const fct_env *env, const fct_split *split, uint
         uint32_t parent = split->parents[around[0] / 3];
         bool rim = true;
         for (size_t k = 1; k < count && rim; ++k) rim = split->parents[around[k] / 3] == parent;
-        v3 normal = find_middle_normal(s, &mesh, split->ends + 2 * (size_t)i, around, count);
+        v3 normal;
+        fct_corner_normal(&mesh, around, count, &normal);
         fct_foothold at = fct_corner_foothold(&mesh, around, count, normal, rim);
         fct_surface_place(s, old_count + i, &at);
     }
@@ -128,18 +146,13 @@ done:
     return result;
 }
 
-fct_result fct_surface_refine(const fct_env *env, fct_surface *surface, fct_edge_test *test, void *user,
-                              uint32_t *added) {
+static fct_result refine_surface(const fct_env *env, fct_surface *surface, const cut_list *cuts,
+                                 const uint8_t *marks, uint32_t *added) {
     const fct_mesh *mesh = &surface->mesh;
+    const uint32_t old_count = mesh->vertex_count;
     fct_split split = {0};
     fct_surface finer = {0};
-    uint32_t old_count = mesh->vertex_count;
-    if (added) *added = 0;
-    uint8_t *marks = fct_allocate(env, mesh->face_count, sizeof *marks);
     fct_result result =
-        marks ? mark_faces(env, mesh, test, user, marks) : fct_fail_memory(env, "a refined surface");
-    if (result != FCT_OK) goto done;
-    result =
         fct_split_edges(env, old_count, mesh->positions, mesh->face_count, mesh->triangles, marks, &split);
     if (result != FCT_OK || split.vertex_count == 0) goto done;
     if (split.face_count > UINT32_MAX / 3) {
@@ -149,16 +162,36 @@ fct_result fct_surface_refine(const fct_env *env, fct_surface *surface, fct_edge
     }
     result = fct_surface_allocate(env, old_count + split.vertex_count, split.face_count, &finer);
     if (result != FCT_OK) goto done;
-    copy_surface(surface, &split, &finer);
+    copy_surface(surface, &split, cuts, &finer);
     add_areas(&finer);
-    result = place_middles(env, &split, old_count, &finer);
+    result = place_cuts(env, &split, old_count, &finer);
     if (result != FCT_OK) goto done;
     fct_surface swap = *surface;
     *surface = finer, finer = swap;
-    if (added) *added = split.vertex_count;
+    *added = split.vertex_count;
 done:
-    fct_release(env, marks);
     fct_split_release(env, &split);
     fct_surface_release(env, &finer);
+    return result;
+}
+
+fct_result fct_surface_refine(const fct_env *env, fct_surface *surface, fct_edge_cut *cut, void *user,
+                              uint32_t *added) {
+    const fct_mesh *mesh = &surface->mesh;
+    cut_list cuts = {.mesh = mesh};
+    uint32_t count = 0;
+    uint8_t *marks;
+    const fct_array arrays[] = {FCT_ARRAY(marks, mesh->face_count),
+                                FCT_ARRAY(cuts.first, mesh->vertex_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "a refined surface");
+    if (result == FCT_OK) {
+        result = fct_weld(env, mesh->vertex_count, mesh->positions, cuts.first);
+        if (result == FCT_OK) result = collect_cuts(env, cut, user, marks, &cuts);
+        if (result == FCT_OK) result = refine_surface(env, surface, &cuts, marks, &count);
+        fct_edge_table_release(env, &cuts.edges);
+        fct_release(env, cuts.shares);
+        fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    }
+    if (added) *added = count;
     return result;
 }

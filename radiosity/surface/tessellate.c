@@ -16,8 +16,8 @@
 
 #include <string.h>
 
-/* Default edges per diagonal of the scene. More edges resolve finer shadows; the output's time grows with the
- * square. */
+/* Default edges per diagonal of the surfaces that emit no light, since a lamp may be far away. More edges
+ * resolve finer shadows; the output's time grows with the square. */
 #define DIAGONAL_EDGES 72
 /* Longest over shortest edge that a split may leave. Larger: finer contact shadows, more vertices. */
 #define GRADES 4
@@ -250,8 +250,22 @@ done:
 }
 
 double fct_surface_default_edge(const fct_scene *scene) {
-    fct_bounds b = fct_scene_get(scene).bounds;
-    return v3_norm(v3_sub(v3_load(b.upper), v3_load(b.lower))) / DIAGONAL_EDGES;
+    const fct_scene_view view = fct_scene_get(scene);
+    double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (uint32_t i = 0; i < view.volume_count; ++i) {
+        const fct_volume *volume = &view.volumes[i];
+        if (volume->instance == FCT_NONE) continue;
+        const float *e = view.materials[view.instances[volume->instance].material].emission;
+        if (e[0] > 0 || e[1] > 0 || e[2] > 0) continue;
+        for (int c = 0; c < 3; ++c) {
+            lower[c] = fct_min(lower[c], volume->bounds.lower[c]);
+            upper[c] = fct_max(upper[c], volume->bounds.upper[c]);
+        }
+    }
+    const bool lit = lower[0] <= upper[0];
+    v3 diagonal = lit ? v3_sub((v3){upper[0], upper[1], upper[2]}, (v3){lower[0], lower[1], lower[2]})
+                      : v3_sub(v3_load(view.bounds.upper), v3_load(view.bounds.lower));
+    return v3_norm(diagonal) / DIAGONAL_EDGES;
 }
 
 fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_t instance, double max_edge,

@@ -4,7 +4,8 @@
 
 #include "radiosity/surface/surface.h"
 
-/* The longest edge for max_edge 0: the scene's diagonal / 72. */
+/* The longest edge for max_edge 0: the diagonal / 72 of the surfaces that emit no light, or of the scene if
+ * all do. */
 double fct_surface_default_edge(const fct_scene *scene);
 
 /* Builds the surface of an instance. Splits edges longer than max_edge (world units; 0: the default) at their

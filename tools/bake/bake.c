@@ -55,7 +55,7 @@ static const struct argp_option bake_options_table[] = {
      "--final gather. These options override it",
      0},
     {"error", KEY_ERROR, "E", 0,
-     "Split links until the uncertainty of each is at most this share of the emitted power (default 2e-5, "
+     "Split links until the uncertainty of each is at most this share of the absorbed power (default 2e-5, "
      "from "
      "1e-9 to 1). A smaller E also means more rays and anchors",
      0},

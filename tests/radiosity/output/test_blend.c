@@ -67,7 +67,7 @@ static void end_room(room *r) {
 }
 
 /* E = mean b, gradient = mean of b d / max(cos, .15), reach = harmonic mean distance. */
-static void gather_plainly(const room *r, uint32_t rays, uint64_t seed, fct_anchor *a) {
+static void gather_plainly(const room *r, double longest, uint32_t rays, uint64_t seed, fct_anchor *a) {
     double e[3] = {0}, g[3][3] = {{0}}, inverse = 0;
     for (uint32_t k = 0; k < rays; ++k) {
         double u[2];
@@ -78,7 +78,7 @@ static void gather_plainly(const room *r, uint32_t rays, uint64_t seed, fct_anch
             origin[c] = (float)((double)a->position[c] + (double)a->offset * a->normal[c]);
         v3_store(direction, d);
         fct_found f = fct_transport_look(&r->set, r->stored, origin, direction);
-        inverse += 1 / f.distance;
+        inverse += 1 / fmin(f.distance, longest);
         const double x[3] = {d.x, d.y, d.z};
         for (int c = 0; c < 3; ++c) {
             e[c] += (double)f.radiosity[c] / rays;
@@ -111,8 +111,9 @@ static void gathers_equal_their_rays(void **state) {
         for (uint64_t c = 0; c < 3; ++c) a.position[c] = (float)(pick(k, c, 2) - .5);
         v3_store(a.normal, v3_unit(v3_make(pick(k, 0, 3) - .5, pick(k, 1, 3) - .5, pick(k, 2, 3) - .5)));
         b = a;
-        fct_anchor_gather(&r.set, r.stored, 50 + (uint32_t)k, k, &a);
-        gather_plainly(&r, 50 + (uint32_t)k, k, &b);
+        const fct_source source = {&r.set, r.stored, k % 2 ? .4 : INFINITY};
+        fct_anchor_gather(&source, 50 + (uint32_t)k, k, &a);
+        gather_plainly(&r, source.longest, 50 + (uint32_t)k, k, &b);
         assert_same_anchor(&a, &b);
     }
     end_room(&r);
@@ -125,7 +126,7 @@ typedef struct maker {
     fct_anchors_def def;
     double longest;
     const fct_anchors *found;
-    uint32_t count, halved[2], turned;
+    uint32_t count, halved[2], turned, hidden;
     uint64_t rays;
 } maker;
 
@@ -141,6 +142,7 @@ static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
     p = v3_scale(p, 1. / count), n = v3_unit(n);
     uint32_t middle = vertices[0], size = 0;
     double least = INFINITY, worst = 0, turn = 0;
+    bool hidden = false;
     for (uint32_t i = 0; i < count; ++i) {
         double d = v3_norm2(v3_sub(at(f->sample_points, vertices[i]), p)) *
                    (2 - v3_dot(at(f->normals, vertices[i]), n));
@@ -151,7 +153,7 @@ static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
     v3_store(a.normal, v3_scale(at(f->normals, middle), m->def.side));
     for (uint32_t k = count; k > 1 && size < 8; k /= 2) ++size;
     uint32_t rays = m->def.rays + m->def.rays * size / 4;
-    gather_plainly(m->r, rays, fct_hash3(m->def.seed, middle, f->mesh.vertex_count), &a);
+    gather_plainly(m->r, m->longest, rays, fct_hash3(m->def.seed, middle, f->mesh.vertex_count), &a);
     a.reach = (float)fmin(fmax(a.reach, 1.5 * sqrt(f->areas[middle])), m->longest);
     ++m->count, m->rays += rays;
     int known = 0;
@@ -172,11 +174,14 @@ static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
         worst = fmax(worst,
                      v3_norm(v3_sub(x, at(f->sample_points, middle))) / a.reach + sqrt(fmax(1 - cosine, 0)));
         turn = fmax(turn, 2 - 2 * cosine);
+        hidden |= m->def.nearest && f->flat[vertices[i]] &&
+                  v3_norm(v3_sub(x, at(f->sample_points, middle))) > (double)m->def.nearest[vertices[i]];
         const double c[6] = {x.x, x.y, x.z, y.x, y.y, y.z};
         for (int k = 0; k < 6; ++k) lower[k] = fmin(lower[k], c[k]), upper[k] = fmax(upper[k], c[k]);
     }
-    if (count == 1 || (worst <= m->def.tolerance && turn <= .9 * .4)) return;
-    m->turned += worst <= m->def.tolerance;
+    if (count == 1 || (worst <= m->def.tolerance && turn <= .9 * .4 && !hidden)) return;
+    m->turned += worst <= m->def.tolerance && turn > .9 * .4;
+    m->hidden += worst <= m->def.tolerance && turn <= .9 * .4;
     int axis = 0, bent = 3;
     for (int k = 1; k < 3; ++k) {
         if (upper[k] - lower[k] > upper[axis] - lower[axis]) axis = k;
@@ -201,7 +206,7 @@ static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
 
 static void groups_follow_the_rules(void **state) {
     (void)state;
-    uint32_t halved[2] = {0, 0}, turned = 0;
+    uint32_t halved[2] = {0, 0}, turned = 0, hidden = 0;
     for (uint64_t seed = 0; seed < 6; ++seed) {
         room r = make_room(seed);
         fct_surface f;
@@ -220,10 +225,17 @@ static void groups_follow_the_rules(void **state) {
             upper = v3_make(fmax(upper.x, x.x), fmax(upper.y, x.y), fmax(upper.z, x.z));
         }
         m.longest = v3_norm(v3_sub(upper, lower)) / 8;
-        assert_int_equal(fct_anchors_create(&plain, &r.set, r.stored, &f, &m.def, &t), FCT_OK);
+        const fct_source source = {&r.set, r.stored, m.longest};
+        float *nearest = malloc(f.mesh.vertex_count * sizeof *nearest);
+        uint8_t *covered = malloc(f.mesh.vertex_count);
+        for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
+            covered[v] = fct_hash(v) % 8 == 0, nearest[v] = (float)(4 * fct_uniform(fct_hash3(seed, v, 7)));
+        if (seed % 2) m.def.covered = covered;
+        if (seed % 3) m.def.nearest = nearest;
+        assert_int_equal(fct_anchors_create(&plain, &source, &f, &m.def, &t), FCT_OK);
         uint32_t *vertices = malloc(f.mesh.vertex_count * sizeof *vertices), count = 0;
         for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
-            if (f.places[v] != FCT_NONE) vertices[count++] = v;
+            if (f.places[v] != FCT_NONE && !(seed % 2 && covered[v])) vertices[count++] = v;
         follow_group(&m, vertices, count);
         assert_int_equal(m.count, t.count);
         assert_int_equal(m.rays, t.rays);
@@ -231,15 +243,15 @@ static void groups_follow_the_rules(void **state) {
         for (uint32_t i = 0; i < t.count; ++i) inverse += 1 / (double)t.items[i].reach;
         assert_near(t.turn, .7 / (inverse / t.count), 1e-6);
         for (int k = 0; k < 2; ++k) halved[k] += m.halved[k];
-        turned += m.turned;
-        free(vertices);
+        turned += m.turned, hidden += m.hidden;
+        free(vertices), free(nearest), free(covered);
         fct_anchors_release(&plain, &t);
         fct_surface_release(&plain, &f);
         end_room(&r);
     }
-    printf("    %u groups halved in space, %u by normals, %u for their turn alone\n", halved[0], halved[1],
-           turned);
-    assert_true(halved[0] > 20 && halved[1] > 20 && turned > 0);
+    printf("    %u groups halved in space, %u by normals, %u for their turn alone, %u for near surfaces\n",
+           halved[0], halved[1], turned, hidden);
+    assert_true(halved[0] > 20 && halved[1] > 20 && turned > 0 && hidden > 0);
 }
 
 /* blend.h and the formulas at the top of blend.c, over all anchors. Returns the number of rays. */

@@ -282,22 +282,23 @@ typedef struct border {
     const fct_surface *surface;
 } border;
 
-static bool crosses(void *user, uint32_t a, uint32_t b) {
+static double crosses(void *user, uint32_t a, uint32_t b) {
     const border *x = user;
     assert_true(a < b);
     double h = .37;
-    return (at(x->surface, a).x - h) * (at(x->surface, b).x - h) < 0;
+    return (at(x->surface, a).x - h) * (at(x->surface, b).x - h) < 0 ? .5 : 0;
 }
 
 /* Marks edges of the top only; the other sides must split the shared rim too. */
-static bool on_top(void *user, uint32_t a, uint32_t b) {
+static double on_top(void *user, uint32_t a, uint32_t b) {
     const border *x = user;
-    return x->surface->normals[3 * (size_t)a + 2] > .5F && x->surface->normals[3 * (size_t)b + 2] > .5F;
+    const float *n = x->surface->normals;
+    return n[3 * (size_t)a + 2] > .5F && n[3 * (size_t)b + 2] > .5F ? .5 : 0;
 }
 
-static bool never(void *user, uint32_t a, uint32_t b) {
+static double never(void *user, uint32_t a, uint32_t b) {
     (void)user, (void)a, (void)b;
-    return false;
+    return 0;
 }
 
 static void refinement(void **state) {
