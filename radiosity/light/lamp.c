@@ -26,7 +26,7 @@
 /* A lamp above this share of the total gets twice the first rays: a wrong agreement of four would show. */
 #define BRIGHT_SHARE .2
 /* Standard error, as a share of the receiver's light, that needs no more than MIXED_RAYS. */
-#define RAY_ERROR .02
+#define RAY_ERROR .008
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
 #define LARGE_AREA .25
 /* |S| / A above which an emitter counts as flat: it does not shine on itself. */

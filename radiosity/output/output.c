@@ -6,7 +6,7 @@
  * anchors. With FCT_FINAL_NONE, the links bring both.
  * 3. Split edges across which the light changes, cut new covers, and light the new vertices, up to
  * BORDER_ROUNDS times. So the edges of the mesh follow shadow borders.
- * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices are black.
+ * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices show their emission alone.
  */
 #include "radiosity/output/output.h"
 
@@ -32,14 +32,16 @@ enum { BORDER_ROUNDS = 4 };
 #define BORDER_LEVEL .04
 /* Rays per anchor and per lamp at the default error. */
 enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4 };
-/* Length of an edge from before the border of a cover to behind it, over that of the edge that it cuts. */
+/* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
+ * length of the edge that is cut. */
 #define CUT_WIDTH (1. / 256)
-enum { VERTEX_GRAIN = 64 }; /* vertices per chunk */
 /* Tolerance of the groups of vertices per anchor. Vertices of one group turn at most acos(1 - .4^2) = 33
  * degrees from their anchor with GATHER, so the blend uses it; up to 79 degrees with DIRECT, where some
  * vertices of strongly bent models find no anchor and stay dark. */
 #define GATHER_TOLERANCE .4
 #define DIRECT_TOLERANCE .9
+enum { VERTEX_GRAIN = 64 }; /* vertices per chunk */
+
 typedef struct lighting {
     const fct_solution *s;
     fct_surface *surface;

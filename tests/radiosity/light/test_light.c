@@ -562,7 +562,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
         double part = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
         if (sent < 16)
             goal = 16;
-        else if (all == 0 || sqrt(part * (1 - part) / sent) * power > .02 * scale)
+        else if (all == 0 || sqrt(part * (1 - part) / sent) * power > .008 * scale)
             goal = 64;
     }
     return all > 0 ? seen / all : 0;
