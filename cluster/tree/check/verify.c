@@ -36,7 +36,7 @@ typedef struct verifier {
 
 /* Sums over the faces of a node. Points are relative to the centre of the box. */
 typedef struct totals {
-    double area, moment[6], second[6], lower[3], upper[3], narrowest;
+    double area, weight, moment[6], second[6], lower[3], upper[3], narrowest;
     v3 vector, first;
 } totals;
 
@@ -71,16 +71,18 @@ static void add_face(const fct_tree_view *view, size_t place, const frame *box, 
     }
     v3 u = v3_sub(q[1], q[0]), v = v3_sub(q[2], q[0]), s = v3_scale(v3_cross(u, v), 0.5);
     v3 middle = v3_mad(p[0], 1.0 / 3, v3_add(u, v));
-    double area = v3_norm(s);
+    double area = v3_norm(s), weight = area;
     if (area > 0) {
         sym3_add_outer(t->moment, 1 / area, s);
         t->narrowest = least(t->narrowest, v3_dot(s, cone) / area);
+    } else {
+        weight = 1e-20 * most(v3_norm2(u), most(v3_norm2(v), v3_norm2(v3_sub(v, u))));
     }
-    t->area += area;
+    t->area += area, t->weight += weight;
     t->vector = v3_add(t->vector, s);
-    t->first = v3_mad(t->first, area, middle);
-    sym3_add_outer(t->second, area, middle);
-    for (int k = 0; k < 3; ++k) sym3_add_outer(t->second, area / 12, v3_sub(p[k], middle));
+    t->first = v3_mad(t->first, weight, middle);
+    sym3_add_outer(t->second, weight, middle);
+    for (int k = 0; k < 3; ++k) sym3_add_outer(t->second, weight / 12, v3_sub(p[k], middle));
 }
 
 static const char *find_box_fault(const fct_cluster *c, const fct_box *box, const totals *t,
@@ -117,7 +119,7 @@ static const char *find_plane_fault(const fct_cluster *c, const fct_box *box, co
     v3 stored = v3_sub(v3_load(c->centroid), center), mean = stored;
     double slack = 1e-5 * diagonal + 1e-6 * v3_norm(center) + FLT_MIN;
     bool solid = t->area > 1e-10 * diagonal * diagonal;
-    if (solid) mean = v3_scale(t->first, 1 / t->area);
+    if (solid) mean = v3_scale(t->first, 1 / t->weight);
     if (v3_norm(v3_sub(mean, stored)) > slack) return "a centroid that is not that of its faces";
     for (int i = 0; i < 3; ++i)
         if (fabs(v3_dot(stored, v3_load(box->axes[i]))) > (double)box->half[i] + slack)
@@ -130,7 +132,7 @@ static const char *find_plane_fault(const fct_cluster *c, const fct_box *box, co
     double values[3], covariance[6];
     v3 axes[3];
     memcpy(covariance, t->second, sizeof covariance);
-    sym3_add_outer(covariance, -t->area, mean);
+    sym3_add_outer(covariance, -t->weight, mean);
     fct_eigen3(covariance, values, axes);
     double excess = sym3_form(covariance, normal, normal) / v3_norm2(normal) - values[0];
     return excess > 1e-8 * (covariance[0] + covariance[3] + covariance[5]) ? "a plane that is not the best"

@@ -1,5 +1,6 @@
 /* fct_tree_verify finds every wrong number of a node, on a sphere, with noise and far from the origin, and
  * accepts correct trees. */
+#include "../../bvh/models.h"
 #include "../check_tree.h"
 
 #include <float.h>
@@ -8,6 +9,7 @@
 #include "cluster/file/format.h"
 #include "cluster/tree/check/edges.h"
 #include "cluster/tree/check/structure.h"
+#include "cluster/tree/check/verify.h"
 
 typedef struct mistake {
     const char *message;
@@ -305,8 +307,23 @@ static void deep_trees_are_found(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
+/* Loose faces, thin ones, doubled ones, and faces without area. */
+static void trees_of_thin_faces_are_correct(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    for (uint64_t seed = 1; seed < 20; ++seed) {
+        fct_mesh mesh = make_soup(&env, 400, seed);
+        fct_tree *tree;
+        assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+        assert_int_equal(fct_tree_verify_contents(&env, tree), FCT_OK);
+        fct_tree_destroy(tree);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_wrong_number_is_found),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(trees_of_thin_faces_are_correct),
+                                       cmocka_unit_test(every_wrong_number_is_found),
                                        cmocka_unit_test(the_first_mistake_is_told),
                                        cmocka_unit_test(wrong_counts_are_found),
                                        cmocka_unit_test(a_build_counts_as_verifying_does),
