@@ -4,19 +4,24 @@ source "$(dirname "$0")/support.sh"
 printf '0 0 9 0 0 -1\n0 0 -9 .1 .1 1\n' >rays.txt
 printf '0 0 0\n1e3 1 1\n' >points.txt
 
-# refused CODE FILE: checks that every command refuses the file.
+# refused CODE FILE: checks that every command refuses the file. With sanitizers, whose programs start slowly, three of them do,
+# because all commands share the readers.
 refused() {
     local wanted=$1 file=$2
     expect "$wanted" info "$file"
     says "$file"
     expect "$wanted" cluster "$file" -o out.fct
+    expect "$wanted" bake "$file" -o out.glb
+    if [ "$scale" != 1 ]; then
+        check "no output of $file" test -z "$(find . -name 'out.*')"
+        return
+    fi
     expect "$wanted" partition "$file" -k 1 -o out.txt
     expect "$wanted" boxes "$file" -k 1 -o out.json
     expect "$wanted" raycast "$file" --rays rays.txt -o out.txt
     expect "$wanted" closest "$file" --points points.txt -o out.txt
     expect "$wanted" simplify "$file" --faces 10 -o out.ply
     expect "$wanted" compare "$file" "$file"
-    expect "$wanted" bake "$file" -o out.glb
     expect "$wanted" render "$file" -o out.png
     check "no output of $file" test -z "$(find . -name 'out.*')"
 }
