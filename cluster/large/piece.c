@@ -491,7 +491,7 @@ static fct_result put_tree(piece *p) {
     uint32_t *ids = p->tree->face_ids, *triangles = p->tree->triangles;
     if (!costs) return fct_fail_memory(l->env, "a part of a mesh");
     fct_result result = p->corners ? put_corners(p) : FCT_OK;
-    fct_enclosed_add(&l->enclosed, &view, v3_load(l->bounds.lower));
+    fct_enclosed_add(&l->enclosed, &view, v3_load(l->all_bounds.lower));
     for (size_t i = 0; i < nodes; ++i) costs[i] = p->tree->nodes[i].cost;
     for (size_t i = 0; i < faces; ++i) ids[i] = p->face_ids[ids[i]];
     for (size_t i = 0; i < 3 * faces; ++i) triangles[i] = p->vertex_ids[view.vertex_ids[triangles[i]]];
