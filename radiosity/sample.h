@@ -10,18 +10,12 @@
 
 #include <stdint.h>
 
+#include "base/hash.h"
 #include "base/math/elementary.h"
 #include "base/math/vec.h"
 
 #define FCT_PI 3.14159265358979323846
 
-/* The finaliser of splitmix64: a bijection of 64-bit words; each output bit depends on all input bits. */
-static inline uint64_t fct_hash(uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
-    return x ^ x >> 31;
-}
 static inline uint64_t fct_hash2(uint64_t seed, uint64_t item) {
     return fct_hash(fct_hash(seed) ^ item);
 }

@@ -10,6 +10,7 @@
  */
 #include <string.h>
 
+#include "base/hash.h"
 #include "base/key.h"
 #include "cluster/large/large.h"
 
@@ -31,7 +32,7 @@ typedef struct side_slot {
 typedef struct welder {
     fct_large *large;
     uint32_t *places;  /* per vertex: the first vertex at its place; after choose_targets, of an open vertex
-                          the  vertex that replaces it */
+                          the vertex that replaces it */
     uint32_t *crowded; /* one bit per vertex: others have its position */
     uint32_t *open;    /* one bit per vertex: it is the end of a side of one face */
     float *positions;
@@ -48,12 +49,6 @@ static bool is_set(const uint32_t *bits, uint32_t i) {
 
 static void set_bit(uint32_t *bits, uint32_t i) {
     bits[i / 32] |= 1u << i % 32;
-}
-
-static uint64_t mix(uint64_t h) {
-    h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
-    h = (h ^ h >> 27) * 0x94d049bb133111ebu;
-    return h ^ h >> 31;
 }
 
 /* Whether a key with this hash belongs to the pass. The upper half of the hash decides, and the lower half
@@ -101,8 +96,8 @@ static fct_result run_passes(welder *w, uint64_t keys, size_t size, double begin
 static void find_place(welder *w, uint32_t vertex, const float *p) {
     place_slot *table = w->table;
     const float q[3] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f}; /* -0 counts as 0 */
-    uint64_t hash =
-        mix(mix((uint64_t)fct_float_bits(q[0]) << 32 | fct_float_bits(q[1])) + fct_float_bits(q[2]));
+    uint64_t hash = fct_hash(fct_hash((uint64_t)fct_float_bits(q[0]) << 32 | fct_float_bits(q[1])) +
+                             fct_float_bits(q[2]));
     if (!is_due(w, hash) || w->full) return;
     size_t i = first_slot(w, hash);
     while (table[i].vertex != FCT_NONE && memcmp(table[i].position, q, sizeof q) != 0)
@@ -140,7 +135,7 @@ static bool get_side(const welder *w, const uint32_t *triangle, int k, uint32_t 
 
 static void note_side(welder *w, uint32_t low, uint32_t high, uint32_t face) {
     side_slot *table = w->table;
-    uint64_t hash = mix((uint64_t)low << 32 | high);
+    uint64_t hash = fct_hash((uint64_t)low << 32 | high);
     if (!is_due(w, hash) || w->full) return;
     size_t i = first_slot(w, hash);
     while (table[i].face != FCT_NONE && (table[i].low != low || table[i].high != high))

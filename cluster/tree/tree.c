@@ -50,19 +50,25 @@ void fct_tree_measure_bounds(fct_tree *tree) {
     view->bounds = b;
 }
 
+/* A sum below this share of its terms is 0. */
+#define ROUNDING 1e-9
+
 void fct_enclosed_add(fct_enclosed *sum, const fct_tree_view *view, v3 origin) {
     for (size_t f = 0; f < view->face_count; ++f) {
         v3 p[3];
         for (size_t k = 0; k < 3; ++k)
             p[k] = v3_sub(v3_load(view->positions + 3 * (size_t)view->triangles[3 * f + k]), origin);
         double term = v3_dot(p[0], v3_cross(p[1], p[2]));
+        v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
         sum->volume += term, sum->magnitude += fabs(term);
+        sum->vector = v3_add(sum->vector, cross), sum->area += v3_norm(cross);
     }
 }
 
 bool fct_enclosed_is_inward(const fct_enclosed *sum, const fct_tree_view *view) {
     bool closed = view->boundary_edges == 0 && view->nonmanifold_edges == 0;
-    return closed && sum->volume < -1e-9 * sum->magnitude;
+    bool alike = v3_norm(sum->vector) <= ROUNDING * sum->area;
+    return closed && alike && sum->volume < -ROUNDING * sum->magnitude;
 }
 
 bool fct_tree_is_inward(const fct_tree_view *view) {

@@ -44,14 +44,16 @@ fct_tree *fct_tree_new(const fct_env *env);
 /* Sets view.bounds from the positions. */
 void fct_tree_measure_bounds(fct_tree *tree);
 
-/* Six times the volume inside a closed surface: the sum over its faces of a signed term. magnitude: the sum
- * of the terms' magnitudes. */
+/* Sums over the faces of a surface. volume: six times the volume inside, if the surface is closed; magnitude:
+ * the sum of the terms' magnitudes. vector: twice the area vector, which is 0 for a closed surface whose
+ * faces wind alike; area: the sum of the terms' lengths. */
 typedef struct fct_enclosed {
-    double volume, magnitude;
+    double volume, magnitude, area;
+    v3 vector;
 } fct_enclosed;
 /* Adds the faces of the view. origin: any point, the same for all faces of a surface. */
 void fct_enclosed_add(fct_enclosed *sum, const fct_tree_view *view, v3 origin);
-/* The value of view.inward. A volume below 1e-9 of the magnitude is 0. */
+/* The value of view.inward. Sums below 1e-9 of their terms are 0. */
 bool fct_enclosed_is_inward(const fct_enclosed *sum, const fct_tree_view *view);
 /* The value of view.inward for a whole mesh. O(F) for a closed one. */
 bool fct_tree_is_inward(const fct_tree_view *view);

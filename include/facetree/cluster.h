@@ -97,10 +97,10 @@ typedef struct fct_tree_view {
     double mean_depth; /* mean over the leaves */
     /* Edges of the mesh with one face, with three or more, and the parts that edges connect (dual.h). */
     uint32_t boundary_edges, nonmanifold_edges, component_count;
-    bool inward;                /* closed (no such edges) and wound inwards: the volume inside is negative */
-    fct_bounds bounds;          /* of all vertices; empty if there are none */
-    const uint32_t *roots;      /* root_count node ids, ascending */
-    const uint32_t *face_ids;   /* face_count: place -> input face */
+    bool inward;              /* closed (no such edges), its faces wind alike, and the volume inside is < 0 */
+    fct_bounds bounds;        /* of all vertices; empty if there are none */
+    const uint32_t *roots;    /* root_count node ids, ascending */
+    const uint32_t *face_ids; /* face_count: place -> input face */
     const uint32_t *vertex_ids; /* vertex_count: tree vertex -> input vertex */
     const float *positions;     /* vertex_count x 3, by tree vertex */
     const uint32_t *triangles;  /* face_count x 3, by place: tree vertices, those of the input */

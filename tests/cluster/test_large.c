@@ -2,12 +2,10 @@
  * bytes for every thread count, and an unchanged old file after every error. */
 #define _GNU_SOURCE
 #include "check_tree.h"
+#include "folder.h"
 
 #include <dirent.h>
 #include <unistd.h>
-
-static char folder[] = "/tmp/facetree-large-XXXXXX";
-static char mesh_path[64], tree_path[64];
 
 /* One thread, because parts of a few faces are too small for a second one. */
 static fct_env single(void) {
@@ -553,21 +551,6 @@ static void errors_are_told(void **state) {
     fct_mesh_release(&env, &mesh);
     fct_mesh_release(&env, &none);
     assert_int_equal(r.alive, 0);
-}
-
-static int make_folder(void **state) {
-    (void)state;
-    if (!mkdtemp(folder)) return -1;
-    snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", folder);
-    snprintf(tree_path, sizeof tree_path, "%s/tree.fct", folder);
-    return 0;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    unlink(mesh_path);
-    unlink(tree_path);
-    return rmdir(folder);
 }
 
 int main(void) {

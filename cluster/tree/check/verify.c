@@ -196,15 +196,6 @@ static fct_result check_geometry(const fct_env *env, const fct_tree *tree) {
     return result;
 }
 
-/* The header's winding against the enclosed volume. A build in parts sums about another point, so a volume
- * near 0 may be either. */
-static bool winding_is_wrong(const fct_tree_view *view) {
-    fct_enclosed sum = {0};
-    if (view->boundary_edges || view->nonmanifold_edges) return view->inward;
-    fct_enclosed_add(&sum, view, v3_load(view->bounds.lower));
-    return view->inward ? sum.volume > 1e-9 * sum.magnitude : sum.volume < -1e-6 * sum.magnitude;
-}
-
 static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
     const fct_tree_view *view = &tree->view;
     fct_tree other = {.view = *view};
@@ -224,7 +215,7 @@ static fct_result check_counts(const fct_env *env, const fct_tree *tree) {
                         "has %u, %u and %u",
                         view->boundary_edges, view->nonmanifold_edges, view->component_count, counts.boundary,
                         counts.nonmanifold, counts.components);
-    if (winding_is_wrong(view))
+    if (fct_tree_is_inward(view) != view->inward)
         return fct_fail(env, FCT_ERROR_DATA, "the header says that the surface is %swound inwards",
                         view->inward ? "" : "not ");
     return FCT_OK;

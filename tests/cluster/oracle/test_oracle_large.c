@@ -3,13 +3,11 @@
  */
 #define _GNU_SOURCE
 #include "cluster/check_tree.h"
+#include "cluster/folder.h"
 #include "nodes.h"
 #include "parts.h"
 
 #include <unistd.h>
-
-static char folder[] = "/tmp/facetree-oracle-XXXXXX";
-static char mesh_path[64], tree_path[64];
 
 /* --- Costs --- */
 
@@ -299,21 +297,6 @@ static void least_memory(void **state) {
         env.allocate = NULL, env.release = NULL;
         fct_mesh_release(&env, &mesh);
     }
-}
-
-static int make_folder(void **state) {
-    (void)state;
-    if (!mkdtemp(folder)) return -1;
-    snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", folder);
-    snprintf(tree_path, sizeof tree_path, "%s/tree.fct", folder);
-    return 0;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    unlink(mesh_path);
-    unlink(tree_path);
-    return rmdir(folder);
 }
 
 int main(void) {
