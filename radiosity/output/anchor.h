@@ -27,7 +27,7 @@ typedef struct fct_anchors_def {
     double side;      /* 1: front of the surface; -1: back */
     const uint8_t *covered; /* per vertex: it needs no light. NULL: none is covered */
     const float *nearest;   /* per vertex: distance to some surface in front of it, which limits how far away
-                               its   anchor may be. NULL: infinity */
+                               its anchor may be. NULL: infinity */
     uint64_t seed;
 } fct_anchors_def;
 

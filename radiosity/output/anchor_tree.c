@@ -68,7 +68,9 @@ static void insert_anchor(fct_nearest *n, uint32_t id, double d2) {
     n->ids[i] = id, n->distances2[i] = d2;
 }
 
-void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3], fct_nearest *found) {
+/* The nearest anchors among those with |n - n'|^2 below most_turn2. */
+static void search_anchors(const fct_anchors *t, const float p[3], const float n[3], double most_turn2,
+                           fct_nearest *found) {
     struct visit {
         uint32_t begin, end;
         double least2; /* no anchor of the node is nearer */
@@ -87,7 +89,7 @@ void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3
             double dp = (double)p[k] - a->position[k], dn = (double)n[k] - a->normal[k];
             d2 += dp * dp, turn2 += dn * dn;
         }
-        if (turn2 < FCT_MOST_TURN2) insert_anchor(found, mid, d2 + t->turn * t->turn * turn2);
+        if (turn2 < most_turn2) insert_anchor(found, mid, d2 + t->turn * t->turn * turn2);
         double side = (double)p[t->axes[mid]] - a->position[t->axes[mid]];
         struct visit low = {r.begin, mid, r.least2}, high = {mid + 1, r.end, r.least2};
         if (side < 0)
@@ -97,6 +99,11 @@ void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3
         stack[top++] = side < 0 ? high : low;
         stack[top++] = side < 0 ? low : high;
     }
+}
+
+void fct_anchors_nearest(const fct_anchors *t, const float p[3], const float n[3], fct_nearest *found) {
+    search_anchors(t, p, n, FCT_MOST_TURN2, found);
+    if (found->count == 0) search_anchors(t, p, n, HUGE_VAL, found);
 }
 
 void fct_anchors_release(const fct_env *env, fct_anchors *anchors) {

@@ -40,7 +40,8 @@ typedef struct fct_nearest {
 
 /* Sorts the items into kd-tree order and fills `axes`. O(n log n). */
 void fct_anchors_order(fct_anchors *anchors);
-/* The nearest anchors to a point with a unit normal, among those whose normal is within 37 degrees of it. */
+/* The nearest anchors to a point with a unit normal, among those whose normal is within 37 degrees of it, or
+ * among all if there is none. */
 void fct_anchors_nearest(const fct_anchors *anchors, const float point[3], const float normal[3],
                          fct_nearest *found);
 void fct_anchors_release(const fct_env *env, fct_anchors *anchors);

@@ -7,7 +7,7 @@
 
 /* Indirect irradiance (RGB) at a point with a unit normal. near_wall: anchors whose light differs from the
  * others' must be visible from the point, or light would pass under walls that stand on one continuous floor;
- * each such test adds 1 to *rays. Without any anchor within 37 degrees of the normal the irradiance is 0. */
+ * each such test adds 1 to *rays. Without any anchor the irradiance is 0. */
 void fct_anchors_irradiance(const fct_anchors *anchors, const fct_elements *set, const float point[3],
                             const float normal[3], float offset, bool near_wall, double irradiance[3],
                             uint64_t *rays);

@@ -36,8 +36,8 @@ enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4 };
  * length of the edge that is cut. */
 #define CUT_WIDTH (1. / 256)
 /* Tolerance of the groups of vertices per anchor. Vertices of one group turn at most acos(1 - .4^2) = 33
- * degrees from their anchor with GATHER, so the blend uses it; up to 79 degrees with DIRECT, where some
- * vertices of strongly bent models find no anchor and stay dark. */
+ * degrees from their anchor with GATHER. A larger tolerance allows 79 degrees, but anchor.c also halves
+ * groups that turn by more than the blend accepts. */
 #define GATHER_TOLERANCE .4
 #define DIRECT_TOLERANCE .9
 enum { VERTEX_GRAIN = 64 }; /* vertices per chunk */
@@ -174,14 +174,19 @@ static fct_result run_vertices(lighting *l, const char *phase, uint32_t first, r
 static fct_result grow_light(lighting *l, bool covered, bool cut) {
     const fct_env *env = l->s->env;
     const size_t count = l->surface->mesh.vertex_count;
-    size_t capacity[5] = {l->known, l->known, l->known, l->known, l->known};
-    fct_result result = fct_grow(env, (void **)&l->direct, &capacity[0], count, 3 * sizeof *l->direct);
-    if (result == FCT_OK)
-        result = fct_grow(env, (void **)&l->indirect, &capacity[1], count, 3 * sizeof *l->indirect);
-    if (result == FCT_OK) result = fct_grow(env, (void **)&l->covered, &capacity[2], count, 1);
-    if (result == FCT_OK)
-        result = fct_grow(env, (void **)&l->nearest, &capacity[3], count, sizeof *l->nearest);
-    if (result == FCT_OK) result = fct_grow(env, (void **)&l->cut, &capacity[4], count, 1);
+    const struct {
+        void **array;
+        size_t size;
+    } arrays[] = {{(void **)&l->direct, 3 * sizeof *l->direct},
+                  {(void **)&l->indirect, 3 * sizeof *l->indirect},
+                  {(void **)&l->nearest, sizeof *l->nearest},
+                  {(void **)&l->covered, 1},
+                  {(void **)&l->cut, 1}};
+    fct_result result = FCT_OK;
+    for (size_t i = 0; i < FCT_LENGTH(arrays) && result == FCT_OK; ++i) {
+        size_t capacity = l->known;
+        result = fct_grow(env, arrays[i].array, &capacity, count, arrays[i].size);
+    }
     for (size_t v = l->known; result == FCT_OK && v < count; ++v)
         l->covered[v] = covered, l->cut[v] = cut, l->nearest[v] = INFINITY;
     l->known = (uint32_t)count;
@@ -191,7 +196,7 @@ static fct_result grow_light(lighting *l, bool covered, bool cut) {
 /* Finds which of the new vertices are covered. */
 static fct_result cover_vertices(lighting *l, uint64_t *rays) {
     fct_result result = grow_light(l, false, false);
-    return result == FCT_OK ? run_vertices(l, "covered vertices", l->first, cover_chunk, rays) : result;
+    return result == FCT_OK ? run_vertices(l, "covers", l->first, cover_chunk, rays) : result;
 }
 
 /* Lights the vertices from l->first on. */

@@ -15,10 +15,9 @@ typedef struct fct_solution {
     fct_elements elements;
     fct_links links;
     fct_transport transport;
-    double max_edge; /* def.max_edge, or the default of the scene */
-    double fineness; /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
-    double
-        mean_radiosity; /* reflected, over the scene's area and channels: the scale of visible differences */
+    double max_edge;       /* def.max_edge, or the default of the scene */
+    double fineness;       /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
+    double mean_radiosity; /* rho E over the scene's area and channels: the scale of visible differences */
 } fct_solution;
 
 /* Rays per lamp: `least` at the default error and above, more for smaller errors, at most 64. */

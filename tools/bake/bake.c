@@ -312,7 +312,7 @@ int tool_bake(int argc, char **argv) {
         {"direct light", 8},
         {"gathering", 8},
         {"iteration", 1},
-        {"objects|surface|anchors|vertices|reference", 72},
+        {"objects|surface|covers|anchors|vertices|reference", 72},
         {"write", 1},
         {"probes", 1},
         {0}};

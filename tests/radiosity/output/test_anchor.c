@@ -111,25 +111,30 @@ static fct_anchors make_anchors(uint32_t count) {
     return t;
 }
 
-/* All anchors within 37 degrees (|n - n'|^2 < .4), by |p - p'|^2 + turn^2 |n - n'|^2. */
+/* All anchors within 37 degrees (|n - n'|^2 < .4), or all if there is none, by |p - p'|^2 + turn^2 |n -
+ * n'|^2. */
 static void nearest_equal_brute_force(void **state) {
     (void)state;
+    int turned = 0;
     for (uint32_t count = 1; count <= 1000; count = 3 * count + 1) {
         fct_anchors t = make_anchors(count);
         fct_anchors_order(&t);
         for (uint64_t q = 0; q < 60; ++q) {
             float p[3], n[3];
             for (uint64_t k = 0; k < 3; ++k) p[k] = (float)fct_uniform(fct_hash3(q, k, 3));
-            v3_store(n, v3_unit(v3_make(fct_uniform(fct_hash3(q, 0, 4)) - .5, 0, 1)));
+            v3_store(n, v3_unit(v3_make(fct_uniform(fct_hash3(q, 0, 4)) - .5, 0, q % 10 ? 1 : -.2)));
             fct_nearest found;
             fct_anchors_nearest(&t, p, n, &found);
-            double best[10];
+            double best[10], most = 8;
             int known = 0;
+            for (uint32_t i = 0; i < count; ++i)
+                if (v3_norm2(v3_sub(v3_load(n), v3_load(t.items[i].normal))) < .4) most = .4;
+            turned += most > 4;
             for (uint32_t i = 0; i < count; ++i) {
                 v3 d = v3_sub(v3_load(p), v3_load(t.items[i].position)),
                    m = v3_sub(v3_load(n), v3_load(t.items[i].normal));
                 double d2 = v3_norm2(d) + .09 * v3_norm2(m);
-                if (v3_norm2(m) >= .4) continue;
+                if (v3_norm2(m) >= most) continue;
                 int at = known < 10 ? known++ : 10;
                 if (at == 10 && d2 >= best[9]) continue;
                 if (at == 10) at = 9;
@@ -144,6 +149,7 @@ static void nearest_equal_brute_force(void **state) {
         }
         fct_anchors_release(&plain, &t);
     }
+    assert_true(turned > 5);
 }
 
 static void set_anchor(fct_anchor *a, v3 p, v3 n, double reach, double e) {
@@ -209,8 +215,8 @@ static void weights_fall_with_distance_and_turn(void **state) {
     fct_anchors_release(&plain, &t);
 }
 
-/* A single anchor decides alone; its correction stays within .5 to 1.6 of its value; beyond 37 degrees no
- * light. */
+/* A single anchor decides alone; its correction stays within .5 to 1.6 of its value. Beyond 37 degrees it
+ * counts only if no other is nearer to the normal. */
 static void corrections_are_clamped(void **state) {
     (void)state;
     const v3 up = {0, 0, 1}, turned = v3_unit(v3_make(.3, 0, 1));
@@ -223,10 +229,16 @@ static void corrections_are_clamped(void **state) {
         for (int c = 0; c < 3; ++c) t.items[0].gradient[c][0] = (float)(.5 * sign);
         assert_near(blend(&t, NULL, v3_make(3, 0, 0), turned, false, NULL), 2 + .5 * sign * turned.x, 1e-5);
     }
-    for (int angle = 30; angle < 45; angle += 10) {
-        double a = angle * pi / 180;
-        double e = blend(&t, NULL, v3_make(0, 0, 0), v3_make(0, sin(a), cos(a)), false, NULL);
-        assert_true(angle < 37 ? e > 0 : e == 0);
+    for (int angle = 30; angle < 100; angle += 10) {
+        const v3 n = {0, sin(angle * pi / 180), cos(angle * pi / 180)};
+        assert_near(blend(&t, NULL, v3_make(0, 0, 0), n, false, NULL), 2, 1e-6);
+        fct_anchors two = make_anchors(2); /* the second one: at n, and brighter */
+        set_anchor(&two.items[0], v3_make(.1, 0, 0), up, 1, 2);
+        set_anchor(&two.items[1], v3_make(-.1, 0, 0), n, 1, 8);
+        fct_anchors_order(&two);
+        double e = blend(&two, NULL, v3_make(0, 0, 0), n, false, NULL);
+        assert_true(angle < 37 ? e > 2 && e < 8 : fabs(e - 8) < 1e-6);
+        fct_anchors_release(&plain, &two);
     }
     fct_anchors_release(&plain, &t);
 }

@@ -254,23 +254,27 @@ static void groups_follow_the_rules(void **state) {
     assert_true(halved[0] > 20 && halved[1] > 20 && turned > 0 && hidden > 0);
 }
 
-/* blend.h and the formulas at the top of blend.c, over all anchors. Returns the number of rays. */
+/* blend.h and the formulas at the top of blend.c, over all anchors. Returns the number of rays. *turned:
+ * counts points whose normal no anchor has within 37 degrees. */
 static int blend_plainly(const room *r, const fct_anchors *t, v3 p, v3 n, double offset, bool wall,
-                         double e[3]) {
+                         double e[3], int *turned) {
     double x[10], w[10], values[10][3], total = 0, mean = 0, farthest = 0, far2[10];
     const fct_anchor *near[10];
     int count = 0, rays = 0;
+    double most = 8;
+    for (uint32_t i = 0; i < t->count; ++i)
+        if (v3_norm2(v3_sub(n, v3_load(t->items[i].normal))) < .4) most = .4;
+    *turned += most > 4;
     for (uint32_t i = 0; i < t->count; ++i) {
         const fct_anchor *a = &t->items[i];
         double turn2 = v3_norm2(v3_sub(n, v3_load(a->normal)));
         double d2 = v3_norm2(v3_sub(p, v3_load(a->position))) + t->turn * t->turn * turn2;
-        if (turn2 >= .4 || (count == 10 && d2 >= far2[9])) continue;
+        if (turn2 >= most || (count == 10 && d2 >= far2[9])) continue;
         int k = count < 10 ? count++ : 9;
         for (; k > 0 && far2[k - 1] > d2; --k) far2[k] = far2[k - 1], near[k] = near[k - 1];
         far2[k] = d2, near[k] = a;
     }
     e[0] = e[1] = e[2] = 0;
-    if (count == 0) return 0;
     for (int i = 0; i < count; ++i) {
         v3 turn = v3_sub(n, v3_load(near[i]->normal));
         x[i] = v3_norm(v3_sub(p, v3_load(near[i]->position))) / near[i]->reach + .7 * v3_norm(turn) + 1e-4;
@@ -304,7 +308,7 @@ static int blend_plainly(const room *r, const fct_anchors *t, v3 p, v3 n, double
 
 static void blends_equal_the_formula(void **state) {
     (void)state;
-    int rays_of_all = 0, dark = 0;
+    int rays_of_all = 0, turned = 0;
     for (uint64_t seed = 0; seed < 24; ++seed) {
         room r = make_room(seed);
         fct_anchors t = {.count = seed < 3 ? (uint32_t)seed + 1 : 4 + 5 * (uint32_t)seed,
@@ -331,17 +335,17 @@ static void blends_equal_the_formula(void **state) {
             v3_store(n, v3_unit(v3_make(pick(seed, q, 54) - .5, pick(seed, q, 55) - .5, q % 9 ? 1 : .2)));
             double expected[3], found[3];
             uint64_t rays = 5;
-            int sent = blend_plainly(&r, &t, v3_load(p), v3_load(n), offset, q % 2, expected);
+            int sent = blend_plainly(&r, &t, v3_load(p), v3_load(n), offset, q % 2, expected, &turned);
             fct_anchors_irradiance(&t, &r.set, p, n, offset, q % 2, found, &rays);
             assert_int_equal(rays, 5 + sent);
             for (int c = 0; c < 3; ++c) assert_near(found[c], expected[c], 1e-6);
-            rays_of_all += sent, dark += found[0] == 0;
+            rays_of_all += sent;
         }
         fct_anchors_release(&plain, &t);
         end_room(&r);
     }
-    printf("    %d visibility rays, %d points without an anchor\n", rays_of_all, dark);
-    assert_true(rays_of_all > 500 && dark > 5);
+    printf("    %d visibility rays, %d points turned from all anchors\n", rays_of_all, turned);
+    assert_true(rays_of_all > 500 && turned > 5);
 }
 
 int main(void) {
