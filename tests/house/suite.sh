@@ -1,6 +1,6 @@
 #!/bin/sh
 # Configures and builds a preset and runs its tests. The preset `fuzz` has no tests of its own, and `tsan` leaves out long tests
-# of one thread. Uses ccache if it is installed.
+# whose code other tests run with several threads. Uses ccache if it is installed.
 # usage: suite.sh PRESET [CTEST-ARGUMENT...]
 set -eu
 preset=$1

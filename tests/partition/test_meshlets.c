@@ -312,7 +312,8 @@ static double area_along(const v3 *points, uint32_t count, v3 a, v3 b) {
     return 2 * (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]);
 }
 
-/* The least area of eight turns by 11.25 degrees about the normal, for the worst first angle. */
+/* Turns a box about the normal in eight steps of 11.25 degrees and takes the least area. Returns the largest
+ * of these areas over all first angles. */
 static double worst_turned_area(const v3 *points, uint32_t count, v3 normal) {
     enum { TURNS = 8, STARTS = 40 };
     v3 t = v3_unit(v3_cross(normal, fabs(normal.x) < 0.6 ? (v3){1, 0, 0} : (v3){0, 1, 0})),

@@ -16,6 +16,19 @@ static inline uint32_t place_material(fct_scene *scene, double reflectance, doub
     return id;
 }
 
+/* Random colours: reflectances in [low, high), emissions up to 1.2 times the given one. */
+static inline uint32_t place_colours(fct_scene *scene, uint64_t seed, double low, double high,
+                                     double emission, bool two_sided) {
+    fct_material material = {.two_sided = two_sided};
+    for (uint64_t k = 0; k < 3; ++k) {
+        material.reflectance[k] = (float)(low + (high - low) * fct_uniform(fct_hash2(seed, k)));
+        material.emission[k] = (float)(emission * (.2 + fct_uniform(fct_hash2(seed, 3 + k))));
+    }
+    uint32_t id;
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    return id;
+}
+
 static inline void place_mesh(fct_scene *scene, const fct_mesh *mesh, uint32_t material,
                               const float *transform) {
     assert_int_equal(fct_scene_add_object(scene, "part", mesh, NULL, transform, material, NULL), FCT_OK);

@@ -149,17 +149,10 @@ static void trace_plainly(const world *w, spot at, const double first[4], fct_ra
         for (int k = 0; k < 4; ++k) u[k] = bounce ? fct_random_next(&random) : first[k];
         if (w->source_count && !(indirect && bounce == 0)) add_light(w, &at, through, u[2], u[3], sum, rays);
         v3 d = fct_cosine_direction(at.n, u[0], u[1]), o = origin_of(&at);
-        uint32_t hit = FCT_NONE, instance = 0;
-        double nearest = INFINITY;
+        double nearest;
+        bool behind;
+        uint32_t hit = find_nearest(&w->triangles, o, d, &nearest, &behind), instance = 0;
         ++*rays;
-        for (uint32_t i = 0; i < w->triangles.count; ++i) {
-            const v3 *c = corners(w, i);
-            v3 e = v3_sub(c[1], c[0]), f = v3_sub(c[2], c[0]), n = v3_cross(e, f), x = v3_sub(o, c[0]),
-               q = v3_cross(x, d);
-            double det = -v3_dot(n, d), t = v3_dot(n, x) / det, a = v3_dot(f, q) / det,
-                   b = -v3_dot(e, q) / det;
-            if (t > 0 && t < nearest && a >= 0 && b >= 0 && a + b <= 1) nearest = t, hit = i;
-        }
         while (hit != FCT_NONE && hit >= w->first[instance + 1]) ++instance;
         const fct_material *m = &w->view.materials[w->view.instances[instance].material];
         v3 n = hit == FCT_NONE ? d : v3_unit(front(w, instance, hit));

@@ -13,14 +13,7 @@ static void assert_near(double value, double expected, double tolerance) {
 }
 
 static uint32_t add_colour(fct_scene *scene, uint64_t seed, double emission, bool two_sided) {
-    fct_material material = {.two_sided = two_sided};
-    for (uint64_t k = 0; k < 3; ++k) {
-        material.reflectance[k] = (float)(.2 + .6 * fct_uniform(fct_hash2(seed, k)));
-        material.emission[k] = (float)(emission * (.2 + fct_uniform(fct_hash2(seed, 3 + k))));
-    }
-    uint32_t id;
-    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
-    return id;
+    return place_colours(scene, seed, .2, .8, emission, two_sided);
 }
 
 /* A floor, a small lamp, a wall whose back is black, a two-sided bumpy ball, which in odd scenes shines and
@@ -49,21 +42,6 @@ static fct_scene *make_scene(uint64_t seed) {
     return scene;
 }
 
-/* The place of a ray's hit, by brute force: nearest triangle along the ray; FCT_NONE on a miss. */
-static uint32_t find_nearest(const soup *s, v3 o, v3 d, double *distance) {
-    uint32_t best = FCT_NONE;
-    *distance = INFINITY;
-    for (size_t i = 0; i < s->count; ++i) {
-        const v3 *c = s->corners + 3 * i;
-        v3 e = v3_sub(c[1], c[0]), f = v3_sub(c[2], c[0]), n = v3_cross(e, f), x = v3_sub(o, c[0]);
-        double det = -v3_dot(n, d), t = v3_dot(n, x) / det;
-        v3 q = v3_cross(x, d);
-        double u = v3_dot(f, q) / det, v = -v3_dot(e, q) / det;
-        if (t > 0 && t < *distance && u >= 0 && v >= 0 && u + v <= 1) *distance = t, best = (uint32_t)i;
-    }
-    return best;
-}
-
 /* A ray finds the leaf at its nearest hit, on the side that it hits, or black on the back of a one-sided
  * surface. */
 static void rays_find_the_leaf_that_they_hit(void **state) {
@@ -85,7 +63,8 @@ static void rays_find_the_leaf_that_they_hit(void **state) {
                                         fct_uniform(fct_hash3(seed, k, 6)) - .5)));
             fct_found f = fct_transport_look(&set, stored, o, d);
             double distance;
-            uint32_t hit = find_nearest(&s, v3_load(o), v3_load(d), &distance), instance = 0;
+            bool behind;
+            uint32_t hit = find_nearest(&s, v3_load(o), v3_load(d), &distance, &behind), instance = 0;
             if (hit == FCT_NONE) {
                 assert_true(f.leaf == FCT_NONE && isinf(f.distance) && !f.black && f.radiosity[0] == 0),
                     ++misses;

@@ -15,14 +15,7 @@ static void assert_near(double value, double expected, double tolerance) {
 }
 
 static uint32_t add_colour(fct_scene *scene, uint64_t seed, double emission, bool two_sided) {
-    fct_material material = {.two_sided = two_sided};
-    for (uint64_t k = 0; k < 3; ++k) {
-        material.reflectance[k] = (float)(.9 * fct_uniform(fct_hash2(seed, k)));
-        material.emission[k] = (float)(emission * (.2 + fct_uniform(fct_hash2(seed, 3 + k))));
-    }
-    uint32_t id;
-    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
-    return id;
+    return place_colours(scene, seed, 0, .9, emission, two_sided);
 }
 
 /* A floor, a lamp that faces it, a bumpy ball under a random similarity, a two-sided sheet, a sheared ball,

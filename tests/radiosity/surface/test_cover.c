@@ -35,21 +35,6 @@ static fct_scene *begin(void) {
     return scene;
 }
 
-/* Distance of the nearest triangle along d; *back: the ray sees its back. Infinity: none. */
-static double find_nearest(const soup *s, v3 o, v3 d, bool *back) {
-    double nearest = INFINITY;
-    for (size_t i = 0; i < s->count; ++i) {
-        const v3 *c = s->corners + 3 * i;
-        v3 e = v3_sub(c[1], c[0]), f = v3_sub(c[2], c[0]), n = v3_cross(e, f), p = v3_sub(o, c[0]);
-        double det = -v3_dot(n, d);
-        if (det == 0) continue;
-        v3 q = v3_cross(p, d);
-        double t = v3_dot(n, p) / det, u = v3_dot(f, q) / det, v = -v3_dot(e, q) / det;
-        if (t > 0 && t < nearest && u >= 0 && v >= 0 && u + v <= 1) nearest = t, *back = det < 0;
-    }
-    return nearest;
-}
-
 /* The first ray that does not see a back ends the search; there are at most eight. */
 static void points_equal_brute_force(void **state) {
     (void)state;
@@ -77,12 +62,13 @@ static void points_equal_brute_force(void **state) {
         while (expected && rays < 8) {
             double uv[2];
             float direction[3];
-            bool back = false, sheet = false;
+            bool back, sheet;
             fct_plane_point((uint32_t)rays++, k, uv);
             v3_store(direction, fct_cosine_direction(v3_load(normal), uv[0], uv[1]));
             soup part = {all.corners, one_sided}, rest = {all.corners + 3 * one_sided, all.count - one_sided};
-            double t = find_nearest(&part, v3_load(origin), v3_load(direction), &back);
-            double other = find_nearest(&rest, v3_load(origin), v3_load(direction), &sheet);
+            double t, other;
+            find_nearest(&part, v3_load(origin), v3_load(direction), &t, &back);
+            find_nearest(&rest, v3_load(origin), v3_load(direction), &other, &sheet);
             expected = t < other && back;
             least = fmin(least, fmin(t, other));
         }
@@ -107,8 +93,8 @@ static double measure_outside(const fct_mesh *mesh, uint32_t v) {
     return fmin(crate, hypot(p.x - 2.8, p.y - 2.6) - .4); /* sqrt(.5^2 - .3^2) */
 }
 
-/* The floor of a lit room with a crate and a sunk ball. Of the floor, what lies under a body is black; what
- * lies beside it is lit; edges between the two are short. */
+/* A crate stands on a lit floor, and a ball is sunk in it. The floor is black under them and lit beside them,
+ * and the edges between black and lit vertices are short. */
 static void contacts_are_sharp(void **state) {
     (void)state;
     fct_scene *scene = begin();
