@@ -30,8 +30,11 @@ enum { BORDER_ROUNDS = 4 };
  * values split edges because of noise. */
 #define BORDER_SHARE .1
 #define BORDER_LEVEL .04
-/* Rays per anchor and per lamp at the default error. */
-enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4 };
+/* Rays per anchor and per lamp at the default error, and first rays per lamp at the borders of shadows: four
+ * rays that agree miss a narrow penumbra here and find it there, so that the border looks torn. */
+enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4, BORDER_RAYS = 16 };
+/* Difference of the direct light of two neighbours over its sum from which on a shadow ends near them. */
+#define SHADOW_SHARE .03
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
  * length of the edge that is cut. */
 #define CUT_WIDTH (1. / 256)
@@ -52,6 +55,8 @@ typedef struct lighting {
     float *direct, *indirect; /* irradiance, per vertex x 3; `indirect` holds all of it with FCT_FINAL_NONE */
     uint8_t *covered;         /* per vertex */
     uint8_t *cut;             /* per vertex: it was made to cut an edge at the border of a cover */
+    uint8_t *border;          /* per vertex: a shadow ends near it (1), and its direct light takes that into
+                                 account (2) */
     float *nearest;           /* per vertex: see fct_point_is_covered */
     uint32_t known;           /* lower vertices have room in these arrays */
     uint32_t cut_first;       /* of the vertices before the border of a cover */
@@ -85,11 +90,11 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-static void gather_lamps(const lighting *l, size_t v, const float normal[3], double irradiance[3],
-                         uint64_t *rays) {
+static void gather_lamps(const lighting *l, size_t v, uint32_t first_rays, const float normal[3],
+                         double irradiance[3], uint64_t *rays) {
     const fct_solution *s = l->s;
     const fct_surface *f = l->surface;
-    uint32_t rays_each = fct_solution_lamp_rays(s, LAMP_RAYS);
+    uint32_t rays_each = fct_solution_lamp_rays(s, first_rays);
     fct_solution_direct(s, f->sample_points + 3 * v, normal, f->offsets[v],
                         fct_hash3(s->def.seed + 1, l->instance, v), rays_each, irradiance, rays);
 }
@@ -131,13 +136,27 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
             if (l->s->def.final == FCT_FINAL_NONE) {
                 gather_links(l, v, normal, indirect);
             } else {
-                gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
+                gather_lamps(l, v, LAMP_RAYS, normal, direct, &l->chunk_rays[chunk]);
                 fct_anchors_irradiance(l->anchors, &l->s->elements, f->sample_points + 3 * v, normal,
                                        f->offsets[v], f->flat[v], indirect, &l->chunk_rays[chunk]);
             }
         }
         for (size_t c = 0; c < 3; ++c)
             l->direct[3 * v + c] = (float)direct[c], l->indirect[3 * v + c] = (float)indirect[c];
+    }
+}
+
+static void border_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    lighting *l = user;
+    (void)thread;
+    for (size_t v = begin; v < end; ++v) {
+        if (l->border[v] != 1) continue;
+        float normal[3];
+        double direct[3];
+        load_normal(l, v, normal);
+        gather_lamps(l, v, BORDER_RAYS, normal, direct, &l->chunk_rays[chunk]);
+        for (size_t c = 0; c < 3; ++c) l->direct[3 * v + c] = (float)direct[c];
+        l->border[v] = 2;
     }
 }
 
@@ -181,14 +200,15 @@ static fct_result grow_light(lighting *l, bool covered, bool cut) {
                   {(void **)&l->indirect, 3 * sizeof *l->indirect},
                   {(void **)&l->nearest, sizeof *l->nearest},
                   {(void **)&l->covered, 1},
-                  {(void **)&l->cut, 1}};
+                  {(void **)&l->cut, 1},
+                  {(void **)&l->border, 1}};
     fct_result result = FCT_OK;
     for (size_t i = 0; i < FCT_LENGTH(arrays) && result == FCT_OK; ++i) {
         size_t capacity = l->known;
         result = fct_grow(env, arrays[i].array, &capacity, count, arrays[i].size);
     }
     for (size_t v = l->known; result == FCT_OK && v < count; ++v)
-        l->covered[v] = covered, l->cut[v] = cut, l->nearest[v] = INFINITY;
+        l->covered[v] = covered, l->cut[v] = cut, l->border[v] = 0, l->nearest[v] = INFINITY;
     l->known = (uint32_t)count;
     return result;
 }
@@ -199,10 +219,31 @@ static fct_result cover_vertices(lighting *l, uint64_t *rays) {
     return result == FCT_OK ? run_vertices(l, "covers", l->first, cover_chunk, rays) : result;
 }
 
-/* Lights the vertices from l->first on. */
+/* Marks lit vertices on whose edges a shadow ends. */
+static void mark_borders(lighting *l) {
+    const fct_mesh *m = &l->surface->mesh;
+    for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
+        const uint32_t a = m->triangles[c], b = m->triangles[c % 3 == 2 ? c - 2 : c + 1];
+        double difference = 0, sum = 0;
+        if (!has_surface(l, a) || !has_surface(l, b) || l->covered[a] || l->covered[b]) continue;
+        for (size_t k = 0; k < 3; ++k) {
+            const double x = l->direct[3 * (size_t)a + k], y = l->direct[3 * (size_t)b + k];
+            difference += fabs(x - y), sum += x + y;
+        }
+        if (difference <= SHADOW_SHARE * sum) continue;
+        if (!l->border[a]) l->border[a] = 1;
+        if (!l->border[b]) l->border[b] = 1;
+    }
+}
+
+/* Lights the vertices from l->first on, and those at borders of shadows once more. */
 static fct_result light_vertices(lighting *l, uint64_t *rays) {
     fct_result result = run_vertices(l, "vertices", l->first, light_chunk, rays);
-    if (result == FCT_OK) color_vertices(l, l->first);
+    if (result == FCT_OK && l->s->def.final != FCT_FINAL_NONE) {
+        mark_borders(l);
+        result = run_vertices(l, "vertices", 0, border_chunk, rays);
+    }
+    if (result == FCT_OK) color_vertices(l, 0);
     l->first = l->surface->mesh.vertex_count;
     return result;
 }
@@ -211,9 +252,9 @@ static fct_result light_vertices(lighting *l, uint64_t *rays) {
 static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
     lighting *l = user;
     const fct_surface *f = l->surface;
-    if (l->covered[a] == l->covered[b] || (l->cut[a] && l->cut[b])) return 0;
-    if (!has_surface(l, a) || !has_surface(l, b)) return 0;
     const uint32_t from = l->covered[a] ? b : a, to = l->covered[a] ? a : b;
+    if (l->covered[a] == l->covered[b] || l->cut[to]) return 0; /* the border is beside a covered cut */
+    if (!has_surface(l, a) || !has_surface(l, b)) return 0;
     const v3 p = v3_load(f->mesh.positions + 3 * (size_t)from);
     const v3 way = v3_sub(v3_load(f->mesh.positions + 3 * (size_t)to), p);
     const float offset = fmaxf(f->offsets[a], f->offsets[b]);
@@ -230,15 +271,18 @@ static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
         bool hidden = fct_point_is_covered(l->s->scene, point, normal, offset, seed, NULL, l->rays);
         *(hidden ? &covered : &bare) = middle;
     }
-    if (bare < CUT_WIDTH || bare > 1 - 4 * CUT_WIDTH) return 0;
+    if (bare < CUT_WIDTH) return 0; /* the border is at `from` */
     return from == a ? bare : 1 - bare;
 }
 
 /* On the rest of such an edge: just behind it. */
 static double cut_behind_cover(void *user, uint32_t a, uint32_t b) {
     const lighting *l = user;
-    bool leaves_cover = a < l->cut_first && b >= l->cut_first && l->covered[a] && !l->covered[b];
-    return leaves_cover ? 1 - 2 * CUT_WIDTH : 0;
+    if (a >= l->cut_first || b < l->cut_first || !l->covered[a] || l->covered[b]) return 0;
+    const float *p = l->surface->mesh.positions + 3 * (size_t)a,
+                *q = l->surface->mesh.positions + 3 * (size_t)b;
+    bool wide = v3_norm(v3_sub(v3_load(p), v3_load(q))) > l->s->max_edge * CUT_WIDTH;
+    return wide ? 1 - 2 * CUT_WIDTH : 0;
 }
 
 /* Cuts surfaces along the border of their cover: first a row of vertices before the border, then one
@@ -343,7 +387,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
         if (back) fct_mesh_turn_over(out);
     }
     fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
-    fct_release(env, l.covered), fct_release(env, l.cut);
+    fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.border);
     fct_anchors_release(env, &anchors);
     fct_surface_release(env, &surface);
     return result;

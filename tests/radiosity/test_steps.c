@@ -123,11 +123,11 @@ typedef struct side {
     fct_surface f;
     fct_anchors anchors;
     float *direct, *indirect,
-        *nearest;            /* per vertex: irradiance x 3 each, distance of the test of the cover */
-    uint8_t *covered, *made; /* made: by a cut */
-    uint32_t known, cut;     /* lower vertices have these; are older than the cuts before covers */
+        *nearest;                     /* per vertex: irradiance x 3 each, distance of the test of the cover */
+    uint8_t *covered, *made, *border; /* made: by a cut; border: a shadow ends near it */
+    uint32_t known, cut;              /* lower vertices have these; are older than the cuts before covers */
     uint64_t rays;
-    int borders, covers;
+    int borders, covers, shadows;
 } side;
 
 static const fct_material *find_material(const fct_solution *s, uint32_t instance) {
@@ -165,9 +165,9 @@ static void grow_side(side *x, bool covered, bool made) {
     const size_t count = x->f.mesh.vertex_count;
     x->direct = realloc(x->direct, 12 * count), x->indirect = realloc(x->indirect, 12 * count);
     x->nearest = realloc(x->nearest, 4 * count), x->covered = realloc(x->covered, count);
-    x->made = realloc(x->made, count);
+    x->made = realloc(x->made, count), x->border = realloc(x->border, count);
     for (size_t v = x->known; v < count; ++v)
-        x->nearest[v] = INFINITY, x->covered[v] = covered, x->made[v] = made;
+        x->nearest[v] = INFINITY, x->covered[v] = covered, x->made[v] = made, x->border[v] = 0;
     x->known = (uint32_t)count;
 }
 
@@ -188,8 +188,8 @@ static void cover_by_steps(side *x) {
 /* Halves the edge until the border of the cover is known to a 256th of it. */
 static double find_border(void *user, uint32_t a, uint32_t b) {
     side *x = user;
-    if (x->covered[a] == x->covered[b] || (x->made[a] && x->made[b])) return 0;
     const uint32_t from = x->covered[a] ? b : a, to = x->covered[a] ? a : b;
+    if (x->covered[a] == x->covered[b] || x->made[to]) return 0;
     const float *p = x->f.mesh.positions + 3 * (size_t)from, *q = x->f.mesh.positions + 3 * (size_t)to;
     double low = 0, high = 1;
     while (high - low > 1 / 256.) {
@@ -204,12 +204,14 @@ static double find_border(void *user, uint32_t a, uint32_t b) {
         else
             low = w;
     }
-    if (low < 1 / 256. || low > 1 - 4 / 256.) return 0;
+    if (low < 1 / 256.) return 0;
     return from == a ? low : 1 - low;
 }
 
 static double pass_border(void *user, uint32_t a, uint32_t b) {
     const side *x = user;
+    const float *p = x->f.mesh.positions + 3 * (size_t)a, *q = x->f.mesh.positions + 3 * (size_t)b;
+    if (v3_norm(v3_sub(v3_load(p), v3_load(q))) <= x->s->max_edge / 256) return 0;
     return a < x->cut && b >= x->cut && x->covered[a] && !x->covered[b] ? 1 - 2 / 256. : 0;
 }
 
@@ -221,9 +223,53 @@ static void cut_by_steps(side *x) {
     grow_side(x, true, true);
 }
 
+/* Direct irradiance of a vertex from `least` rays per lamp or more. */
+static void light_directly(side *x, uint32_t v, double least, double e[3]) {
+    const fct_solution *s = x->s;
+    const float *point = x->f.sample_points + 3 * (size_t)v;
+    const v3 n = find_normal(x, v);
+    const double p[3] = {point[0], point[1], point[2]}, normal[3] = {n.x, n.y, n.z};
+    for (int c = 0; c < 3; ++c) e[c] = 0;
+    if (s->def.indirect_only) return;
+    fct_lamps_direct(s->lamps, s->scene, p, normal, x->f.offsets[v],
+                     fct_hash3(s->def.seed + 1, x->instance, v),
+                     (uint32_t)fmin(fmax(least * s->fineness, least), 64), e, &x->rays);
+}
+
+/* Vertices on whose edges direct light differs by over 3 % of its sum take it from four times the rays, once.
+ */
+static void light_borders(side *x) {
+    const fct_mesh *m = &x->f.mesh;
+    for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
+        const uint32_t ends[2] = {m->triangles[c], m->triangles[c % 3 == 2 ? c - 2 : c + 1]};
+        double difference = 0, sum = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            double y = x->direct[3 * (size_t)ends[0] + k], z = x->direct[3 * (size_t)ends[1] + k];
+            difference += fabs(y - z), sum += y + z;
+        }
+        for (int k = 0; k < 2; ++k)
+            if (difference > .03 * sum && !x->covered[ends[0]] && !x->covered[ends[1]] && !x->border[ends[k]])
+                x->border[ends[k]] = 1;
+    }
+    for (uint32_t v = 0; v < m->vertex_count; ++v) {
+        double e[3];
+        if (x->border[v] != 1) continue;
+        light_directly(x, v, 16, e);
+        for (size_t k = 0; k < 3; ++k) x->direct[3 * (size_t)v + k] = (float)e[k];
+        x->border[v] = 2, ++x->shadows;
+    }
+}
+
+static void color_side(side *x) {
+    const fct_material *m = find_material(x->s, x->instance);
+    for (size_t i = 0; i < 3 * (size_t)x->known; ++i)
+        x->f.mesh.colors[i] =
+            (float)((x->s->def.indirect_only ? 0 : (double)m->emission[i % 3]) +
+                    (double)m->reflectance[i % 3] * ((double)x->direct[i] + (double)x->indirect[i]));
+}
+
 static void light_by_steps(side *x, uint32_t first) {
     const fct_solution *s = x->s;
-    const fct_material *m = find_material(s, x->instance);
     for (uint32_t v = first; v < x->f.mesh.vertex_count; ++v) {
         float normal[3];
         double e[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
@@ -233,21 +279,15 @@ static void light_by_steps(side *x, uint32_t first) {
             uint32_t leaf = find_leaf(x, x->f.places[v], v3_load(point));
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), indirect);
         } else if (!x->covered[v]) {
-            uint32_t rays = (uint32_t)fmin(fmax(4 * s->fineness, 4), 64);
-            const double p[3] = {point[0], point[1], point[2]}, n[3] = {normal[0], normal[1], normal[2]};
-            if (!s->def.indirect_only)
-                fct_lamps_direct(s->lamps, s->scene, p, n, x->f.offsets[v],
-                                 fct_hash3(s->def.seed + 1, x->instance, v), rays, e, &x->rays);
+            light_directly(x, v, 4, e);
             fct_anchors_irradiance(&x->anchors, &s->elements, point, normal, x->f.offsets[v], x->f.flat[v],
                                    indirect, &x->rays);
         }
-        for (size_t c = 0; c < 3; ++c) {
-            const size_t i = 3 * (size_t)v + c;
-            x->direct[i] = (float)e[c], x->indirect[i] = (float)indirect[c];
-            x->f.mesh.colors[i] = (float)((s->def.indirect_only ? 0 : (double)m->emission[c]) +
-                                          (double)m->reflectance[c] * (e[c] + indirect[c]));
-        }
+        for (size_t c = 0; c < 3; ++c)
+            x->direct[3 * (size_t)v + c] = (float)e[c], x->indirect[3 * (size_t)v + c] = (float)indirect[c];
     }
+    if (s->def.final != FCT_FINAL_NONE) light_borders(x);
+    color_side(x);
 }
 
 /* Edges not shorter than a 24th of max_edge whose ends differ by a tenth of their sum and 4 % of the scene's
@@ -288,22 +328,19 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     for (int round = 0; round < 4; ++round) {
         uint32_t old = x.f.mesh.vertex_count;
         assert_int_equal(fct_surface_refine(&plain, &x.f, has_border, &x, &added), FCT_OK);
+        if (added == 0) break;
         cover_by_steps(&x);
         cut_by_steps(&x);
         light_by_steps(&x, old);
     }
     if (s->def.final != FCT_FINAL_NONE)
         assert_int_equal(fct_light_smooth(&plain, &x.f, x.covered, x.indirect), FCT_OK);
-    const fct_material *m = find_material(s, instance);
-    for (size_t i = 0; i < 3 * (size_t)x.known; ++i)
-        x.f.mesh.colors[i] =
-            (float)((s->def.indirect_only ? 0 : (double)m->emission[i % 3]) +
-                    (double)m->reflectance[i % 3] * ((double)x.direct[i] + (double)x.indirect[i]));
+    color_side(&x);
     return x;
 }
 
 static void release_side(side *x) {
-    free(x->direct), free(x->indirect), free(x->nearest), free(x->covered), free(x->made);
+    free(x->direct), free(x->indirect), free(x->nearest), free(x->covered), free(x->made), free(x->border);
     fct_surface_release(&plain, &x->f);
     fct_anchors_release(&plain, &x->anchors);
 }
@@ -364,7 +401,7 @@ static double measure_work(const fct_scene_view *view, uint32_t i, double max_ed
 
 static void bakes_equal_their_steps(void **state) {
     (void)state;
-    int borders = 0, second_sides = 0, covers = 0;
+    int borders = 0, second_sides = 0, covers = 0, shadows = 0;
     static const fct_bake_def defs[] = {
         {.final = FCT_FINAL_GATHER, .error = 2e-3, .seed = 5, .max_edge = .8},
         {.final = FCT_FINAL_NONE, .error = 5e-4, .seed = 2, .max_edge = .5},
@@ -414,7 +451,7 @@ static void bakes_equal_their_steps(void **state) {
                             face + x.f.mesh.face_count <= mesh.face_count);
                 compare_side(&mesh, vertex, face, &x);
                 vertex += x.f.mesh.vertex_count, face += x.f.mesh.face_count, rays += x.rays,
-                    borders += x.borders, covers += x.covers;
+                    borders += x.borders, covers += x.covers, shadows += x.shadows;
                 release_side(&x);
             }
             second_sides += count == 2;
@@ -478,9 +515,9 @@ static void bakes_equal_their_steps(void **state) {
         release_solution(&s);
         fct_scene_destroy(scene);
     }
-    printf("    %d borders, %d instances with two sides, %d vertices covered\n", borders, second_sides,
-           covers);
-    assert_true(borders > 50 && second_sides > 2 && covers > 50);
+    printf("    %d borders, %d instances with two sides, %d vertices covered, %d at shadows\n", borders,
+           second_sides, covers, shadows);
+    assert_true(borders > 50 && second_sides > 2 && covers > 50 && shadows > 500);
 }
 
 /* The reference: paths at the vertices of the surface and at probes. Power is counted per vertex, and the
