@@ -134,7 +134,7 @@ static fct_result solve_scene(fct_bake *bake) {
     bake->stats.seconds_total = fct_seconds() - begin;
     fill_stats(bake);
     s->mean_radiosity = find_mean_reflection(&s->elements);
-    return FCT_OK;
+    return fct_guides_create(&s->elements, &s->links, s->transport.stored, &s->guides);
 }
 
 /* Estimates how long an instance takes to light, in a unit of its own. The progress needs it. A face of a
@@ -200,6 +200,7 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
 void fct_bake_destroy(fct_bake *bake) {
     if (!bake) return;
     const fct_env *env = bake->solution.env;
+    fct_guides_release(env, &bake->solution.guides);
     fct_transport_release(env, &bake->solution.transport);
     fct_links_release(env, &bake->solution.links);
     fct_elements_release(&bake->solution.elements);

@@ -20,13 +20,20 @@
 /* Share of the total above which a lamp has rays of its own. Smaller: more lamps, more rays per receiver.
  * Larger: one visible fraction stands for lamps that differ visibly. */
 #define MAJOR_SHARE .025
-/* Rays per lamp: where the first ones disagree, and at most. */
-#define MIXED_RAYS 16
-#define MAX_RAYS   64
+/* Rays per lamp where the first ones disagree: a multiple of RAY_STEP, at most MAX_RAYS. */
+#define RAY_STEP 8
+#define MAX_RAYS 64
+/* First rays to lamps in doubt, which must find a border that the rays of a neighbour have found. */
+#define DOUBT_RAYS 16
+/* Rays to the minor lamps together if the first ones disagree, at least and at most. */
+#define LEAST_MINOR_RAYS 4
+#define MOST_MINOR_RAYS  16
 /* A lamp above this share of the total gets twice the first rays: a wrong agreement of four would show. */
 #define BRIGHT_SHARE .2
-/* Standard error, as a share of the receiver's light, that needs no more than MIXED_RAYS. */
-#define RAY_ERROR .008
+/* Wanted standard error of a lamp's light as a share of the receiver's light. */
+#define RAY_ERROR .016
+/* The standard error of a visible fraction f from n stratified rays is about .6 sqrt(f (1 - f)) / n^(3/4). */
+#define STRATIFIED .6
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
 #define LARGE_AREA .25
 /* |S| / A above which an emitter counts as flat: it does not shine on itself. */
@@ -46,12 +53,23 @@ typedef struct query {
     const double *point, *normal;
     float origin[3];
     uint64_t seed;
-    uint32_t base_rays;
+    uint32_t base_rays, doubt;
+    fct_sight sight;
     bool fixed;
     double total; /* sum of the lamps' estimates times strength */
     double scale; /* the same, with exact light in place of the estimates of lamps seen so far */
     uint64_t rays;
 } query;
+
+enum { MINOR_SLOT = 31 };
+
+static uint32_t find_slot(const query *q, const fct_lamp *lamp) {
+    return 1u << (lamp - q->lamps->lamps) % MINOR_SLOT;
+}
+
+static void note_sight(query *q, uint32_t slot, bool visible) {
+    *(visible ? &q->sight.open : &q->sight.blocked) |= slot;
+}
 
 static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
     const double *m = lamp->to_world, p[3] = {y.x, y.y, y.z};
@@ -70,31 +88,43 @@ static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
     return !(ray.t_max > 0) || !fct_scene_any_hit(q->scene, &ray, NULL);
 }
 
+/* The number of rays after `sent` ones of which some were blocked. share: the lamp's light over all light. */
+static uint32_t count_wanted_rays(double visible, uint32_t sent, double share) {
+    /* Counts one more ray as half visible, because the variance of few rays is often too small. */
+    const double fraction = (visible * sent + .5) / (sent + 1);
+    const double ratio = STRATIFIED * sqrt(fraction * (1 - fraction)) * share / RAY_ERROR;
+    uint32_t rays = RAY_STEP;
+    while (rays < MAX_RAYS && rays * sqrt(rays) < ratio * ratio) rays += RAY_STEP;
+    return rays;
+}
+
 /* The visible fraction of a lamp whose light is `power` (strength included). */
 static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct_receiver *rec,
                                        const fct_cut *cut, double power) {
     uint64_t seed = fct_hash2(q->seed, lamp->instance);
     double all = 0, seen = 0;
     uint32_t sent = 0;
+    const uint32_t slot = find_slot(q, lamp);
     uint32_t first = !q->fixed && power > BRIGHT_SHARE * q->total ? 2 * q->base_rays : q->base_rays;
+    if (q->doubt & slot) {
+        const uint32_t wanted = count_wanted_rays(.5, 1, power / q->scale);
+        const uint32_t enough = wanted < DOUBT_RAYS ? wanted : DOUBT_RAYS;
+        first = first > enough ? first : enough;
+    }
     for (uint32_t goal = first; sent < goal;) {
         for (; sent < goal; ++sent) {
             double u[2];
             fct_plane_point(sent, seed, u);
             fct_lamp_point point = fct_cut_point(lamp, rec, cut, u[0], u[1]);
             if (point.weight <= 0) continue;
+            const bool visible = point_is_visible(q, lamp, point.y);
             all += point.weight;
-            if (point_is_visible(q, lamp, point.y)) seen += point.weight;
+            if (visible) seen += point.weight;
+            note_sight(q, slot, visible);
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
-        if (!mixed || sent >= MAX_RAYS || q->fixed) break;
-        /* Counts one more ray as half visible, because the variance of few rays is often too small. */
-        double fraction = all > 0 ? (seen / all * sent + .5) / (sent + 1) : .5;
-        double error = sqrt(fraction * (1 - fraction) / sent) * power;
-        if (sent < MIXED_RAYS)
-            goal = MIXED_RAYS;
-        else if (all <= 0 || error > RAY_ERROR * q->scale)
-            goal = MAX_RAYS;
+        if (!mixed || q->fixed) break;
+        goal = count_wanted_rays(all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
     }
     return all > 0 ? seen / all : 0;
 }
@@ -127,6 +157,7 @@ static bool sample_minor_lamps(query *q, double sum, uint32_t count, double all[
             fct_lamp_point point = fct_cut_point(lamp, &rec, cut, u[0], u[1]);
             if (point.weight <= 0) continue;
             bool free = point_is_visible(q, lamp, point.y);
+            note_sight(q, 1u << MINOR_SLOT, free);
             for (int k = 0; k < 3; ++k) {
                 double weight = point.weight * lamp->emission[k] / share;
                 all[k] += weight;
@@ -141,9 +172,15 @@ static bool sample_minor_lamps(query *q, double sum, uint32_t count, double all[
 /* Adds the minor lamps' light times their common visible fraction. */
 static void add_minor_lamps(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
     double all[3], seen[3];
-    bool mixed = sample_minor_lamps(q, sum, q->base_rays, all, seen, cut);
-    if ((mixed || all[0] + all[1] + all[2] <= 0) && q->base_rays < MIXED_RAYS && !q->fixed)
-        sample_minor_lamps(q, sum, MIXED_RAYS, all, seen, cut);
+    bool mixed = q->doubt >> MINOR_SLOT & 1;
+    mixed |= sample_minor_lamps(q, sum, q->base_rays, all, seen, cut);
+    if ((mixed || all[0] + all[1] + all[2] <= 0) && !q->fixed) {
+        /* Rays to different lamps are not stratified: n rays leave a standard error of at most 1/2 / sqrt(n).
+         */
+        const double ratio = .5 * sum / (q->scale * RAY_ERROR);
+        const double wanted = fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
+        if (wanted > q->base_rays) sample_minor_lamps(q, sum, (uint32_t)wanted, all, seen, cut);
+    }
     double grey = all[0] + all[1] + all[2];
     grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
     for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * (all[k] > 0 ? seen[k] / all[k] : grey);
@@ -186,17 +223,19 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
 
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                        double irradiance[3], uint64_t *rays) {
+                        uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays) {
     query q = {.lamps = lamps,
                .scene = scene,
                .point = point,
                .normal = normal,
                .seed = item_seed,
                .base_rays = base_rays & ~FCT_LAMPS_FIXED,
+               .doubt = doubt,
                .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)fct_round(point[k] + offset * normal[k]);
     double open = add_lamps(&q, irradiance);
     if (rays) *rays += q.rays;
+    if (sight) *sight = q.sight;
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
 }
 

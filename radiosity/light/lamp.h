@@ -28,6 +28,15 @@ bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance);
  * mean over many receivers must not be. */
 #define FCT_LAMPS_FIXED 0x80000000u
 
+/* What shadow rays to the lamps met: bit k is for the lamps whose numbers are k modulo 31, bit 31 for the
+ * minor lamps, which share their rays. */
+typedef struct fct_sight {
+    uint32_t open, blocked; /* some ray reached the lamp; something blocked some ray */
+} fct_sight;
+static inline uint32_t fct_sight_mixed(fct_sight s) {
+    return s.open & s.blocked;
+}
+
 /* Irradiance (RGB) of all lamps at a point with a unit normal, without blockers. */
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]);
@@ -35,10 +44,13 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
  * 0: no shadows), 16 if they disagree, and up to 64 if the uncertain part is a large share of the light.
  * Minor lamps share their rays. Equal values of item_seed give equal rays. *rays (may be NULL) grows by the
  * number of rays. Any number of threads may call. Returns the visible fraction over all lamps, weighted by
- * their light; 0 if no lamp lies above the horizon. Four rays may agree by chance and miss a thin shadow: use
- * 16 where a neighbour's fraction differs. */
+ * their light; 0 if no lamp lies above the horizon.
+ *
+ * Few rays may agree by chance and miss a thin shadow. Neighbours tell: *sight (may be NULL) receives what
+ * the rays met. If the sights of a receiver and its neighbours together are mixed for a lamp, and the
+ * receiver's own sight is not, call again with these lamps in doubt: they get at least 16 rays. */
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                        double irradiance[3], uint64_t *rays);
+                        uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays);
 
 #endif

@@ -17,6 +17,8 @@
 #define TURN_REACH .7
 /* An anchor sends rays * (1 + k / 4) rays, with k = log2 of its group's size, at most MOST_DOUBLINGS. */
 #define MOST_DOUBLINGS 8
+/* Relative difference of distances up to which a ray has hit the point at which it aims. */
+#define SAME_POINT 1e-3
 enum { GROUP_GRAIN = 4 }; /* groups per chunk */
 
 typedef struct group {
@@ -33,32 +35,79 @@ typedef struct grouping {
     group *groups, *next;
     uint32_t *scratch;
     fct_anchor *anchors;
+    fct_guide *guides; /* per thread; NULL: none */
     uint64_t *chunk_rays;
 } grouping;
 
-void fct_anchor_gather(const fct_source *source, uint32_t rays, uint64_t seed, fct_anchor *a) {
-    v3 n = v3_load(a->normal), p = v3_mad(v3_load(a->position), a->offset, n);
-    double sum[3] = {0, 0, 0}, inverse = 0;
-    v3 vector[3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+/* The sums of one gather. */
+typedef struct gather_sums {
+    double weight, inverse, light[3];
+    v3 vector[3];
+} gather_sums;
+
+static void add_ray(const fct_source *source, v3 n, v3 d, const fct_found *found, double weight,
+                    gather_sums *sums) {
+    const double lift = weight / fct_max(v3_dot(d, n), LEAST_COSINE);
+    sums->weight += weight;
+    if (found->distance > 0) sums->inverse += weight / fct_min(found->distance, source->longest);
+    for (int c = 0; c < 3; ++c) {
+        sums->light[c] += weight * found->radiosity[c];
+        sums->vector[c] = v3_mad(sums->vector[c], lift * found->radiosity[c], d);
+    }
+}
+
+static double weigh_ray(const fct_guide *guide, const fct_found *found, double cosine, uint32_t cosines,
+                        uint32_t aimed) {
+    const double density = aimed && found->leaf != FCT_NONE ? fct_guide_density(guide, found->leaf) : 0;
+    if (density <= 0) return 1. / cosines;
+    /* p_c and p_g times pi r^2. */
+    const double p = cosine * found->cosine, q = FCT_PI * found->distance * found->distance * density;
+    return p > 0 ? p / (cosines * p + aimed * q) : 0;
+}
+
+/* Sends a ray to a point of a source. */
+static void aim_ray(const fct_source *source, const fct_guide *guide, v3 n, const float origin[3], double t,
+                    const double place[2], uint32_t cosines, uint32_t aimed, gather_sums *sums) {
+    const uint32_t leaf = fct_guide_pick(guide, &t);
+    fct_element_point point;
+    float direction[3];
+    fct_element_sample(source->set, leaf, t, place[0], place[1], &point);
+    const v3 way = v3_sub(v3_load(point.position), v3_load(origin));
+    const double distance = v3_norm(way);
+    const v3 d = v3_scale(way, 1 / distance);
+    const double cosine = v3_dot(d, n);
+    if (!(distance > 0 && cosine > 0 && v3_dot(d, v3_load(point.normal)) < 0)) return;
+    v3_store(direction, d);
+    const fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
+    if (found.leaf != leaf || fabs(found.distance - distance) > SAME_POINT * distance) return;
+    add_ray(source, n, d, &found, weigh_ray(guide, &found, cosine, cosines, aimed), sums);
+}
+
+void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
+                       fct_anchor *a) {
+    const v3 n = v3_load(a->normal);
+    const uint32_t aimed = guide ? rays / 3 : 0, cosines = rays - aimed;
+    gather_sums sums = {0};
     float origin[3], direction[3];
-    v3_store(origin, p);
-    for (uint32_t k = 0; k < rays; ++k) {
+    v3_store(origin, v3_mad(v3_load(a->position), a->offset, n));
+    for (uint32_t k = 0; k < cosines; ++k) {
         double plane[2];
         fct_plane_point(k, seed, plane);
-        v3 d = fct_cosine_direction(n, plane[0], plane[1]);
+        const v3 d = fct_cosine_direction(n, plane[0], plane[1]);
         v3_store(direction, d);
-        fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
-        if (found.distance > 0) inverse += 1 / fct_min(found.distance, source->longest);
-        double weight = 1 / fct_max(v3_dot(d, n), LEAST_COSINE);
-        for (int c = 0; c < 3; ++c) {
-            sum[c] += found.radiosity[c];
-            vector[c] = v3_mad(vector[c], found.radiosity[c] * weight, d);
-        }
+        const fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
+        add_ray(source, n, d, &found, weigh_ray(guide, &found, v3_dot(d, n), cosines, aimed), &sums);
     }
-    a->reach = inverse > 0 ? (float)(rays / inverse) : INFINITY;
+    for (uint32_t k = 0; k < aimed; ++k) {
+        double plane[2];
+        fct_plane_point(k, fct_hash(seed), plane);
+        const double t = (k + fct_uniform(fct_hash2(seed, k))) / aimed;
+        aim_ray(source, guide, n, origin, t, plane, cosines, aimed, &sums);
+    }
+    a->reach = sums.inverse > 0 ? (float)(sums.weight / sums.inverse) : INFINITY;
     for (int c = 0; c < 3; ++c) {
-        a->irradiance[c] = (float)(sum[c] / rays);
-        v3_store(a->gradient[c], v3_scale(vector[c], 1. / rays));
+        a->irradiance[c] = (float)(sums.light[c] / sums.weight);
+        v3_store(a->gradient[c], v3_scale(sums.vector[c], 1 / sums.weight));
     }
 }
 
@@ -103,7 +152,7 @@ static bool group_is_too_wide(const grouping *g, const group *k, const fct_ancho
 }
 
 /* Places the group's anchor on its middle vertex and gathers. Returns the number of rays. */
-static uint32_t gather_group(const grouping *g, group *k) {
+static uint32_t gather_group(const grouping *g, fct_guide *guide, group *k) {
     const fct_surface *s = g->surface;
     fct_anchor *a = &g->anchors[k->anchor];
     uint32_t size = k->end - k->begin, v = find_middle_vertex(g, k), doublings = 0;
@@ -112,7 +161,13 @@ static uint32_t gather_group(const grouping *g, group *k) {
     a->offset = s->offsets[v];
     while (doublings < MOST_DOUBLINGS && size >> doublings > 1) ++doublings;
     uint32_t count = g->def->rays + g->def->rays * doublings / 4;
-    fct_anchor_gather(g->source, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count), a);
+    if (guide) {
+        const v3 p = v3_load(a->position);
+        const uint32_t leaf =
+            fct_elements_locate_point(g->source->set, g->def->instance, g->def->side < 0, s->places[v], p);
+        if (!fct_guide_aim(guide, leaf, p, v3_load(a->normal))) guide = NULL;
+    }
+    fct_anchor_gather(g->source, guide, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count), a);
     double least = SHORTEST_REACH * sqrt(s->areas[v]);
     a->reach = (float)fct_min(fct_max(a->reach, least), g->source->longest);
     k->halve = group_is_too_wide(g, k, a, v);
@@ -121,8 +176,8 @@ static uint32_t gather_group(const grouping *g, group *k) {
 
 static void gather_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     grouping *g = user;
-    (void)thread;
-    for (size_t i = begin; i < end; ++i) g->chunk_rays[chunk] += gather_group(g, &g->groups[i]);
+    fct_guide *guide = g->guides ? &g->guides[thread] : NULL;
+    for (size_t i = begin; i < end; ++i) g->chunk_rays[chunk] += gather_group(g, guide, &g->groups[i]);
 }
 
 /* Coordinate 0..2 of the sample point, or 3..5 of the normal. */
@@ -215,6 +270,17 @@ static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *ou
     return out->axes ? FCT_OK : fct_fail_memory(env, "anchors");
 }
 
+/* One guide per thread, if the source has guides. */
+static fct_result make_guides(const fct_env *env, grouping *g) {
+    const uint32_t threads = fct_env_threads(env);
+    if (!g->source->guides) return FCT_OK;
+    g->guides = fct_allocate_zero(env, threads, sizeof *g->guides);
+    fct_result result = g->guides ? FCT_OK : fct_fail_memory(env, "anchors");
+    for (uint32_t t = 0; t < threads && result == FCT_OK; ++t)
+        result = fct_guide_create(g->source->guides, &g->guides[t]);
+    return result;
+}
+
 fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
                               const fct_anchors_def *def, fct_anchors *out) {
     *out = (fct_anchors){0};
@@ -226,7 +292,10 @@ fct_result fct_anchors_create(const fct_env *env, const fct_source *source, cons
                                 FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "anchors");
     if (result != FCT_OK) return result;
-    result = place_anchors(env, &g, out);
+    result = make_guides(env, &g);
+    if (result == FCT_OK) result = place_anchors(env, &g, out);
+    for (uint32_t t = 0; g.guides && t < fct_env_threads(env); ++t) fct_guide_release(env, &g.guides[t]);
+    fct_release(env, g.guides);
     if (result == FCT_OK) {
         double inverse = 0;
         for (size_t c = 0; c < chunks; ++c) out->rays += g.chunk_rays[c];

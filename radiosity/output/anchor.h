@@ -10,21 +10,23 @@
 #define FCT_RADIOSITY_ANCHOR_H
 
 #include "radiosity/output/anchor_tree.h"
-#include "radiosity/solve/element.h"
+#include "radiosity/solve/guide.h"
 #include "radiosity/surface/surface.h"
 
 /* The stored solution that gather rays look up. */
 typedef struct fct_source {
     const fct_elements *set;
-    const float *stored; /* as in fct_transport */
-    double longest;      /* hits farther away, and misses, count as if at this distance; also the longest
-                            reach. One far hit makes no wall smooth */
+    const fct_guides *guides; /* NULL: cosine-distributed rays alone */
+    const float *stored;      /* as in fct_transport */
+    double longest;           /* hits farther away, and misses, count as if at this distance; also the longest
+                                 reach. One far hit makes no wall smooth */
 } fct_source;
 
 typedef struct fct_anchors_def {
-    uint32_t rays;    /* least number per anchor; anchors of large groups send up to three times as many */
-    double tolerance; /* of distance / reach + sqrt(1 - n . n'), within a group */
-    double side;      /* 1: front of the surface; -1: back */
+    uint32_t rays;     /* least number per anchor; anchors of large groups send up to three times as many */
+    double tolerance;  /* of distance / reach + sqrt(1 - n . n'), within a group */
+    double side;       /* 1: front of the surface; -1: back */
+    uint32_t instance; /* of the surface */
     const uint8_t *covered; /* per vertex: it needs no light. NULL: none is covered */
     const float *nearest;   /* per vertex: distance to some surface in front of it, which limits how far away
                                its anchor may be. NULL: infinity */
@@ -35,8 +37,14 @@ typedef struct fct_anchors_def {
 fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
                               const fct_anchors_def *def, fct_anchors *out);
 
-/* Sends `rays` cosine-distributed rays from position + offset * normal. Sets reach, irradiance and gradient:
- *   E = mean b,  gradient = mean b d / max(d . n, .15)   over the rays' directions d. */
-void fct_anchor_gather(const fct_source *source, uint32_t rays, uint64_t seed, fct_anchor *anchor);
+/* Sends `rays` rays from position + offset * normal. Sets reach, irradiance and gradient as weighted means
+ * over the rays' directions d, with hits at distance r whose surface has the cosine c' to the ray: E = sum w
+ * b / sum w,  gradient = sum w b d / max(d . n, .15) / sum w,  1 / reach = sum w / r / sum w. Without a guide
+ * all rays are cosine-distributed and w = 1. With an aimed guide, a third of them (rounded down) go to points
+ * of its sources, with the density p_g per area; p_c = d . n c' / (pi r^2) is that of the others, and w = p_c
+ * / (n_c p_c + n_g p_g), the balance heuristic of Veach and Guibas. A ray that does not reach its point has w
+ * = 0. The sum of all w has the mean 1; division by it keeps rows at 1, so a furnace is exact. */
+void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
+                       fct_anchor *anchor);
 
 #endif

@@ -20,7 +20,6 @@
 #include "radiosity/surface/cover.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/tessellate.h"
-#include "scene/transform.h"
 
 /* Rounds of splits at shadow borders: each halves the width of a border's blur. */
 enum { BORDER_ROUNDS = 4 };
@@ -30,11 +29,11 @@ enum { BORDER_ROUNDS = 4 };
  * values split edges because of noise. */
 #define BORDER_SHARE .1
 #define BORDER_LEVEL .04
-/* Rays per anchor and per lamp at the default error, and first rays per lamp at the borders of shadows: four
- * rays that agree miss a narrow penumbra here and find it there, so that the border looks torn. */
-enum { ANCHOR_RAYS = 64, LAMP_RAYS = 4, BORDER_RAYS = 16 };
-/* Difference of the direct light of two neighbours over its sum from which on a shadow ends near them. */
-#define SHADOW_SHARE .03
+/* Rays per anchor, and first rays per lamp, at the default error. Two rays that agree often miss a penumbra,
+ * but those of a vertex and its neighbours together seldom do. */
+enum { ANCHOR_RAYS = 32, LAMP_RAYS = 2 };
+/* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
+enum { DOUBT_ROUNDS = 2 };
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
  * length of the edge that is cut. */
 #define CUT_WIDTH (1. / 256)
@@ -55,8 +54,9 @@ typedef struct lighting {
     float *direct, *indirect; /* irradiance, per vertex x 3; `indirect` holds all of it with FCT_FINAL_NONE */
     uint8_t *covered;         /* per vertex */
     uint8_t *cut;             /* per vertex: it was made to cut an edge at the border of a cover */
-    uint8_t *border;          /* per vertex: a shadow ends near it (1), and its direct light takes that into
-                                 account (2) */
+    fct_sight *sights;        /* per vertex */
+    uint32_t *doubt;          /* per vertex: lamps of which it or a neighbour sees a part */
+    uint8_t *again;           /* per vertex: it needs more rays */
     float *nearest;           /* per vertex: see fct_point_is_covered */
     uint32_t known;           /* lower vertices have room in these arrays */
     uint32_t cut_first;       /* of the vertices before the border of a cover */
@@ -64,39 +64,23 @@ typedef struct lighting {
     uint64_t *chunk_rays;
 } lighting;
 
-/* Barycentrics of a point's projection onto the face at `place`. Sample points lie on faces with an area. */
-static void project_to_face(const fct_solution *s, uint32_t instance, uint32_t place, const float point[3],
-                            float uv[2]) {
-    const fct_instance *in = &s->elements.view.instances[instance];
-    fct_tree_view t = fct_tree_get(s->elements.view.models[in->model].tree);
-    v3 p[3];
-    for (size_t k = 0; k < 3; ++k) {
-        size_t vertex = t.triangles[3 * (size_t)place + k];
-        p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * vertex));
-    }
-    v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(v3_load(point), p[0]), n = v3_cross(e, f);
-    double scale = v3_norm2(n), u = v3_dot(v3_cross(d, f), n) / scale, v = v3_dot(v3_cross(e, d), n) / scale;
-    uv[0] = (float)u, uv[1] = (float)v;
-}
-
 /* Irradiance over the links alone (FCT_FINAL_NONE). */
 static void gather_links(const lighting *l, size_t v, const float normal[3], double irradiance[3]) {
     const fct_solution *s = l->s;
     const float *point = l->surface->sample_points + 3 * v;
-    uint32_t place = l->surface->places[v];
-    float uv[2];
-    project_to_face(s, l->instance, place, point, uv);
-    uint32_t leaf = fct_elements_locate(&s->elements, l->instance, l->back, place, uv[0], uv[1]);
+    const uint32_t leaf =
+        fct_elements_locate_point(&s->elements, l->instance, l->back, l->surface->places[v], v3_load(point));
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-static void gather_lamps(const lighting *l, size_t v, uint32_t first_rays, const float normal[3],
-                         double irradiance[3], uint64_t *rays) {
+static void gather_lamps(const lighting *l, size_t v, const float normal[3], double irradiance[3],
+                         uint64_t *rays) {
     const fct_solution *s = l->s;
     const fct_surface *f = l->surface;
-    uint32_t rays_each = fct_solution_lamp_rays(s, first_rays);
+    uint32_t rays_each = fct_solution_lamp_rays(s, LAMP_RAYS);
     fct_solution_direct(s, f->sample_points + 3 * v, normal, f->offsets[v],
-                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, irradiance, rays);
+                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, l->doubt[v], &l->sights[v],
+                        irradiance, rays);
 }
 
 /* The normal on the side that receives the light. */
@@ -136,7 +120,7 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
             if (l->s->def.final == FCT_FINAL_NONE) {
                 gather_links(l, v, normal, indirect);
             } else {
-                gather_lamps(l, v, LAMP_RAYS, normal, direct, &l->chunk_rays[chunk]);
+                gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
                 fct_anchors_irradiance(l->anchors, &l->s->elements, f->sample_points + 3 * v, normal,
                                        f->offsets[v], f->flat[v], indirect, &l->chunk_rays[chunk]);
             }
@@ -146,32 +130,32 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-static void border_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void doubt_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     lighting *l = user;
     (void)thread;
     for (size_t v = begin; v < end; ++v) {
-        if (l->border[v] != 1) continue;
+        if (!l->again[v]) continue;
         float normal[3];
         double direct[3];
         load_normal(l, v, normal);
-        gather_lamps(l, v, BORDER_RAYS, normal, direct, &l->chunk_rays[chunk]);
+        gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
         for (size_t c = 0; c < 3; ++c) l->direct[3 * v + c] = (float)direct[c];
-        l->border[v] = 2;
     }
 }
 
-/* Sets the colours of the vertices from `first` on. A vertex without a surface is black. */
-static void color_vertices(const lighting *l, uint32_t first) {
-    const fct_surface *f = l->surface;
-    for (size_t v = first; v < f->mesh.vertex_count; ++v) {
-        float *color = f->mesh.colors + 3 * v;
-        double irradiance[3];
-        color[0] = color[1] = color[2] = 0;
-        if (!has_surface(l, v)) continue;
-        for (size_t c = 0; c < 3; ++c)
-            irradiance[c] = (double)l->direct[3 * v + c] + (double)l->indirect[3 * v + c];
-        fct_solution_radiosity(l->s, l->instance, irradiance, color);
-    }
+/* A vertex without a surface is black. */
+static void color_vertex(const lighting *l, size_t v, float color[3]) {
+    double irradiance[3];
+    color[0] = color[1] = color[2] = 0;
+    if (!has_surface(l, v)) return;
+    for (size_t c = 0; c < 3; ++c)
+        irradiance[c] = (double)l->direct[3 * v + c] + (double)l->indirect[3 * v + c];
+    fct_solution_radiosity(l->s, l->instance, irradiance, color);
+}
+
+static void color_vertices(const lighting *l) {
+    const fct_mesh *m = &l->surface->mesh;
+    for (size_t v = 0; v < m->vertex_count; ++v) color_vertex(l, v, m->colors + 3 * v);
 }
 
 typedef void run_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
@@ -201,14 +185,18 @@ static fct_result grow_light(lighting *l, bool covered, bool cut) {
                   {(void **)&l->nearest, sizeof *l->nearest},
                   {(void **)&l->covered, 1},
                   {(void **)&l->cut, 1},
-                  {(void **)&l->border, 1}};
+                  {(void **)&l->again, 1},
+                  {(void **)&l->doubt, sizeof *l->doubt},
+                  {(void **)&l->sights, sizeof *l->sights}};
     fct_result result = FCT_OK;
     for (size_t i = 0; i < FCT_LENGTH(arrays) && result == FCT_OK; ++i) {
         size_t capacity = l->known;
         result = fct_grow(env, arrays[i].array, &capacity, count, arrays[i].size);
     }
-    for (size_t v = l->known; result == FCT_OK && v < count; ++v)
-        l->covered[v] = covered, l->cut[v] = cut, l->border[v] = 0, l->nearest[v] = INFINITY;
+    for (size_t v = l->known; result == FCT_OK && v < count; ++v) {
+        l->covered[v] = covered, l->cut[v] = cut, l->nearest[v] = INFINITY;
+        l->again[v] = 0, l->doubt[v] = 0, l->sights[v] = (fct_sight){0};
+    }
     l->known = (uint32_t)count;
     return result;
 }
@@ -219,31 +207,39 @@ static fct_result cover_vertices(lighting *l, uint64_t *rays) {
     return result == FCT_OK ? run_vertices(l, "covers", l->first, cover_chunk, rays) : result;
 }
 
-/* Marks lit vertices on whose edges a shadow ends. */
-static void mark_borders(lighting *l) {
+/* Finds the vertices that need more rays: all rays of such a vertex to a lamp agree, but those of a neighbour
+ * do not agree with them. Returns their number. */
+static fct_result find_doubt(lighting *l, uint32_t *count) {
     const fct_mesh *m = &l->surface->mesh;
+    *count = 0;
+    fct_sight *around = fct_allocate_zero(l->s->env, m->vertex_count, sizeof *around);
+    if (!around) return fct_fail_memory(l->s->env, "the output");
     for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
         const uint32_t a = m->triangles[c], b = m->triangles[c % 3 == 2 ? c - 2 : c + 1];
-        double difference = 0, sum = 0;
-        if (!has_surface(l, a) || !has_surface(l, b) || l->covered[a] || l->covered[b]) continue;
-        for (size_t k = 0; k < 3; ++k) {
-            const double x = l->direct[3 * (size_t)a + k], y = l->direct[3 * (size_t)b + k];
-            difference += fabs(x - y), sum += x + y;
-        }
-        if (difference <= SHADOW_SHARE * sum) continue;
-        if (!l->border[a]) l->border[a] = 1;
-        if (!l->border[b]) l->border[b] = 1;
+        around[a].open |= l->sights[b].open, around[a].blocked |= l->sights[b].blocked;
+        around[b].open |= l->sights[a].open, around[b].blocked |= l->sights[a].blocked;
     }
+    for (size_t v = 0; v < m->vertex_count; ++v) {
+        const fct_sight own = l->sights[v];
+        const uint32_t mixed = (own.open | around[v].open) & (own.blocked | around[v].blocked);
+        const uint32_t more = mixed & (own.open | own.blocked) & ~fct_sight_mixed(own) & ~l->doubt[v];
+        l->doubt[v] |= more;
+        l->again[v] = more != 0;
+        *count += more != 0;
+    }
+    fct_release(l->s->env, around);
+    return FCT_OK;
 }
 
 /* Lights the vertices from l->first on, and those at borders of shadows once more. */
 static fct_result light_vertices(lighting *l, uint64_t *rays) {
     fct_result result = run_vertices(l, "vertices", l->first, light_chunk, rays);
-    if (result == FCT_OK && l->s->def.final != FCT_FINAL_NONE) {
-        mark_borders(l);
-        result = run_vertices(l, "vertices", 0, border_chunk, rays);
+    uint32_t count = 1;
+    for (int round = 0; round < DOUBT_ROUNDS && count > 0 && result == FCT_OK; ++round) {
+        result = find_doubt(l, &count);
+        if (result == FCT_OK && count > 0) result = run_vertices(l, "vertices", 0, doubt_chunk, rays);
     }
-    if (result == FCT_OK) color_vertices(l, 0);
+    if (result == FCT_OK) color_vertices(l);
     l->first = l->surface->mesh.vertex_count;
     return result;
 }
@@ -254,6 +250,7 @@ static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
     const fct_surface *f = l->surface;
     const uint32_t from = l->covered[a] ? b : a, to = l->covered[a] ? a : b;
     if (l->covered[a] == l->covered[b] || l->cut[to]) return 0; /* the border is beside a covered cut */
+    if (a < l->first && b < l->first) return 0;                 /* an earlier round looked at this edge */
     if (!has_surface(l, a) || !has_surface(l, b)) return 0;
     const v3 p = v3_load(f->mesh.positions + 3 * (size_t)from);
     const v3 way = v3_sub(v3_load(f->mesh.positions + 3 * (size_t)to), p);
@@ -305,7 +302,7 @@ static fct_result finish_colors(const lighting *l) {
     fct_result result = FCT_OK;
     if (l->s->def.final != FCT_FINAL_NONE)
         result = fct_light_smooth(env, l->surface, l->covered, l->indirect);
-    if (result == FCT_OK) color_vertices(l, 0);
+    if (result == FCT_OK) color_vertices(l);
     return result;
 }
 
@@ -352,6 +349,7 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : rays,
                            .tolerance = tolerance / sqrt(fct_max(s->fineness, .5)),
                            .side = l->back ? -1 : 1,
+                           .instance = l->instance,
                            .covered = l->covered,
                            .nearest = l->nearest,
                            .seed = fct_hash2(s->def.seed, l->instance)};
@@ -387,7 +385,8 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
         if (back) fct_mesh_turn_over(out);
     }
     fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
-    fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.border);
+    fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.again);
+    fct_release(env, l.doubt), fct_release(env, l.sights);
     fct_anchors_release(env, &anchors);
     fct_surface_release(env, &surface);
     return result;

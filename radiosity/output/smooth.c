@@ -7,8 +7,8 @@
 #include "base/env.h"
 
 /* Difference of two neighbours over the sum of their light that may be noise of the rays. Larger values blur
- * shadow borders, smaller ones leave the noise. */
-#define NOISE .04
+ * contacts, smaller ones leave the noise of anchors that are close together. */
+#define NOISE .1
 /* Passes: each reaches one edge further. */
 enum { PASSES = 2 };
 

@@ -15,6 +15,7 @@ typedef struct fct_solution {
     fct_elements elements;
     fct_links links;
     fct_transport transport;
+    fct_guides guides;
     double max_edge;       /* def.max_edge, or the default of the scene */
     double fineness;       /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
     double mean_radiosity; /* rho E over the scene's area and channels: the scale of visible differences */
@@ -23,9 +24,11 @@ typedef struct fct_solution {
 /* Rays per lamp: `least` at the default error and above, more for smaller errors, at most 64. */
 uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least);
 
-/* Direct irradiance (RGB) at a point with a unit normal; 0 for def.indirect_only. *rays grows. */
+/* Direct irradiance (RGB) at a point with a unit normal; 0 for def.indirect_only. doubt, *sight (may be
+ * NULL): as in fct_lamps_direct. *rays grows. */
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
-                         uint64_t seed, uint32_t rays_each, double irradiance[3], uint64_t *rays);
+                         uint64_t seed, uint32_t rays_each, uint32_t doubt, fct_sight *sight,
+                         double irradiance[3], uint64_t *rays);
 
 /* The stored solution for gathers. */
 fct_source fct_solution_source(const fct_solution *s);

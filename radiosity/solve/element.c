@@ -436,6 +436,21 @@ uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool ba
     }
 }
 
+uint32_t fct_elements_locate_point(const fct_elements *set, uint32_t instance, bool back, uint32_t place,
+                                   v3 point) {
+    const fct_instance *in = &set->view.instances[instance];
+    const fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
+    v3 p[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const size_t vertex = t.triangles[3 * (size_t)place + k];
+        p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * vertex));
+    }
+    const v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(point, p[0]), n = v3_cross(e, f);
+    const double scale = v3_norm2(n);
+    const double u = v3_dot(v3_cross(d, f), n) / scale, v = v3_dot(v3_cross(e, d), n) / scale;
+    return fct_elements_locate(set, instance, back, place, (float)u, (float)v);
+}
+
 void fct_elements_pull(fct_elements *set) {
     /* Descending order visits children before parents within surfaces and within volumes. Surfaces go first:
      * volumes have smaller numbers than the roots below them. */

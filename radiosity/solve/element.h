@@ -101,6 +101,9 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
  * material. */
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,
                              float v);
+/* The same for the projection of a world point onto the face, which has an area. */
+uint32_t fct_elements_locate_point(const fct_elements *set, uint32_t instance, bool back, uint32_t place,
+                                   v3 point);
 /* Sets radiosity and power of all inner elements from their leaves. */
 void fct_elements_pull(fct_elements *set);
 /* Size of the hierarchies' pages that were read so far, bytes. */

@@ -149,3 +149,21 @@ void fct_links_irradiance(const fct_elements *set, const fct_links *links, uint3
     irradiance[0] = irradiance[1] = irradiance[2] = 0;
     gather_links(set, links, leaf, &site, irradiance);
 }
+
+uint32_t fct_links_factors(const fct_elements *set, const fct_links *links, uint32_t leaf, v3 point,
+                           v3 normal, uint32_t *sources, double *factors) {
+    const gather_site site = {.point = point, .normal = normal};
+    uint32_t count = 0, id = leaf;
+    while (id != FCT_NONE && id >= links->element_count) id = set->items[id].parent;
+    for (; id != FCT_NONE; id = set->items[id].parent)
+        for (uint32_t k = links->first[id]; k < links->first[id + 1]; ++k) {
+            double unused[3] = {0, 0, 0};
+            fct_link link = links->items[k];
+            link.weight = (link.weight * (float)link.rays + 1) / (float)(link.rays + 1);
+            if (link.near) link.weight = links->items[k].weight;
+            if (link.rays == 0) link.rays = 1;
+            factors[count] = add_link(set, &link, &site, unused);
+            sources[count++] = links->items[k].source;
+        }
+    return count;
+}

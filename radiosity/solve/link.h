@@ -43,4 +43,9 @@ fct_result fct_links_solve(fct_elements *set, fct_links *links, double tolerance
 void fct_links_irradiance(const fct_elements *set, const fct_links *links, uint32_t leaf, v3 point, v3 normal,
                           double irradiance[3]);
 
+/* The links of a leaf and of its ancestors at such a point: their sources, and the form factors to these
+ * (visibility included). Returns their number; the arrays have room for all of them. */
+uint32_t fct_links_factors(const fct_elements *set, const fct_links *links, uint32_t leaf, v3 point,
+                           v3 normal, uint32_t *sources, double *factors);
+
 #endif

@@ -33,12 +33,12 @@ fct_found fct_transport_look(const fct_elements *set, const float *stored, const
     memcpy(ray.direction, direction, sizeof ray.direction);
     fct_scene_hit hit;
     if (!fct_scene_light_hit(set->scene, &ray, &hit, NULL))
-        return (fct_found){black, FCT_NONE, INFINITY, false};
-    bool back =
-        direction[0] * hit.normal[0] + direction[1] * hit.normal[1] + direction[2] * hit.normal[2] > 0;
-    uint32_t leaf = fct_elements_locate(set, hit.instance, back, hit.place, hit.u, hit.v);
-    if (leaf == FCT_NONE) return (fct_found){black, FCT_NONE, hit.t, true};
-    return (fct_found){stored + 3 * (size_t)leaf, leaf, hit.t, false};
+        return (fct_found){.radiosity = black, .leaf = FCT_NONE, .distance = INFINITY};
+    double cosine = v3_dot(v3_load(direction), v3_load(hit.normal));
+    uint32_t leaf = fct_elements_locate(set, hit.instance, cosine > 0, hit.place, hit.u, hit.v);
+    if (leaf == FCT_NONE)
+        return (fct_found){.radiosity = black, .leaf = FCT_NONE, .distance = hit.t, .black = true};
+    return (fct_found){stored + 3 * (size_t)leaf, leaf, hit.t, fabs(cosine), false};
 }
 
 typedef struct gathering {
@@ -69,7 +69,7 @@ static void sample_direct(const gathering *g, uint32_t id, uint64_t fresh, doubl
         double x[3], n[3];
         for (int c = 0; c < 3; ++c) x[c] = p->position[c], n[c] = p->normal[c];
         fct_lamps_direct(g->lamps, g->set->scene, x, n, p->offset,
-                         fct_hash3(g->seed + fresh, id, (uint64_t)k), DIRECT_RAYS | FCT_LAMPS_FIXED,
+                         fct_hash3(g->seed + fresh, id, (uint64_t)k), DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL,
                          irradiance[k], rays);
     }
 }

@@ -43,6 +43,7 @@ typedef struct fct_found {
     const float *radiosity; /* 3 floats, never NULL */
     uint32_t leaf;          /* FCT_NONE: no hit, or a black back */
     double distance;        /* infinity on a miss */
+    double cosine;          /* of the hit surface's normal with the way back */
     bool black;             /* the back of a one-sided material */
 } fct_found;
 /* Traces a ray and looks up the stored radiosity of the leaf that it hits. */

@@ -109,6 +109,7 @@ static fct_solution solve_by_steps(const fct_scene *scene, const fct_bake_def *d
 }
 
 static void release_solution(fct_solution *s) {
+    fct_guides_release(&plain, &s->guides);
     fct_transport_release(&plain, &s->transport);
     fct_links_release(&plain, &s->links);
     fct_elements_release(&s->elements);
@@ -123,9 +124,12 @@ typedef struct side {
     fct_surface f;
     fct_anchors anchors;
     float *direct, *indirect,
-        *nearest;                     /* per vertex: irradiance x 3 each, distance of the test of the cover */
-    uint8_t *covered, *made, *border; /* made: by a cut; border: a shadow ends near it */
-    uint32_t known, cut;              /* lower vertices have these; are older than the cuts before covers */
+        *nearest;            /* per vertex: irradiance x 3 each, distance of the test of the cover */
+    uint8_t *covered, *made; /* made: by a cut */
+    uint32_t *doubt;         /* per vertex: lamps of which it and its neighbours see different parts */
+    fct_sight *sights;       /* per vertex */
+    uint32_t known, cut,
+        lit; /* lower vertices have these; are older than the cuts before covers; have light */
     uint64_t rays;
     int borders, covers, shadows;
 } side;
@@ -165,9 +169,12 @@ static void grow_side(side *x, bool covered, bool made) {
     const size_t count = x->f.mesh.vertex_count;
     x->direct = realloc(x->direct, 12 * count), x->indirect = realloc(x->indirect, 12 * count);
     x->nearest = realloc(x->nearest, 4 * count), x->covered = realloc(x->covered, count);
-    x->made = realloc(x->made, count), x->border = realloc(x->border, count);
-    for (size_t v = x->known; v < count; ++v)
-        x->nearest[v] = INFINITY, x->covered[v] = covered, x->made[v] = made, x->border[v] = 0;
+    x->made = realloc(x->made, count), x->doubt = realloc(x->doubt, 4 * count);
+    x->sights = realloc(x->sights, count * sizeof *x->sights);
+    for (size_t v = x->known; v < count; ++v) {
+        x->nearest[v] = INFINITY, x->covered[v] = covered, x->made[v] = made, x->doubt[v] = 0;
+        x->sights[v] = (fct_sight){0, 0};
+    }
     x->known = (uint32_t)count;
 }
 
@@ -189,7 +196,7 @@ static void cover_by_steps(side *x) {
 static double find_border(void *user, uint32_t a, uint32_t b) {
     side *x = user;
     const uint32_t from = x->covered[a] ? b : a, to = x->covered[a] ? a : b;
-    if (x->covered[a] == x->covered[b] || x->made[to]) return 0;
+    if (x->covered[a] == x->covered[b] || x->made[to] || (a < x->lit && b < x->lit)) return 0;
     const float *p = x->f.mesh.positions + 3 * (size_t)from, *q = x->f.mesh.positions + 3 * (size_t)to;
     double low = 0, high = 1;
     while (high - low > 1 / 256.) {
@@ -223,8 +230,8 @@ static void cut_by_steps(side *x) {
     grow_side(x, true, true);
 }
 
-/* Direct irradiance of a vertex from `least` rays per lamp or more. */
-static void light_directly(side *x, uint32_t v, double least, double e[3]) {
+/* Direct irradiance of a vertex from two rays per lamp or more. */
+static void light_directly(side *x, uint32_t v, double e[3]) {
     const fct_solution *s = x->s;
     const float *point = x->f.sample_points + 3 * (size_t)v;
     const v3 n = find_normal(x, v);
@@ -232,31 +239,32 @@ static void light_directly(side *x, uint32_t v, double least, double e[3]) {
     for (int c = 0; c < 3; ++c) e[c] = 0;
     if (s->def.indirect_only) return;
     fct_lamps_direct(s->lamps, s->scene, p, normal, x->f.offsets[v],
-                     fct_hash3(s->def.seed + 1, x->instance, v),
-                     (uint32_t)fmin(fmax(least * s->fineness, least), 64), e, &x->rays);
+                     fct_hash3(s->def.seed + 1, x->instance, v), (uint32_t)fmin(fmax(2 * s->fineness, 2), 64),
+                     x->doubt[v], &x->sights[v], e, &x->rays);
 }
 
-/* Vertices on whose edges direct light differs by over 3 % of its sum take it from four times the rays, once.
- */
-static void light_borders(side *x) {
+/* Twice: a vertex takes more rays to the lamps that it has looked at with rays that agree, if those of a
+ * neighbour disagree with them; once per lamp. */
+static void settle_doubts(side *x) {
     const fct_mesh *m = &x->f.mesh;
-    for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
-        const uint32_t ends[2] = {m->triangles[c], m->triangles[c % 3 == 2 ? c - 2 : c + 1]};
-        double difference = 0, sum = 0;
-        for (size_t k = 0; k < 3; ++k) {
-            double y = x->direct[3 * (size_t)ends[0] + k], z = x->direct[3 * (size_t)ends[1] + k];
-            difference += fabs(y - z), sum += y + z;
+    for (int round = 0; round < 2; ++round) {
+        uint32_t *more = calloc(m->vertex_count, sizeof *more);
+        for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c)
+            for (int turn = 0; turn < 2; ++turn) {
+                const uint32_t next = m->triangles[c % 3 == 2 ? c - 2 : c + 1];
+                const uint32_t v = turn ? next : m->triangles[c], w = turn ? m->triangles[c] : next;
+                const fct_sight a = x->sights[v], b = x->sights[w];
+                more[v] |= (a.open & ~a.blocked & b.blocked) | (a.blocked & ~a.open & b.open);
+            }
+        for (uint32_t v = 0; v < m->vertex_count; ++v) {
+            double e[3];
+            if ((more[v] & ~x->doubt[v]) == 0) continue;
+            x->doubt[v] |= more[v];
+            light_directly(x, v, e);
+            for (size_t k = 0; k < 3; ++k) x->direct[3 * (size_t)v + k] = (float)e[k];
+            ++x->shadows;
         }
-        for (int k = 0; k < 2; ++k)
-            if (difference > .03 * sum && !x->covered[ends[0]] && !x->covered[ends[1]] && !x->border[ends[k]])
-                x->border[ends[k]] = 1;
-    }
-    for (uint32_t v = 0; v < m->vertex_count; ++v) {
-        double e[3];
-        if (x->border[v] != 1) continue;
-        light_directly(x, v, 16, e);
-        for (size_t k = 0; k < 3; ++k) x->direct[3 * (size_t)v + k] = (float)e[k];
-        x->border[v] = 2, ++x->shadows;
+        free(more);
     }
 }
 
@@ -279,14 +287,15 @@ static void light_by_steps(side *x, uint32_t first) {
             uint32_t leaf = find_leaf(x, x->f.places[v], v3_load(point));
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), indirect);
         } else if (!x->covered[v]) {
-            light_directly(x, v, 4, e);
+            light_directly(x, v, e);
             fct_anchors_irradiance(&x->anchors, &s->elements, point, normal, x->f.offsets[v], x->f.flat[v],
                                    indirect, &x->rays);
         }
         for (size_t c = 0; c < 3; ++c)
             x->direct[3 * (size_t)v + c] = (float)e[c], x->indirect[3 * (size_t)v + c] = (float)indirect[c];
     }
-    if (s->def.final != FCT_FINAL_NONE) light_borders(x);
+    settle_doubts(x);
+    x->lit = x->known;
     color_side(x);
 }
 
@@ -312,10 +321,11 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     cover_by_steps(&x);
     cut_by_steps(&x);
     if (s->def.final != FCT_FINAL_NONE) {
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(64 * s->fineness),
+        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(32 * s->fineness),
                                .tolerance =
                                    (s->def.final == FCT_FINAL_GATHER ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
                                .side = back ? -1 : 1,
+                               .instance = instance,
                                .covered = x.covered,
                                .nearest = x.nearest,
                                .seed = fct_hash2(s->def.seed, instance)};
@@ -340,7 +350,8 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
 }
 
 static void release_side(side *x) {
-    free(x->direct), free(x->indirect), free(x->nearest), free(x->covered), free(x->made), free(x->border);
+    free(x->direct), free(x->indirect), free(x->nearest), free(x->covered), free(x->made), free(x->doubt);
+    free(x->sights);
     fct_surface_release(&plain, &x->f);
     fct_anchors_release(&plain, &x->anchors);
 }
@@ -424,6 +435,7 @@ static void bakes_equal_their_steps(void **state) {
         env.progress = watch, env.progress_user = &w;
         assert_int_equal(fct_bake_create(&env, scene, &other, &b), FCT_OK);
         fct_solution s = solve_by_steps(scene, &other, &expected);
+        assert_int_equal(fct_guides_create(&s.elements, &s.links, s.transport.stored, &s.guides), FCT_OK);
         fct_bake_stats stats = fct_bake_get_stats(b);
         assert_true(stats.converged);
         assert_int_equal(stats.passes, expected.passes);
@@ -493,12 +505,12 @@ static void bakes_equal_their_steps(void **state) {
                 const double p[3] = {site.point[0], site.point[1], site.point[2]}, m[3] = {n[0], n[1], n[2]};
                 if (!other.indirect_only)
                     fct_lamps_direct(s.lamps, scene, p, m, site.offset, seed,
-                                     (uint32_t)fmin(fmax(16 * s.fineness, 16), 64), e, &probe_rays);
+                                     (uint32_t)fmin(fmax(16 * s.fineness, 16), 64), 0, NULL, e, &probe_rays);
                 fct_anchor a = {.offset = site.offset};
                 memcpy(a.position, site.point, 12), memcpy(a.normal, n, 12);
                 uint32_t count = (uint32_t)(1024 * fmax(s.fineness, 1));
                 const fct_source source = fct_solution_source(&s);
-                fct_anchor_gather(&source, count, fct_hash(seed), &a);
+                fct_anchor_gather(&source, NULL, count, fct_hash(seed), &a);
                 probe_rays += count;
                 for (int c = 0; c < 3; ++c) e[c] += (double)a.irradiance[c];
             }

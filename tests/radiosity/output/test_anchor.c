@@ -55,8 +55,8 @@ static void end_sky(sky *s) {
 static fct_anchor gather(const sky *s, v3 n) {
     fct_anchor a = {.offset = 1e-3F};
     v3_store(a.normal, n);
-    const fct_source source = {&s->set, s->stored, INFINITY};
-    fct_anchor_gather(&source, 8192, 3, &a);
+    const fct_source source = {&s->set, NULL, s->stored, INFINITY};
+    fct_anchor_gather(&source, NULL, 8192, 3, &a);
     return a;
 }
 
@@ -300,7 +300,7 @@ static void groups_respect_the_tolerance(void **state) {
         const double tolerance = k == 0 ? .9 : .4;
         fct_anchors_def def = {.rays = 16, .tolerance = tolerance, .side = k == 2 ? -1 : 1, .seed = 1};
         fct_anchors t;
-        const fct_source source = {&s.set, s.stored, 20 * sqrt(3) / 8};
+        const fct_source source = {&s.set, NULL, s.stored, 20 * sqrt(3) / 8};
         assert_int_equal(fct_anchors_create(&plain, &source, &f, &def, &t), FCT_OK);
         assert_true(t.rays >= 16 * t.count && t.rays <= 48 * t.count);
         double inverse = 0;

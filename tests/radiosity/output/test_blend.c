@@ -1,70 +1,10 @@
 /* Anchors against a plain evaluation in double: the rays of one gather, the groups of a surface, and blends
  * of random anchors among walls. */
-#include "../place.h"
-#include "../soup.h"
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/blend.h"
 #include "radiosity/solve/transport.h"
 #include "radiosity/surface/tessellate.h"
-
-static fct_env plain; /* outlives every scene */
-
-static void assert_near(double value, double expected, double tolerance) {
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%.9g, expected %.9g within %g", value, expected, tolerance);
-}
-
-/* A number in [0, 1). */
-static double pick(uint64_t a, uint64_t b, uint64_t c) {
-    return fct_uniform(fct_hash3(a, b, c));
-}
-
-/* A room with random sheets inside, and a bumpy ball as the last instance. Every leaf shines in a colour of
- * its own. */
-typedef struct room {
-    fct_scene *scene;
-    fct_elements set;
-    float *stored;
-    soup triangles;
-    uint32_t ball;
-} room;
-
-static room make_room(uint64_t seed) {
-    room r = {.ball = 14};
-    plain = fct_env_default();
-    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &r.scene), FCT_OK);
-    uint32_t grey = place_material(r.scene, .5, 0, false), two = place_material(r.scene, .5, 0, true);
-    fct_mesh cube = make_sphere(&plain, 3), ball = make_bumpy(&plain, 9, .25);
-    for (size_t t = 0; t < cube.face_count; ++t) {
-        uint32_t *c = cube.triangles + 3 * t, swap = c[1];
-        c[1] = c[2], c[2] = swap;
-    }
-    const float wide[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0};
-    place_mesh(r.scene, &cube, grey, wide);
-    for (uint64_t k = 0; k < 13; ++k)
-        place_sheet(&plain, r.scene, k & 1 ? two : grey, 1,
-                    v3_make(2 * pick(seed, k, 0) - 1, 2 * pick(seed, k, 1) - 1, pick(seed, k, 2) - .5),
-                    v3_make(.4 * pick(seed, k, 3), .4, .3 * pick(seed, k, 4)),
-                    v3_make(.4, -.2, pick(seed, k, 5) - .5));
-    const float place[12] = {.6F, 0, 0, .2F, 0, .6F, 0, .5F, 0, 0, .6F, 0};
-    place_mesh(r.scene, &ball, two, place);
-    fct_mesh_release(&plain, &cube), fct_mesh_release(&plain, &ball);
-    assert_int_equal(fct_scene_commit(r.scene), FCT_OK);
-    assert_int_equal(fct_elements_create(&plain, r.scene, 1, &r.set), FCT_OK);
-    for (uint32_t id = 0; id < r.set.count; ++id)
-        if (fct_elements_can_split(&r.set, id)) assert_int_equal(fct_elements_split(&r.set, id), FCT_OK);
-    r.stored = malloc(3 * r.set.count * sizeof *r.stored);
-    for (size_t i = 0; i < 3 * r.set.count; ++i)
-        r.stored[i] = (float)(pick(seed, i, 6) * pick(seed, i / 30, 7));
-    r.triangles = list_triangles(r.scene);
-    return r;
-}
-
-static void end_room(room *r) {
-    free(r->stored), free(r->triangles.corners);
-    fct_elements_release(&r->set);
-    fct_scene_destroy(r->scene);
-}
+#include "room.h"
 
 /* E = mean b, gradient = mean of b d / max(cos, .15), reach = harmonic mean distance. */
 static void gather_plainly(const room *r, double longest, uint32_t rays, uint64_t seed, fct_anchor *a) {
@@ -111,8 +51,8 @@ static void gathers_equal_their_rays(void **state) {
         for (uint64_t c = 0; c < 3; ++c) a.position[c] = (float)(pick(k, c, 2) - .5);
         v3_store(a.normal, v3_unit(v3_make(pick(k, 0, 3) - .5, pick(k, 1, 3) - .5, pick(k, 2, 3) - .5)));
         b = a;
-        const fct_source source = {&r.set, r.stored, k % 2 ? .4 : INFINITY};
-        fct_anchor_gather(&source, 50 + (uint32_t)k, k, &a);
+        const fct_source source = {&r.set, NULL, r.stored, k % 2 ? .4 : INFINITY};
+        fct_anchor_gather(&source, NULL, 50 + (uint32_t)k, k, &a);
         gather_plainly(&r, source.longest, 50 + (uint32_t)k, k, &b);
         assert_same_anchor(&a, &b);
     }
@@ -225,7 +165,7 @@ static void groups_follow_the_rules(void **state) {
             upper = v3_make(fmax(upper.x, x.x), fmax(upper.y, x.y), fmax(upper.z, x.z));
         }
         m.longest = v3_norm(v3_sub(upper, lower)) / 8;
-        const fct_source source = {&r.set, r.stored, m.longest};
+        const fct_source source = {&r.set, NULL, r.stored, m.longest};
         float *nearest = malloc(f.mesh.vertex_count * sizeof *nearest);
         uint8_t *covered = malloc(f.mesh.vertex_count);
         for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)

@@ -22,7 +22,7 @@ static fct_scene *begin(void) {
 }
 
 /* Two passes of c = (c + sum w c') / (1 + sum w) over all sides of all faces, w = (1 - x^2)^2, x = difference
- * over 4 % of the sum. */
+ * over 10 % of the sum. */
 static void smooth_directly(const fct_surface *s, const uint8_t *covered, double *c) {
     size_t n = s->mesh.vertex_count;
     double *sum = malloc(4 * n * sizeof *sum);
@@ -38,7 +38,7 @@ static void smooth_directly(const fct_surface *s, const uint8_t *covered, double
                 difference += fabs(c[3 * ends[0] + k] - c[3 * ends[1] + k]);
                 level += c[3 * ends[0] + k] + c[3 * ends[1] + k];
             }
-            double x = difference / (.04 * level), w = x < 1 ? (1 - x * x) * (1 - x * x) : 0;
+            double x = difference / (.1 * level), w = x < 1 ? (1 - x * x) * (1 - x * x) : 0;
             if (!s->flat[ends[0]] || !s->flat[ends[1]] || covered[ends[0]] || covered[ends[1]]) w = 0;
             for (size_t e = 0; e < 2; ++e) {
                 for (size_t k = 0; k < 3; ++k) sum[4 * ends[e] + k] += w * c[3 * ends[1 - e] + k];
@@ -65,7 +65,7 @@ static void noise_on_flat_surfaces_is_smoothed(void **state) {
         for (size_t k = 0; k < 3; ++k) {
             double level = s.mesh.positions[3 * v] > .5F ? 1 : .5,
                    noise = fct_uniform(fct_hash3(v, k, 1)) - .5;
-            expected[3 * v + k] = s.mesh.colors[3 * v + k] = (float)(level * (1 + .03 * noise));
+            expected[3 * v + k] = s.mesh.colors[3 * v + k] = (float)(level * (1 + .07 * noise));
         }
     uint8_t *covered = calloc(n, 1);
     smooth_directly(&s, covered, expected);

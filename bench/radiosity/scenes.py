@@ -1,0 +1,174 @@
+#!/usr/bin/env python3
+"""Writes the scenes of the radiosity benchmark into folders, with meshes that `facetree make` makes.
+usage: scenes.py FACETREE OUT [SCENE...]"""
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+
+PAINT = {
+    "white": [.75, .75, .72], "red": [.63, .10, .08], "blue": [.14, .22, .52], "grey": [.5, .5, .5],
+    "wood": [.45, .3, .18], "plaster": [.78, .76, .7], "stone": [.55, .52, .47], "ground": [.4, .36, .3]}
+
+
+class Scene:
+    """Objects of shared models under a transform, as scene.json has them."""
+
+    def __init__(self, tool, folder):
+        self.tool, self.folder = tool, folder
+        self.models, self.instances = {}, []
+        self.materials = {name: {"reflectance": value} for name, value in PAINT.items()}
+        os.makedirs(folder, exist_ok=True)
+
+    def shape(self, name, triangles=0, inside=False):
+        """A mesh of `facetree make`; the name of its model."""
+        model = f"{name}{triangles or ''}{'_inside' if inside else ''}"
+        if model not in self.models:
+            command = [self.tool, "make", name, "-q", "-o", f"{self.folder}/{model}.ply"]
+            command += ["--triangles", str(triangles)] if triangles else []
+            command += ["--inside"] if inside else []
+            subprocess.run(command, check=True)
+            self.models[model] = f"{model}.ply"
+        return model
+
+    def obj(self, name, boxes):
+        """One mesh of several boxes, each (centre, half extents)."""
+        with open(f"{self.folder}/{name}.obj", "w", encoding="ascii") as out:
+            for i, (center, half) in enumerate(boxes):
+                for k in range(8):
+                    p = [center[a] + half[a] * (1 if k >> a & 1 else -1) for a in range(3)]
+                    out.write("v %.9g %.9g %.9g\n" % tuple(p))
+                for face in ((1, 5, 7, 3), (2, 4, 8, 6), (1, 2, 6, 5), (3, 7, 8, 4), (1, 3, 4, 2), (5, 6, 8, 7)):
+                    out.write("f " + " ".join(str(v + 8 * i) for v in face) + "\n")
+        self.models[name] = f"{name}.obj"
+        return name
+
+    def cube(self):
+        return self.obj("cube", [((0, 0, 0), (1, 1, 1))])
+
+    def sheet(self, name, corner, side, up):
+        """A rectangle of two triangles; its front is where side x up points."""
+        with open(f"{self.folder}/{name}.obj", "w", encoding="ascii") as out:
+            for a, b in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                out.write("v %.9g %.9g %.9g\n" % tuple(corner[k] + a * side[k] + b * up[k] for k in range(3)))
+            out.write("f 1 2 3 4\n")
+        self.models[name] = f"{name}.obj"
+        return name
+
+    def add(self, name, model, material, translate=(0, 0, 0), scale=(1, 1, 1), degrees=0):
+        item = {"name": name, "model": model, "material": material, "translate": list(translate), "scale": list(scale)}
+        if degrees:
+            item["rotate"] = {"axis": [0, 1, 0], "degrees": degrees}
+        self.instances.append(item)
+
+    def lamp(self, name, emission, place, half):
+        """A thin box of light."""
+        self.materials.setdefault(f"light{len(self.materials)}", {"reflectance": .5, "emission": emission})
+        material = [m for m, v in self.materials.items() if v.get("emission") == emission][0]
+        self.add(name, self.cube(), material, place, half)
+
+    def panel(self, name, emission, place, half):
+        """A sheet that shines down."""
+        x, y, z = place
+        self.lamp(name, emission, (0, 0, 0), (1, 1, 1))
+        w, d = half
+        self.instances[-1]["model"] = self.sheet(name, (x - w, y, z - d), (2 * w, 0, 0), (0, 0, 2 * d))
+
+    def room(self, width, height, depth, walls="plaster", floor="wood"):
+        """Floor, ceiling and four walls of one rectangle each; the corner of the room is the origin."""
+        w, h, d = width, height, depth
+        for name, corner, side, up, paint in (
+                ("floor", (0, 0, 0), (0, 0, d), (w, 0, 0), floor), ("ceiling", (0, h, 0), (w, 0, 0), (0, 0, d), walls),
+                ("left", (0, 0, 0), (0, h, 0), (0, 0, d), walls), ("right", (w, 0, 0), (0, 0, d), (0, h, 0), walls),
+                ("back", (0, 0, 0), (w, 0, 0), (0, h, 0), walls), ("front", (0, 0, d), (0, h, 0), (w, 0, 0), walls)):
+            self.add(name, self.sheet(name, corner, side, up), paint)
+
+    def save(self, position, target, angle=60):
+        camera = {"position": position, "target": target, "up": [0, 1, 0], "vertical_fov": angle}
+        scene = {"materials": self.materials, "models": self.models, "instances": self.instances, "camera": camera}
+        with open(f"{self.folder}/scene.json", "w", encoding="ascii") as out:
+            json.dump(scene, out, indent=1)
+
+
+def make_hall(s):
+    """Five statues of 6,000 triangles under two lamps."""
+    s.room(12, 5, 8)
+    for i, name in enumerate(("torso", "knot", "gyroid", "vase", "bust")):
+        x, z = 2 + 2 * i, 2.5 + 2.5 * (i % 2)
+        s.add(f"plinth {i}", s.cube(), "stone", (x, .4, z), (.45, .4, .45))
+        s.add(name, s.shape(name, 6000), ("white", "red", "blue", "grey", "wood")[i], (x, .8, z), (1, 1, 1))
+    s.lamp("lamp", [14, 13, 11], (4, 3.8, 4), (.8, .02, .5))
+    s.lamp("lamp 2", [14, 13, 11], (9, 3.8, 4), (.5, .02, .8))
+    s.save([6, 2.2, 7.8], [6, 1.4, 0])
+
+
+def make_lamps(s):
+    """Forty lamps over twelve crates."""
+    s.room(16, 4, 10)
+    pick = random.Random(5)
+    for i in range(12):
+        half = pick.uniform(.3, .7)
+        x, z = 2 + 4 * (i % 4) + pick.uniform(-.6, .6), 1.8 + 3.2 * (i // 4) + pick.uniform(-.5, .5)
+        s.add(f"crate {i}", s.cube(), ("wood", "red", "blue")[i % 3], (x, half, z), (half,) * 3, pick.uniform(5, 85))
+    for i in range(40):
+        s.panel(f"lamp {i}", [18, 17, 14], (1 + 2 * (i % 8), 3.96, 1 + 2 * (i // 8)), (.12, .12))
+    s.save([15.4, 2.6, 9.6], [5, .6, 3])
+
+
+def make_courtyard(s):
+    """Four walls without a roof under a small far lamp; crates and columns on the ground."""
+    s.add("ground", s.sheet("ground", (-10, 0, -10), (0, 0, 20), (20, 0, 0)), "ground")
+    for i in range(4):
+        angle = math.pi / 2 * i
+        c, n = round(math.cos(angle)), round(math.sin(angle))
+        s.add(f"wall {i}", s.cube(), "stone", (9.5 * c, 2, 9.5 * n), (.3 if c else 9.8, 2, .3 if n else 9.8))
+    for i in range(6):
+        s.add(f"column {i}", s.shape("cylinder", 600), "white", (-6 + 2.4 * i, 0, -4), (.6, 3, .6))
+    for i in range(5):
+        s.add(f"crate {i}", s.cube(), ("wood", "red", "blue")[i % 3], (-5 + 2.3 * i, .5, 2.5), (.5, .5, .5), 17 * i)
+    s.lamp("sun", [9e3, 8.6e3, 7.6e3], (60, 90, 35), (1, 1, 1))
+    s.save([7.5, 5, 9], [-1, .8, -1])
+
+
+def make_classroom(s):
+    """Twenty desks and chairs of many boxes, with books on the desks."""
+    s.room(9, 3.2, 11)
+    desk = [((0, .72, 0), (.6, .02, .3)), ((0, .5, -.27), (.55, .12, .01))]
+    desk += [((x, .35, z), (.02, .35, .02)) for x in (-.55, .55) for z in (-.25, .25)]
+    desk += [((.3, .76, 0), (.1, .02, .14)), ((-.25, .75, .05), (.08, .01, .11))]
+    chair = [((0, .44, 0), (.2, .015, .2)), ((0, .8, .19), (.2, .12, .012))]
+    chair += [((x, .22, z), (.015, .22, .015)) for x in (-.18, .18) for z in (-.18, .18)]
+    chair += [((x, .62, .19), (.015, .2, .012)) for x in (-.18, .18)]
+    for i in range(20):
+        x, z = 1.4 + 2.05 * (i % 4), 2.2 + 1.75 * (i // 4)
+        s.add(f"desk {i}", s.obj("desk", desk), "wood", (x, 0, z), degrees=3 * (i % 5) - 6)
+        s.add(f"chair {i}", s.obj("chair", chair), "blue", (x, 0, z + .55), degrees=11 * (i % 7) - 30)
+    for i in range(6):
+        s.panel(f"lamp {i}", [11, 11, 10.5], (2.5 + 4 * (i % 2), 3.15, 2 + 3.5 * (i // 2)), (.6, .12))
+    s.save([8.6, 2.3, 10.6], [3.5, .6, 3.5])
+
+
+MAKERS = {"hall": make_hall, "lamps": make_lamps, "courtyard": make_courtyard, "classroom": make_classroom}
+MADE = {"museum": 30000, "cornell": 1000}  # by the program alone: triangles
+
+
+def make_scene(tool, out, name):
+    """The folder of a scene, made if it is not there."""
+    folder = os.path.join(out, name)
+    os.makedirs(out, exist_ok=True)
+    if not os.path.exists(f"{folder}/scene.json"):
+        if name in MADE:
+            subprocess.run([tool, "make", name, "-q", "-o", folder, "--triangles", str(MADE[name])], check=True)
+        else:
+            scene = Scene(tool, folder)
+            MAKERS[name](scene)
+    return folder
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    for scene_name in sys.argv[3:] or [*MADE, *MAKERS]:
+        print(make_scene(sys.argv[1], sys.argv[2], scene_name))
