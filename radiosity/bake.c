@@ -36,6 +36,7 @@ struct fct_bake {
     fct_solution solution;
     fct_bake_stats stats;
     double lit_work, whole_work; /* of the instances that fct_bake_instance has lit, and of all */
+    fct_check *checks;           /* per object */
 };
 
 fct_bake_def fct_bake_def_default(void) {
@@ -179,7 +180,10 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     s->env = env, s->scene = scene, s->def = *def;
     s->max_edge = def->max_edge > 0 ? def->max_edge : fct_surface_default_edge(scene);
     s->fineness = fct_min(fct_max(sqrt(DEFAULT_ERROR / def->error), LEAST_FINENESS), MOST_FINENESS);
-    if (def->method == FCT_BAKE_FACE) {
+    bake->checks = fct_allocate_zero(env, view.object_count, sizeof *bake->checks);
+    if (!bake->checks) {
+        result = fct_fail_memory(env, "a bake");
+    } else if (def->method == FCT_BAKE_FACE) {
         result = fct_lamps_create(env, scene, &s->lamps);
         if (result == FCT_OK) result = fct_elements_create(env, scene, s->max_edge / 4, &s->elements);
         if (result == FCT_OK) result = solve_scene(bake);
@@ -205,14 +209,40 @@ void fct_bake_destroy(fct_bake *bake) {
     fct_links_release(env, &bake->solution.links);
     fct_elements_release(&bake->solution.elements);
     fct_lamps_destroy(bake->solution.lamps);
+    fct_release(env, bake->checks);
     fct_release(env, bake);
+}
+
+/* Sets the error over the objects without emission that have been lit, if there are such objects. */
+static void estimate_error(const fct_bake *bake, double *error) {
+    const fct_scene_view *view = &bake->solution.elements.view;
+    fct_check all = {0};
+    uint32_t last = FCT_NONE;
+    for (uint32_t i = 0; i < view->instance_count; ++i) {
+        const fct_instance *in = &view->instances[i];
+        const fct_check *c = &bake->checks[in->object];
+        const float *e = view->materials[in->material].emission;
+        if (in->object == last || e[0] > 0 || e[1] > 0 || e[2] > 0) continue;
+        last = in->object;
+        all.area += c->area, all.light += c->light, all.square += c->square;
+    }
+    if (all.area > 0) *error = fct_check_error(&all);
 }
 
 fct_bake_stats fct_bake_get_stats(const fct_bake *bake) {
     fct_bake_stats stats = bake->stats;
     if (bake->solution.elements.env) stats.touched_bytes = fct_elements_touched(&bake->solution.elements);
     stats.seconds_total += stats.seconds_push;
+    estimate_error(bake, &stats.error_estimate);
     return stats;
+}
+
+fct_bake_error fct_bake_get_error(const fct_bake *bake, uint32_t object) {
+    const fct_check *c = &bake->checks[object];
+    return (fct_bake_error){.area = c->area,
+                            .light = c->area > 0 ? c->light / c->area : 0,
+                            .error = fct_check_error(c),
+                            .bias = c->light > 0 ? c->bias / c->light : 0};
 }
 
 static uint32_t choose_samples(const fct_bake *bake) {
@@ -285,13 +315,22 @@ static fct_result trace_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[
     return FCT_OK;
 }
 
+static fct_result light_side(fct_bake *bake, uint32_t instance, bool back, fct_mesh *out) {
+    const uint32_t object = bake->solution.elements.view.instances[instance].object;
+    fct_output_rays rays = {0, 0};
+    fct_result result = fct_output_side(&bake->solution, instance, back, out, &bake->checks[object], &rays);
+    bake->stats.output_rays += rays.light;
+    bake->stats.check_rays += rays.check;
+    return result;
+}
+
 static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], uint32_t *count) {
     bool back[2];
     if (bake->solution.def.method != FCT_BAKE_FACE) return trace_sides(bake, instance, sides, count);
     *count = fct_output_sides(&bake->solution, instance, back);
     fct_result result = FCT_OK;
     for (uint32_t k = 0; k < *count && result == FCT_OK; ++k)
-        result = fct_output_side(&bake->solution, instance, back[k], &sides[k], &bake->stats.output_rays);
+        result = light_side(bake, instance, back[k], &sides[k]);
     return result;
 }
 

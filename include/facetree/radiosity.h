@@ -51,13 +51,23 @@ typedef struct fct_bake_stats {
     /* The reference counts the power of the instances that it has written. */
     double power_emitted;                 /* area times emission, summed over RGB */
     double power_absorbed, power_escaped; /* their sum equals power_emitted up to the noise of the rays */
-    double error_estimate;                /* noise of the stored solution: relative standard error (RMS over
-                                             area) of an element's irradiance, plus the last change of the
-                                             iteration. It does not contain the errors of tessellation, anchors
-                                             or shadow rays, and is not the error of a vertex */
+    /* RMS error over the mean of the light that the surfaces without emission show between their vertices,
+     * for the output so far (see fct_bake_error). Before any output: the noise of the stored solution. */
+    double error_estimate;
+    uint64_t check_rays; /* of the error estimate, not in output_rays */
 } fct_bake_stats;
 
 typedef struct fct_bake fct_bake;
+
+/* The error of an object's light, estimated at random points of its output: 16 to 512 per instance, by area.
+ * There the shown light is compared with two independent gathers, whose own noise cancels. An error of the
+ * stored solution is not in it. All zero for an object without output, and for REFERENCE. */
+typedef struct fct_bake_error {
+    double error; /* RMS over the mean light */
+    double bias;  /* mean difference over the mean light */
+    double light; /* mean reflected radiosity, of the three channels */
+    double area;  /* that was checked */
+} fct_bake_error;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
  * (error <= 0, max_edge < 0, a scene or model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
@@ -66,6 +76,8 @@ FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, c
 /* NULL is allowed. */
 FCT_API void fct_bake_destroy(fct_bake *bake);
 FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
+/* object < object_count of the scene. */
+FCT_API fct_bake_error fct_bake_get_error(const fct_bake *bake, uint32_t object);
 
 /* The lit mesh of one instance in world space, with the scene's origin; colours are radiosity per vertex.
  * Large flat triangles are tessellated, and vertices on creases are doubled; source_faces gives the face of

@@ -30,8 +30,9 @@
 #define MOST_MINOR_RAYS  16
 /* A lamp above this share of the total gets twice the first rays: a wrong agreement of four would show. */
 #define BRIGHT_SHARE .2
-/* Wanted standard error of a lamp's light as a share of the receiver's light. */
-#define RAY_ERROR .016
+/* Wanted standard error of a lamp's light as a share of the receiver's light, times the first rays per lamp.
+ */
+#define RAY_ERROR .032
 /* The standard error of a visible fraction f from n stratified rays is about .6 sqrt(f (1 - f)) / n^(3/4). */
 #define STRATIFIED .6
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
@@ -89,10 +90,10 @@ static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
 }
 
 /* The number of rays after `sent` ones of which some were blocked. share: the lamp's light over all light. */
-static uint32_t count_wanted_rays(double visible, uint32_t sent, double share) {
+static uint32_t count_wanted_rays(const query *q, double visible, uint32_t sent, double share) {
     /* Counts one more ray as half visible, because the variance of few rays is often too small. */
     const double fraction = (visible * sent + .5) / (sent + 1);
-    const double ratio = STRATIFIED * sqrt(fraction * (1 - fraction)) * share / RAY_ERROR;
+    const double ratio = STRATIFIED * sqrt(fraction * (1 - fraction)) * share * q->base_rays / RAY_ERROR;
     uint32_t rays = RAY_STEP;
     while (rays < MAX_RAYS && rays * sqrt(rays) < ratio * ratio) rays += RAY_STEP;
     return rays;
@@ -107,7 +108,7 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
     const uint32_t slot = find_slot(q, lamp);
     uint32_t first = !q->fixed && power > BRIGHT_SHARE * q->total ? 2 * q->base_rays : q->base_rays;
     if (q->doubt & slot) {
-        const uint32_t wanted = count_wanted_rays(.5, 1, power / q->scale);
+        const uint32_t wanted = count_wanted_rays(q, .5, 1, power / q->scale);
         const uint32_t enough = wanted < DOUBT_RAYS ? wanted : DOUBT_RAYS;
         first = first > enough ? first : enough;
     }
@@ -124,7 +125,7 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
         if (!mixed || q->fixed) break;
-        goal = count_wanted_rays(all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
+        goal = count_wanted_rays(q, all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
     }
     return all > 0 ? seen / all : 0;
 }
@@ -177,7 +178,7 @@ static void add_minor_lamps(query *q, const double light[3], double sum, double 
     if ((mixed || all[0] + all[1] + all[2] <= 0) && !q->fixed) {
         /* Rays to different lamps are not stratified: n rays leave a standard error of at most 1/2 / sqrt(n).
          */
-        const double ratio = .5 * sum / (q->scale * RAY_ERROR);
+        const double ratio = .5 * sum / q->scale * q->base_rays / RAY_ERROR;
         const double wanted = fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
         if (wanted > q->base_rays) sample_minor_lamps(q, sum, (uint32_t)wanted, all, seen, cut);
     }

@@ -40,15 +40,15 @@ static inline uint32_t fct_sight_mixed(fct_sight s) {
 /* Irradiance (RGB) of all lamps at a point with a unit normal, without blockers. */
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]);
-/* The same with shadows. Rays start at point + offset * normal. Each lamp receives base_rays rays (4 is good;
- * 0: no shadows), 16 if they disagree, and up to 64 if the uncertain part is a large share of the light.
- * Minor lamps share their rays. Equal values of item_seed give equal rays. *rays (may be NULL) grows by the
- * number of rays. Any number of threads may call. Returns the visible fraction over all lamps, weighted by
- * their light; 0 if no lamp lies above the horizon.
+/* The same with shadows. Rays start at point + offset * normal. Each lamp receives base_rays rays (0: no
+ * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 3.2 % /
+ * base_rays of the receiver's light. Minor lamps share their rays. Equal values of item_seed give equal rays.
+ * *rays (may be NULL) grows by the number of rays. Any number of threads may call. Returns the visible
+ * fraction over all lamps, weighted by their light; 0 if no lamp lies above the horizon.
  *
  * Few rays may agree by chance and miss a thin shadow. Neighbours tell: *sight (may be NULL) receives what
  * the rays met. If the sights of a receiver and its neighbours together are mixed for a lamp, and the
- * receiver's own sight is not, call again with these lamps in doubt: they get at least 16 rays. */
+ * receiver's own sight is not, call again with these lamps in doubt: they get up to 16 rays at first. */
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
                         uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays);

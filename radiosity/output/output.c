@@ -306,6 +306,12 @@ static fct_result finish_colors(const lighting *l) {
     return result;
 }
 
+/* Measures the error of the final light. */
+static fct_result check_light(lighting *l, fct_check *check, uint64_t *rays) {
+    for (size_t i = 0; i < 3 * (size_t)l->surface->mesh.vertex_count; ++i) l->direct[i] += l->indirect[i];
+    return fct_check_surface(l->s, l->surface, l->instance, l->back, l->direct, l->covered, check, rays);
+}
+
 bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity) {
     double difference = 0, level = 0;
     for (int c = 0; c < 3; ++c) {
@@ -358,8 +364,9 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
 }
 
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
-                           uint64_t *rays) {
+                           fct_check *check, fct_output_rays *counts) {
     const fct_env *env = s->env;
+    uint64_t *rays = &counts->light;
     bool gathers = s->def.final != FCT_FINAL_NONE;
     fct_surface surface = {0};
     fct_anchors anchors = {0};
@@ -379,6 +386,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
         if (added == 0) break;
     }
     if (result == FCT_OK) result = finish_colors(&l);
+    if (result == FCT_OK) result = check_light(&l, check, &counts->check);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};

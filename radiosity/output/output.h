@@ -2,12 +2,17 @@
 #ifndef FCT_RADIOSITY_OUTPUT_H
 #define FCT_RADIOSITY_OUTPUT_H
 
-#include "radiosity/output/solution.h"
+#include "radiosity/output/check.h"
 
-/* The lit mesh of one side of an instance in world space, wound so that this side is in front. *rays grows by
- * the rays traced. Errors: MEMORY, CANCELLED. */
+/* Rays of the output. */
+typedef struct fct_output_rays {
+    uint64_t light, check; /* of the vertices; of the estimate of their error */
+} fct_output_rays;
+
+/* The lit mesh of one side of an instance in world space, wound so that this side is in front. *check grows
+ * by what check.h finds, *rays by the rays traced. Errors: MEMORY, CANCELLED. */
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
-                           uint64_t *rays);
+                           fct_check *check, fct_output_rays *rays);
 
 /* Share of the power of an instance's brighter side below which the other side counts as dark. */
 #define FCT_OUTPUT_DARK 1e-4

@@ -110,12 +110,12 @@ typedef struct eye {
     fct_sight sight;
 } eye;
 
-/* Rays for a standard error of 1.6 % of the light from a lamp of this share: .6 sqrt(f (1 - f)) / n^(3/4)
- * with one more ray that is half visible, in steps of 8 up to 64. */
-static uint32_t count_rays(double visible, uint32_t sent, double share) {
+/* Rays for a standard error of 3.2 % / base of the light from a lamp of this share: .6 sqrt(f (1 - f)) /
+ * n^(3/4) with one more ray that is half visible, in steps of 8 up to 64. */
+static uint32_t count_rays(uint32_t base, double visible, uint32_t sent, double share) {
     const double f = (visible * sent + .5) / (sent + 1), error = .6 * sqrt(f * (1 - f)) * share;
     uint32_t n = 8;
-    while (n < 64 && error / pow(n, .75) > .016) n += 8;
+    while (n < 64 && error / pow(n, .75) > .032 / base) n += 8;
     return n;
 }
 
@@ -139,7 +139,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
                        uint32_t base, bool fixed, double power, double total, double scale) {
     double all = 0, seen = 0;
     uint32_t sent = 0, goal = !fixed && power > .2 * total ? 2 * base : base;
-    const uint32_t slot = (uint32_t)(lamp - q->h->own) % 31, doubted = count_rays(.5, 1, power / scale);
+    const uint32_t slot = (uint32_t)(lamp - q->h->own) % 31, doubted = count_rays(base, .5, 1, power / scale);
     if (q->doubt >> slot & 1 && goal < 16) goal = doubted > 16 ? 16 : doubted > goal ? doubted : goal;
     while (sent < goal) {
         for (; sent < goal; ++sent) {
@@ -149,7 +149,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
             if (p.weight > 0) all += p.weight, seen += sees(q, lamp, slot, p.y) ? p.weight : 0;
         }
         if (fixed || (all > 0 && (seen == 0 || seen == all))) break;
-        goal = count_rays(all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
+        goal = count_rays(base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
     }
     return all > 0 ? seen / all : 0;
 }
@@ -212,8 +212,9 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     if (light[0] + light[1] + light[2] > 0) {
         double all[3], seen[3];
         bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, all, seen);
-        /* Enough for an error of 1.6 % of the light if each ray has a standard error of 1/2; 4 to 16. */
-        const double enough = fmin(fmax(pow(.5 * minor_sum / scale / .016, 2), 4), 16);
+        /* Enough for an error of 3.2 % / base of the light if each ray has a standard error of 1/2; 4 to 16.
+         */
+        const double enough = fmin(fmax(pow(.5 * minor_sum / scale / .032 * base, 2), 4), 16);
         if ((mixed || q->doubt >> 31 || all[0] + all[1] + all[2] == 0) && base < enough && !fixed)
             see_minor_lamps(q, recs, shares, minor, minor_sum, (uint32_t)enough, all, seen);
         double grey = all[0] + all[1] + all[2];

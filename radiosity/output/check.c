@@ -1,0 +1,164 @@
+/* radiosity/output/check.c: see check.h. */
+#include "radiosity/output/check.h"
+
+#include <string.h>
+
+/* Points per scene, by area; at least and at most this many per side of an instance, but no more than one per
+ * VERTICES_PER_POINT vertices. */
+enum { SCENE_POINTS = 2048, LEAST_POINTS = 16, MOST_POINTS = 512, VERTICES_PER_POINT = 32 };
+/* Gather rays, and first rays per lamp, of each of the two gathers. */
+enum { GATHER_RAYS = 64, LAMP_RAYS = 16 };
+enum { POINT_GRAIN = 4 }; /* points per chunk */
+
+typedef struct checking {
+    const fct_solution *s;
+    const fct_surface *surface;
+    const float *light;
+    const uint8_t *covered;
+    uint32_t instance;
+    bool back;
+    double *areas; /* running sums over the faces */
+    fct_guide *guides;
+    size_t count;
+    fct_check *parts; /* per point, without area */
+    uint64_t *chunk_rays;
+    uint64_t seed;
+} checking;
+
+double fct_check_error(const fct_check *sums) {
+    if (!(sums->light > 0)) return 0;
+    return sqrt(fct_max(sums->square, 0) * sums->area) / sums->light;
+}
+
+/* Running sums of the area of faces that are not covered. Returns the whole. */
+static double sum_areas(const checking *k) {
+    const fct_mesh *m = &k->surface->mesh;
+    double sum = 0;
+    for (size_t f = 0; f < m->face_count; ++f) {
+        const uint32_t *t = m->triangles + 3 * f;
+        const v3 a = v3_load(m->positions + 3 * (size_t)t[0]);
+        const v3 e1 = v3_sub(v3_load(m->positions + 3 * (size_t)t[1]), a);
+        const v3 e2 = v3_sub(v3_load(m->positions + 3 * (size_t)t[2]), a);
+        if (!(k->covered[t[0]] && k->covered[t[1]] && k->covered[t[2]]))
+            sum += .5 * v3_norm(v3_cross(e1, e2));
+        k->areas[f] = sum;
+    }
+    return sum;
+}
+
+static size_t find_face(const checking *k, double area) {
+    size_t low = 0, high = k->surface->mesh.face_count - 1;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (area < k->areas[middle])
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return low;
+}
+
+/* A point of a face with what its vertices say there. */
+typedef struct spot {
+    fct_anchor at;
+    uint32_t place; /* of the model's face */
+    double light[3];
+} spot;
+
+static spot mix_spot(const checking *k, size_t face, const double weights[3]) {
+    const fct_surface *f = k->surface;
+    spot result = {.place = f->face_places[face]};
+    v3 point = {0, 0, 0}, normal = {0, 0, 0};
+    for (size_t c = 0; c < 3; ++c) {
+        const size_t v = f->mesh.triangles[3 * face + c];
+        point = v3_mad(point, weights[c], v3_load(f->mesh.positions + 3 * v));
+        normal = v3_mad(normal, weights[c], v3_load(f->normals + 3 * v));
+        result.at.offset = fmaxf(result.at.offset, f->offsets[v]);
+        for (int i = 0; i < 3; ++i) result.light[i] += weights[c] * k->light[3 * v + (size_t)i];
+    }
+    v3_store(result.at.position, point);
+    v3_store(result.at.normal, v3_scale(v3_unit(normal), k->back ? -1 : 1));
+    return result;
+}
+
+static void gather_spot(const checking *k, spot *p, fct_guide *guide, uint64_t seed, double light[3],
+                        uint64_t *rays) {
+    const fct_solution *s = k->s;
+    const fct_source source = fct_solution_source(s);
+    fct_solution_direct(s, p->at.position, p->at.normal, p->at.offset, seed, LAMP_RAYS, 0, NULL, light, rays);
+    fct_anchor_gather(&source, guide, GATHER_RAYS, fct_hash(seed), &p->at);
+    *rays += GATHER_RAYS;
+    for (int c = 0; c < 3; ++c) light[c] += p->at.irradiance[c];
+}
+
+static void check_point(const checking *k, size_t i, fct_guide *guide, uint64_t *rays) {
+    const fct_scene_view *view = &k->s->elements.view;
+    const fct_material *m = &view->materials[view->instances[k->instance].material];
+    const uint64_t seed = fct_hash2(k->seed, i);
+    const size_t faces = k->surface->mesh.face_count;
+    const double whole = k->areas[faces - 1], area = (i + fct_uniform(seed)) / (double)k->count * whole;
+    double plane[2], w[2], truths[2][3];
+    fct_plane_point((uint32_t)i, k->seed, plane);
+    fct_triangle_point(plane[0], plane[1], w);
+    spot p = mix_spot(k, find_face(k, area), (const double[3]){1 - w[0] - w[1], w[0], w[1]});
+    if (v3_norm2(v3_load(p.at.normal)) <= 0) return;
+    const v3 point = v3_load(p.at.position);
+    const uint32_t leaf = fct_elements_locate_point(&k->s->elements, k->instance, k->back, p.place, point);
+    if (!fct_guide_aim(guide, leaf, point, v3_load(p.at.normal))) guide = NULL;
+    for (uint64_t h = 0; h < 2; ++h) gather_spot(k, &p, guide, fct_hash3(k->seed, i, h + 1), truths[h], rays);
+    fct_check *part = &k->parts[i];
+    for (int c = 0; c < 3; ++c) {
+        const double rho = m->reflectance[c] / 3., a = p.light[c] - truths[0][c],
+                     b = p.light[c] - truths[1][c];
+        part->light += rho * (truths[0][c] + truths[1][c]) / 2;
+        part->square += 3 * rho * rho * a * b;
+        part->bias += rho * (a + b) / 2;
+    }
+}
+
+static void check_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    checking *k = user;
+    for (size_t i = begin; i < end; ++i) check_point(k, i, &k->guides[thread], &k->chunk_rays[chunk]);
+}
+
+static size_t count_points(const checking *k, double area) {
+    const double share = area / k->s->elements.items[0].area;
+    const double most = k->surface->mesh.vertex_count / VERTICES_PER_POINT + 1;
+    return (size_t)fct_min(fct_min(fct_max(share * SCENE_POINTS, LEAST_POINTS), MOST_POINTS), most);
+}
+
+fct_result fct_check_surface(const fct_solution *s, const fct_surface *surface, uint32_t instance, bool back,
+                             const float *light, const uint8_t *covered, fct_check *sums, uint64_t *rays) {
+    const fct_env *env = s->env;
+    const uint32_t threads = fct_env_threads(env);
+    checking k = {.s = s, .surface = surface, .light = light, .covered = covered, .instance = instance};
+    k.back = back;
+    k.seed = fct_hash3(s->def.seed + 5, instance, back);
+    k.areas = fct_allocate(env, surface->mesh.face_count, sizeof *k.areas);
+    k.guides = fct_allocate_zero(env, threads, sizeof *k.guides);
+    fct_result result = k.areas && k.guides ? FCT_OK : fct_fail_memory(env, "the estimate of the error");
+    for (uint32_t t = 0; t < threads && result == FCT_OK; ++t)
+        result = fct_guide_create(&s->guides, &k.guides[t]);
+    const double area = result == FCT_OK ? sum_areas(&k) : 0;
+    if (area > 0) {
+        k.count = count_points(&k, area);
+        const size_t chunks = fct_chunk_count(k.count, POINT_GRAIN);
+        const fct_array arrays[] = {FCT_ARRAY_ZERO(k.parts, k.count), FCT_ARRAY_ZERO(k.chunk_rays, chunks)};
+        result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the estimate of the error");
+        if (result == FCT_OK)
+            result = fct_parallel_for_progress(env, "check", k.count, POINT_GRAIN, check_chunk, &k);
+        for (size_t c = 0; result == FCT_OK && c < chunks; ++c) *rays += k.chunk_rays[c];
+        for (size_t i = 0; result == FCT_OK && i < k.count; ++i) {
+            const double share = area / (double)k.count;
+            sums->area += share;
+            sums->light += share * k.parts[i].light;
+            sums->square += share * k.parts[i].square;
+            sums->bias += share * k.parts[i].bias;
+        }
+        fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    }
+    for (uint32_t t = 0; k.guides && t < threads; ++t) fct_guide_release(env, &k.guides[t]);
+    fct_release(env, k.guides);
+    fct_release(env, k.areas);
+    return result;
+}
