@@ -4,6 +4,7 @@
 
 #include "facetree/radiosity.h"
 #include "mesh/mesh.h"
+#include "radiosity/output/attributes.h"
 #include "radiosity/output/output.h"
 #include "radiosity/output/probe.h"
 #include "radiosity/rivals/reference.h"
@@ -171,7 +172,8 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     if (def->size != sizeof *def || !(def->error > 0) || !(def->max_edge >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "error must be positive and max_edge not negative");
     fct_scene_view view = fct_scene_get(scene);
-    fct_result result = check_extents(env, &view);
+    fct_result result = fct_attributes_check(env, def);
+    if (result == FCT_OK) result = check_extents(env, &view);
     if (result != FCT_OK) return result;
     fct_bake *bake = fct_allocate_zero(env, 1, sizeof *bake);
     if (!bake) return fct_fail_memory(env, "a bake");
@@ -249,6 +251,7 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     else
         result = fct_fail_memory(s->env, "a reference");
     *power = 0;
+    if (result == FCT_OK) result = fct_attributes_add(s->env, s->def.outputs, NULL, f.mesh.colors, &f.mesh);
     for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
         if (!s->def.indirect_only) count_power(&bake->stats, m, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
         for (int c = 0; c < 3; ++c) {
@@ -295,35 +298,6 @@ static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[
     return result;
 }
 
-/* Appends `part` to `whole`, whose arrays are large enough. */
-static void append_mesh(fct_mesh *whole, const fct_mesh *part) {
-    memcpy(whole->positions + 3 * (size_t)whole->vertex_count, part->positions,
-           3 * (size_t)part->vertex_count * sizeof(float));
-    memcpy(whole->colors + 3 * (size_t)whole->vertex_count, part->colors,
-           3 * (size_t)part->vertex_count * sizeof(float));
-    for (size_t i = 0; i < 3 * (size_t)part->face_count; ++i)
-        whole->triangles[3 * (size_t)whole->face_count + i] = part->triangles[i] + whole->vertex_count;
-    if (whole->source_faces)
-        memcpy(whole->source_faces + whole->face_count, part->source_faces,
-               part->face_count * sizeof *part->source_faces);
-    whole->vertex_count += part->vertex_count;
-    whole->face_count += part->face_count;
-}
-
-/* Joins parts into one mesh. arrays: FCT_MESH_ bits. */
-static fct_result join_meshes(const fct_env *env, const fct_mesh *parts, uint32_t count, unsigned arrays,
-                              fct_mesh *out) {
-    uint64_t vertices = 0, faces = 0;
-    for (uint32_t i = 0; i < count; ++i) vertices += parts[i].vertex_count, faces += parts[i].face_count;
-    if (vertices >= INT32_MAX || faces >= INT32_MAX)
-        return fct_fail(env, FCT_ERROR_MEMORY, "the lit mesh has more than 2^31 vertices or faces");
-    fct_result result = fct_mesh_create(env, (uint32_t)vertices, (uint32_t)faces, arrays, out);
-    if (result != FCT_OK) return result;
-    out->vertex_count = out->face_count = 0;
-    for (uint32_t i = 0; i < count; ++i) append_mesh(out, &parts[i]);
-    return FCT_OK;
-}
-
 fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     const fct_env *env = bake->solution.env;
     fct_mesh sides[2] = {{0}, {0}};
@@ -332,7 +306,7 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     double start = fct_seconds();
     fct_result result = light_sides(bake, instance, sides, &count);
     if (result == FCT_OK && count == 2) {
-        result = join_meshes(env, sides, 2, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, out);
+        result = fct_mesh_join(env, sides, 2, out);
     } else if (result == FCT_OK) {
         *out = sides[0];
         sides[0] = (fct_mesh){0};
@@ -349,6 +323,12 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     return result;
 }
 
+static void drop_sources(const fct_env *env, fct_mesh *mesh) {
+    fct_release(env, mesh->source_faces);
+    fct_release(env, mesh->source_uv);
+    mesh->source_faces = NULL, mesh->source_uv = NULL;
+}
+
 fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
     const fct_env *env = bake->solution.env;
     uint32_t count = bake->solution.elements.view.instance_count;
@@ -359,8 +339,9 @@ fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         result = fct_bake_instance(bake, i, &parts[i]);
         if (face_counts) face_counts[i] = parts[i].face_count;
+        if (!bake->solution.def.sources) drop_sources(env, &parts[i]);
     }
-    if (result == FCT_OK) result = join_meshes(env, parts, count, FCT_MESH_COLORS, out);
+    if (result == FCT_OK) result = fct_mesh_join(env, parts, count, out);
     memcpy(out->origin, bake->solution.elements.view.origin, sizeof out->origin);
     for (uint32_t i = 0; i < count; ++i) fct_mesh_release(env, &parts[i]);
     fct_release(env, parts);

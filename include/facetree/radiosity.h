@@ -32,6 +32,10 @@ typedef struct fct_bake_def {
     uint32_t samples; /* REFERENCE: paths per vertex, default 256; FACE: gather rays per anchor; 0: default */
     uint64_t seed;    /* of all random numbers; equal seeds give equal results */
     bool indirect_only; /* the output leaves out emission and direct light */
+    unsigned outputs;   /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
+                           FCT_MESH_INDIRECT; default 0. REFERENCE knows the irradiance alone, and NONE does not
+                           know its parts. indirect_only leaves the direct part out of the irradiance too */
+    bool sources;       /* fct_bake_mesh also gives source_faces and source_uv; default false */
     double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
                            72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
@@ -60,7 +64,8 @@ typedef struct fct_bake_stats {
 typedef struct fct_bake fct_bake;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
- * (error <= 0, max_edge < 0, a scene or model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
+ * (error <= 0, max_edge < 0, outputs that the method does not know, a scene or model with a diagonal outside
+ * [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 /* NULL is allowed. */
@@ -69,10 +74,11 @@ FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
 
 /* The lit mesh of one instance in world space, with the scene's origin; colours are radiosity per vertex.
  * Large flat triangles are tessellated, and vertices on creases are doubled; source_faces gives the face of
- * the mesh as it was added. A two-sided instance has each of its sides that is lit, with its own vertices and
- * wound so that this side is in front: first the side with more radiosity, then the other one unless it has
- * less than 1e-4 of that. The caller releases *out with fct_mesh_release. Errors: MEMORY, CANCELLED; *out is
- * empty then. */
+ * the mesh as it was added, and source_uv where in this face each corner lies. With env->flip_inward, a face
+ * that was turned has its corners in the turned order. A two-sided instance has each of its sides that is
+ * lit, with its own vertices and wound so that this side is in front: first the side with more radiosity,
+ * then the other one unless it has less than 1e-4 of that. The caller releases *out with fct_mesh_release.
+ * Errors: MEMORY, CANCELLED; *out is empty then. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
 /* All instances in one mesh, in their order. face_counts (may be NULL) receives the number of faces of each
  * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */

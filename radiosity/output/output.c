@@ -15,6 +15,7 @@
 #include "mesh/mesh.h"
 
 #include "radiosity/output/anchor.h"
+#include "radiosity/output/attributes.h"
 #include "radiosity/output/blend.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/surface/cover.h"
@@ -379,6 +380,8 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
         if (added == 0) break;
     }
     if (result == FCT_OK) result = finish_colors(&l);
+    if (result == FCT_OK)
+        result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};

@@ -183,6 +183,15 @@ static fct_result bake_instance_with(const fct_env *env, fct_bake_method method,
     return finish_bake(env, bake, &mesh, STARVE(fct_bake_instance(bake, 0, &mesh)));
 }
 
+static fct_result bake_lights(const fct_env *env) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_DIRECT);
+    def.outputs = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT;
+    fct_bake *bake;
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);
+    return finish_bake(env, bake, &mesh, STARVE(fct_bake_instance(bake, 0, &mesh)));
+}
+
 static fct_result bake_instance(const fct_env *env) {
     return bake_instance_with(env, FCT_BAKE_FACE, FCT_FINAL_GATHER);
 }
@@ -243,6 +252,7 @@ const memory_call scene_calls[] = {{"fct_scene_create", "", create_scene, false}
                                    {"fct_bake_instance", "direct", bake_instance_direct, false},
                                    {"fct_bake_instance", "none", bake_instance_plain, false},
                                    {"fct_bake_instance", "reference", bake_reference, false},
+                                   {"fct_bake_instance", "all outputs", bake_lights, false},
                                    {"fct_bake_mesh", "", bake_mesh, false},
                                    {"fct_bake_probe", "face", bake_probe, false},
                                    {"fct_bake_probe", "reference", bake_probe_reference, false},

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "tools/bake/objects.h"
+#include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
 #include "tools/commands.h"
 #include "tools/kit/command.h"
@@ -19,7 +20,8 @@ typedef struct bake_options {
     fct_bake_def def;
     fct_backend backend;
     const char *probes;
-    double exposure;
+    fct_mesh_save_def save;
+    bake_outputs outputs;
     const char *also;
     bool two_sided;
     int quality; /* of qualities */
@@ -44,7 +46,9 @@ enum {
     KEY_EXPOSURE,
     KEY_MAX_EDGE,
     KEY_ALSO,
-    KEY_TWO_SIDED
+    KEY_TWO_SIDED,
+    KEY_LIGHT,
+    KEY_SOURCE
 };
 
 static const struct argp_option bake_options_table[] = {
@@ -72,6 +76,18 @@ static const struct argp_option bake_options_table[] = {
      "Also compute the light at points, one per line: x y z nx ny nz; - is standard input", 0},
     {"exposure", KEY_EXPOSURE, "F", 0,
      "Factor on the colours for display (default 1); the stored radiosity does not change", 0},
+    {"light", KEY_LIGHT, "LIST", 0,
+     "What to write, separated by commas: radiosity (default), the light that leaves a surface; irradiance, "
+     "the "
+     "light that arrives, before the surface's own colour; direct and indirect, the two parts of the "
+     "irradiance. All are per area, in the unit of the scene's emission. The first one makes the colours, "
+     "and "
+     "all are written as floats. reference gives radiosity and irradiance",
+     0},
+    {"source", KEY_SOURCE, NULL, 0,
+     "Also write where each face of a .ply comes from: source_face, a face of the object's mesh, and "
+     "source_uv, the weights of the second and the third corner of that face at each corner",
+     0},
     {"max-edge", KEY_MAX_EDGE, "L", 0,
      "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
      "scene)",
@@ -89,6 +105,7 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const char *const names[] = {"draft", "normal", "fine", NULL};
     bake_options *o = state->input;
     int index = 0;
+    double exposure = 1;
     error_t error;
     switch (key) {
     case KEY_METHOD:
@@ -100,6 +117,13 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case ARGP_KEY_END:
         if (!o->error_given) o->def.error = qualities[o->quality].error;
         if (!o->final_given) o->def.final = qualities[o->quality].final;
+        o->def.outputs = o->outputs.lights & ~(unsigned)FCT_MESH_COLORS;
+        bake_set_save(&o->outputs, &o->save);
+        return 0;
+    case KEY_LIGHT:
+        return bake_parse_outputs(state, text, &o->outputs);
+    case KEY_SOURCE:
+        o->def.sources = o->save.sources = true;
         return 0;
     case KEY_FINAL:
         o->final_given = true;
@@ -120,7 +144,9 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         o->probes = text;
         return 0;
     case KEY_EXPOSURE:
-        return tool_parse_real(state, "--exposure", text, 0, 1e12, &o->exposure);
+        error = tool_parse_real(state, "--exposure", text, 0, 1e12, &exposure);
+        o->save.exposure = (float)exposure;
+        return error;
     case KEY_ALSO:
         o->also = text;
         return 0;
@@ -140,8 +166,8 @@ static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     fct_mesh mesh;
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
-    code = tool_save_mesh(t, t->output, &mesh, o->exposure);
-    if (code == TOOL_DONE && o->also) code = tool_save_mesh(t, o->also, &mesh, o->exposure);
+    code = tool_save_mesh_as(t, t->output, &mesh, &o->save);
+    if (code == TOOL_DONE && o->also) code = tool_save_mesh_as(t, o->also, &mesh, &o->save);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -190,6 +216,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
         (json_int_t)tool_peak_bytes(), "touched_bytes", (json_int_t)s->touched_bytes, "power", "emitted",
         s->power_emitted, "absorbed", s->power_absorbed, "escaped", s->power_escaped, "error_estimate",
         s->error_estimate);
+    if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (probes && object) json_object_set(object, "probes", probes);
     if (files && object) json_object_set(object, "files", files);
     int code = tool_json(t, object);
@@ -225,7 +252,7 @@ static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, f
     if (code == TOOL_DONE) code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
     if (code == TOOL_DONE && folder) {
         answers->files = json_array();
-        code = bake_write_objects(t, bake, &view, &objects, o->exposure, answers->files);
+        code = bake_write_objects(t, bake, &view, &objects, &o->save, answers->files);
     } else if (code == TOOL_DONE && t->output) {
         code = write_file(t, o, bake);
     }
@@ -325,8 +352,8 @@ int tool_bake(int argc, char **argv) {
             "either a mesh in world "
             "space or a folder, which receives one .ply per object. A .glb holds linear COLOR_0, exposed "
             "and clamped, "
-            "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
-            "triangles are divided, so "
+            "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. With --light they hold "
+            "_IRRADIANCE, _DIRECT, _INDIRECT, irradiance_r/g/b, ... Large flat triangles are divided, so "
             "that they can carry shadows. A scene in which nothing emits light is an error. The exit code is "
             "1 if the solution has not converged.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
@@ -339,7 +366,7 @@ int tool_bake(int argc, char **argv) {
             "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
             "seconds{load, open, "
             "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
-            "error_estimate, "
+            "error_estimate, outputs[] (the quantities of --light), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
             "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
             "name of its model. Powers are sums over "
@@ -347,6 +374,7 @@ int tool_bake(int argc, char **argv) {
         .examples = "  facetree bake scene.json -o lit.glb\n"
                     "  facetree bake room.obj -o lit.glb --quality draft\n"
                     "  facetree bake scene.json -o lit/ --json\n"
+                    "  facetree bake scene.json -o lit.glb --light irradiance,direct\n"
                     "  facetree bake scene.json --probe points.txt",
         .options = bake_options_table,
         .parse = parse_bake,
@@ -358,6 +386,9 @@ int tool_bake(int argc, char **argv) {
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,
         .output_folder = true};
-    bake_options options = {.def = fct_bake_def_default(), .exposure = 1, .quality = 1};
+    bake_options options = {.def = fct_bake_def_default(),
+                            .save = fct_mesh_save_def_default(),
+                            .outputs = {FCT_MESH_COLORS, FCT_MESH_COLORS},
+                            .quality = 1};
     return tool_main(&command, argc, argv, &options);
 }

@@ -49,8 +49,8 @@ static fct_result list_parts(fct_gltf *d, uint32_t mesh) {
         if (result != FCT_OK) return result;
         d->parts[d->part_count++] = (fct_gltf_part){mesh, (uint32_t)i};
         ++g->count;
-        g->colors |= p.color >= 0 || p.radiosity >= 0;
-        g->radiosity |= p.radiosity >= 0;
+        g->colors |= p.color >= 0 || p.light >= 0;
+        if (!g->light) g->light = p.light_name;
         g->texcoords |= p.texcoord >= 0;
     }
     return FCT_OK;

@@ -98,8 +98,9 @@ static fct_result make_geometries(writing *w) {
         fct_glb_geometry *geometry = w->content.geometries + at;
         w->groups[at] = g;
         result = make_group_mesh(d, m, g, faces + starts[g], count, w->meshes + at);
-        *geometry = (fct_glb_geometry){.mesh = w->meshes + at, .radiosity = d->groups[g].radiosity};
-        fct_sink sink = {d->env, w->path, w->meshes + at, w->def};
+        *geometry = (fct_glb_geometry){.mesh = w->meshes + at, .light_name = d->groups[g].light};
+        fct_sink sink = {d->env, w->path, w->meshes + at, w->def, NULL};
+        geometry->light = geometry->light_name ? w->meshes[at].colors : NULL;
         if (result == FCT_OK) result = fct_glb_layout_build(&sink, &geometry->layout);
         if (result == FCT_OK)
             result = fct_progress(d->env, "write", .5 * (double)(g + 1) / (double)d->group_count);
@@ -315,7 +316,7 @@ static size_t print_document(void *user, FILE *json) {
 
 static fct_result produce(void *user, FILE *stream) {
     writing *w = user;
-    fct_sink sink = {w->gltf->env, w->path, w->mesh, w->def};
+    fct_sink sink = {w->gltf->env, w->path, w->mesh, w->def, NULL};
     fct_result result = fct_glb_write_file(&sink, &w->content, print_document, w, stream);
     return result == FCT_OK && w->failed ? fail_json(w->gltf) : result;
 }

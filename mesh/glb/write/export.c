@@ -18,15 +18,25 @@ typedef struct array {
     bool there;
 } array;
 
-enum { ARRAYS = 5 };
+enum { ARRAYS = 8, LIGHTS = 4 };
+
+/* The float lights of a geometry, in the order of their attributes; NULL: absent. */
+static void list_lights(const fct_glb_geometry *g, const float *out[LIGHTS]) {
+    out[0] = g->light, out[1] = g->mesh->irradiance, out[2] = g->mesh->direct, out[3] = g->mesh->indirect;
+}
 
 /* The attributes of a geometry, in the order of their views. */
 static void list_arrays(const fct_glb_geometry *g, array out[ARRAYS]) {
     const fct_mesh *m = g->mesh;
+    const float *lights[LIGHTS];
+    list_lights(g, lights);
     const array arrays[ARRAYS] = {{"POSITION", "VEC3", "", 5126, 12, true},
                                   {"NORMAL", "VEC3", "", 5126, 12, m->normals != NULL},
                                   {"COLOR_0", "VEC4", ",\"normalized\":true", 5123, 8, m->colors != NULL},
-                                  {"_RADIOSITY", "VEC3", "", 5126, 12, m->colors != NULL && g->radiosity},
+                                  {g->light_name, "VEC3", "", 5126, 12, lights[0] != NULL},
+                                  {"_IRRADIANCE", "VEC3", "", 5126, 12, lights[1] != NULL},
+                                  {"_DIRECT", "VEC3", "", 5126, 12, lights[2] != NULL},
+                                  {"_INDIRECT", "VEC3", "", 5126, 12, lights[3] != NULL},
                                   {"TEXCOORD_0", "VEC2", "", 5126, 8, g->layout.texcoords != NULL}};
     memcpy(out, arrays, sizeof arrays);
 }
@@ -197,11 +207,12 @@ static void write_geometry(const fct_sink *sink, const fct_glb_geometry *g, FILE
     for (uint32_t i = 0; i < l->vertex_count; ++i)
         write_floats(stream, m->positions + 3 * find_origin(l, i), 3);
     if (m->normals) write_normals(m, l, stream);
-    if (m->colors) {
-        write_colors(sink, m, l, stream);
-        for (uint32_t i = 0; g->radiosity && i < l->vertex_count; ++i)
-            write_floats(stream, m->colors + 3 * find_origin(l, i), 3);
-    }
+    if (m->colors) write_colors(sink, m, l, stream);
+    const float *lights[LIGHTS];
+    list_lights(g, lights);
+    for (int k = 0; k < LIGHTS; ++k)
+        for (uint32_t i = 0; lights[k] && i < l->vertex_count; ++i)
+            write_floats(stream, lights[k] + 3 * find_origin(l, i), 3);
     if (l->texcoords)
         for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, l->texcoords + 2 * (size_t)i, 2);
     const uint32_t *corners = l->corners ? l->corners : m->triangles;

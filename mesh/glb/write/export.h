@@ -2,7 +2,8 @@
  *
  * A file holds a list of geometries: vertices with their attributes, and one primitive per material over
  * them. Each attribute is a buffer view and an accessor, and so are the indices of each primitive. COLOR_0
- * holds the exposed, clamped, linear colours as normalized shorts; _RADIOSITY holds the unchanged colours.
+ * holds the exposed, clamped, linear colours as normalized shorts; _RADIOSITY (or _IRRADIANCE, ...) holds
+ * light as floats.
  * All data are little endian and aligned to four bytes. The JSON is made first, because its length comes
  * before it in the file.
  */
@@ -14,8 +15,9 @@
 typedef struct fct_glb_geometry {
     const fct_mesh *mesh;
     fct_glb_layout layout;
-    bool radiosity;        /* colours are also written as _RADIOSITY */
-    size_t accessor, view; /* numbers of its first accessor and buffer view */
+    const float *light;     /* floats per vertex of the mesh to write beside its colours, or NULL */
+    const char *light_name; /* their attribute, such as _RADIOSITY */
+    size_t accessor, view;  /* numbers of its first accessor and buffer view */
 } fct_glb_geometry;
 
 /* Bytes of another kind, such as an image, in a buffer view of their own. */

@@ -92,7 +92,7 @@ static size_t print_json(void *user, FILE *json) {
 
 fct_result fct_write_glb(const fct_sink *sink, FILE *stream) {
     fct_note_left_out(sink, FCT_MESH_FACE_COLORS);
-    fct_glb_geometry geometry = {.mesh = sink->mesh, .radiosity = true};
+    fct_glb_geometry geometry = {.mesh = sink->mesh, .light = sink->radiosity, .light_name = "_RADIOSITY"};
     fct_glb_content content = {.geometries = &geometry, .geometry_count = 1};
     fct_result result = fct_progress(sink->env, "write", 0);
     if (result == FCT_OK) result = fct_glb_layout_build(sink, &geometry.layout);
