@@ -23,6 +23,15 @@ typedef enum fct_bake_method { FCT_BAKE_FACE, FCT_BAKE_REFERENCE } fct_bake_meth
  * GATHER: the same with enough anchors for contacts and relief. */
 typedef enum fct_final { FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER } fct_final;
 
+/* The mesh of the output.
+ * NONE: finer than the model where light needs it.
+ * CORNER: the faces of the mesh as it was added, in its order, with a vertex per smooth side of a crease: its
+ * vertices keep their numbers, others follow.
+ * VERTEX: the mesh as it was added. A vertex on a crease has the mean of its sides, weighted by their area.
+ * FACE: the same with face_colors instead of colors: the mean of each face, from its corners and its centre.
+ */
+typedef enum fct_keep { FCT_KEEP_NONE, FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE } fct_keep;
+
 typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
@@ -35,6 +44,7 @@ typedef struct fct_bake_def {
     unsigned outputs;   /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
                            FCT_MESH_INDIRECT; default 0. REFERENCE knows the irradiance alone, and NONE does not
                            know its parts. indirect_only leaves the direct part out of the irradiance too */
+    fct_keep keep;      /* default NONE. FACE has no outputs beside the colours */
     bool sources;       /* fct_bake_mesh also gives source_faces and source_uv; default false */
     double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
                            72nd of the diagonal of all surfaces that emit no light */
@@ -51,6 +61,7 @@ typedef struct fct_bake_stats {
     double seconds_solve;       /* iterations and gathers */
     double seconds_push;        /* output so far */
     double seconds_total;       /* all of fct_bake_create, and the output so far */
+    uint32_t sides_left_out;    /* lit sides of two-sided instances that keep has no place for, so far */
     uint64_t touched_bytes;     /* pages of the hierarchies that were read, without rays */
     /* The reference counts the power of the instances that it has written. */
     double power_emitted;                 /* area times emission, summed over RGB */
@@ -78,8 +89,16 @@ FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
  * that was turned has its corners in the turned order. A two-sided instance has each of its sides that is
  * lit, with its own vertices and wound so that this side is in front: first the side with more radiosity,
  * then the other one unless it has less than 1e-4 of that. The caller releases *out with fct_mesh_release.
- * Errors: MEMORY, CANCELLED; *out is empty then. */
+ * Errors: MEMORY, CANCELLED; *out is empty then.
+ *
+ * With def.keep, the mesh is that of the object, in world space, with all its vertices: those without faces
+ * are black. A mirrored instance has corners 1 and 2 of each face exchanged, so that its front stays outside.
+ * A two-sided instance has the light of its brighter side and the winding of its front. An instance that is
+ * one of several parts of an object is an error (DATA): use fct_bake_object. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
+/* The lit mesh of an object: of all its instances. With def.keep, its parts are one mesh again, in the order
+ * of the mesh as it was added. Errors: as above. */
+FCT_API fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out);
 /* All instances in one mesh, in their order. face_counts (may be NULL) receives the number of faces of each
  * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */
 FCT_API fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts);

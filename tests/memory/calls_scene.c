@@ -192,6 +192,31 @@ static fct_result bake_lights(const fct_env *env) {
     return finish_bake(env, bake, &mesh, STARVE(fct_bake_instance(bake, 0, &mesh)));
 }
 
+static fct_result bake_object_with(const fct_env *env, fct_keep keep) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_DIRECT);
+    def.keep = keep;
+    fct_bake *bake;
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);
+    return finish_bake(env, bake, &mesh, STARVE(fct_bake_object(bake, 0, &mesh)));
+}
+
+static fct_result bake_object(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_NONE);
+}
+
+static fct_result bake_corners(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_CORNER);
+}
+
+static fct_result bake_vertices(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_VERTEX);
+}
+
+static fct_result bake_faces(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_FACE);
+}
+
 static fct_result bake_instance(const fct_env *env) {
     return bake_instance_with(env, FCT_BAKE_FACE, FCT_FINAL_GATHER);
 }
@@ -253,6 +278,10 @@ const memory_call scene_calls[] = {{"fct_scene_create", "", create_scene, false}
                                    {"fct_bake_instance", "none", bake_instance_plain, false},
                                    {"fct_bake_instance", "reference", bake_reference, false},
                                    {"fct_bake_instance", "all outputs", bake_lights, false},
+                                   {"fct_bake_object", "", bake_object, false},
+                                   {"fct_bake_object", "corner", bake_corners, false},
+                                   {"fct_bake_object", "vertex", bake_vertices, false},
+                                   {"fct_bake_object", "face", bake_faces, false},
                                    {"fct_bake_mesh", "", bake_mesh, false},
                                    {"fct_bake_probe", "face", bake_probe, false},
                                    {"fct_bake_probe", "reference", bake_probe_reference, false},

@@ -74,6 +74,22 @@ expect 65 bake furnace.json -o x.ply --light indirect --method reference
 says "radiosity and irradiance"
 check "no file" test ! -e x.ply
 
+# --keep-mesh: the faces of the input; colours of faces in every format.
+for how in vertex corner face; do
+    for form in ply off glb obj; do
+        expect 0 bake furnace.json -o kept.$form --keep-mesh $how --quality draft
+        expect 0 info kept.$form --json
+        holds "$(value faces) == 528"
+        [ $how = corner ] || [ $how$form = faceglb ] || [ $how$form = faceobj ] || holds "$(value vertices) == 266"
+    done
+    expect 0 compare kept.glb lit.ply --json
+    holds "$(value color_rms) < .06"
+done
+expect 0 info kept.glb --json
+holds "$(value vertices) == 3 * 528"
+expect 64 bake furnace.json -o kept.ply --keep-mesh edge
+expect 65 bake furnace.json -o kept.ply --keep-mesh face --light irradiance
+
 # A folder receives one file per object.
 cat >two.json <<'END'
 {"models": {"room": "inside.off", "box": "cube.off"},

@@ -10,6 +10,7 @@
 #include "tools/bake/objects.h"
 #include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
+#include "tools/bake/save.h"
 #include "tools/commands.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
@@ -48,6 +49,7 @@ enum {
     KEY_ALSO,
     KEY_TWO_SIDED,
     KEY_LIGHT,
+    KEY_KEEP,
     KEY_SOURCE
 };
 
@@ -84,6 +86,12 @@ static const struct argp_option bake_options_table[] = {
      "and "
      "all are written as floats. reference gives radiosity and irradiance",
      0},
+    {"keep-mesh", KEY_KEEP, "HOW", 0,
+     "Write the faces of the input in its order, and divide none. vertex: one colour per vertex, on a crease "
+     "the "
+     "mean of its sides; corner: a vertex more for each other side of a crease; face: one colour per face. A "
+     "two-sided surface has the light of its brighter side",
+     0},
     {"source", KEY_SOURCE, NULL, 0,
      "Also write where each face of a .ply comes from: source_face, a face of the object's mesh, and "
      "source_uv, the weights of the second and the third corner of that face at each corner",
@@ -103,6 +111,8 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const fct_bake_method method_values[] = {FCT_BAKE_FACE, FCT_BAKE_REFERENCE};
     static const fct_final final_values[] = {FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER};
     static const char *const names[] = {"draft", "normal", "fine", NULL};
+    static const char *const keeps[] = {"corner", "vertex", "face", NULL};
+    static const fct_keep keep_values[] = {FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE};
     bake_options *o = state->input;
     int index = 0;
     double exposure = 1;
@@ -122,6 +132,10 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_LIGHT:
         return bake_parse_outputs(state, text, &o->outputs);
+    case KEY_KEEP:
+        error = tool_parse_choice(state, "--keep-mesh", text, keeps, &index);
+        o->def.keep = keep_values[index];
+        return error;
     case KEY_SOURCE:
         o->def.sources = o->save.sources = true;
         return 0;
@@ -166,8 +180,8 @@ static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     fct_mesh mesh;
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
-    code = tool_save_mesh_as(t, t->output, &mesh, &o->save);
-    if (code == TOOL_DONE && o->also) code = tool_save_mesh_as(t, o->also, &mesh, &o->save);
+    code = bake_save_mesh(t, t->output, &mesh, &o->save);
+    if (code == TOOL_DONE && o->also) code = bake_save_mesh(t, o->also, &mesh, &o->save);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -241,6 +255,15 @@ static int check_light(tool *t, const fct_scene_view *scene) {
         t->inputs[0]);
 }
 
+static void warn_sides(tool *t, const fct_bake_stats *s) {
+    const bool one = s->sides_left_out == 1;
+    if (s->sides_left_out)
+        tool_warn(t,
+                  "%u two-sided surface%s lit on both sides; --keep-mesh has a place for the brighter side "
+                  "alone",
+                  s->sides_left_out, one ? " is" : "s are");
+}
+
 static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, fct_scene *scene, double load,
                        bake_answers *answers) {
     fct_bake *bake = NULL;
@@ -259,6 +282,7 @@ static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, f
     if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
     if (code == TOOL_DONE) {
         fct_bake_stats stats = fct_bake_get_stats(bake);
+        warn_sides(t, &stats);
         code = report_bake(t, o, &stats, load, answers->probes, answers->files);
     }
     bake_release_objects(t, &objects);
@@ -354,7 +378,8 @@ int tool_bake(int argc, char **argv) {
             "and clamped, "
             "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. With --light they hold "
             "_IRRADIANCE, _DIRECT, _INDIRECT, irradiance_r/g/b, ... Large flat triangles are divided, so "
-            "that they can carry shadows. A scene in which nothing emits light is an error. The exit code is "
+            "that they can carry shadows; --keep-mesh keeps the faces of the input instead. A scene in which "
+            "nothing emits light is an error. The exit code is "
             "1 if the solution has not converged.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
@@ -375,6 +400,7 @@ int tool_bake(int argc, char **argv) {
                     "  facetree bake room.obj -o lit.glb --quality draft\n"
                     "  facetree bake scene.json -o lit/ --json\n"
                     "  facetree bake scene.json -o lit.glb --light irradiance,direct\n"
+                    "  facetree bake model.obj -o lit/ --keep-mesh vertex\n"
                     "  facetree bake scene.json --probe points.txt",
         .options = bake_options_table,
         .parse = parse_bake,

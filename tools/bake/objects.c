@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/bake/save.h"
 #include "tools/guard/inputs.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -42,29 +43,6 @@ int bake_plan_objects(tool *t, const fct_scene_view *scene, bake_objects *out) {
     return code;
 }
 
-/* The lit parts of the object whose first instance is `first`, as one mesh. */
-static int merge_parts(tool *t, fct_bake *bake, const fct_scene_view *scene, uint32_t first, fct_mesh *all) {
-    uint32_t end = first, count = 0;
-    while (end < scene->instance_count && scene->instances[end].object == scene->instances[first].object)
-        ++end;
-    fct_mesh *parts = tool_allocate(t, end - first, sizeof *parts);
-    if (!parts) return TOOL_MEMORY;
-    int code = TOOL_DONE;
-    for (uint32_t i = first; i < end && code == TOOL_DONE; ++i) {
-        code = tool_result(t, fct_bake_instance(bake, i, &parts[count]));
-        if (code == TOOL_DONE) ++count;
-    }
-    if (code == TOOL_DONE && count == 1) {
-        *all = parts[0];
-        count = 0;
-    } else if (code == TOOL_DONE) {
-        code = tool_result(t, fct_mesh_join(&t->env, parts, count, all));
-    }
-    for (uint32_t i = 0; i < count; ++i) fct_mesh_release(&t->env, &parts[i]);
-    tool_release(t, parts);
-    return code;
-}
-
 /* A file system may take two names for one in ways that bake_make_name does not know. The file of an earlier
  * object then stays, and this object gets another name. */
 static int avoid_written(tool *t, const guard_inputs *written, bake_objects *objects, uint32_t object,
@@ -85,9 +63,9 @@ int bake_write_objects(tool *t, fct_bake *bake, const fct_scene_view *scene, bak
         if (objects->first[i] == FCT_NONE) continue;
         const fct_instance *first = scene->instances + objects->first[i];
         fct_mesh all = {0};
-        code = merge_parts(t, bake, scene, objects->first[i], &all);
+        code = tool_result(t, fct_bake_object(bake, first->object, &all));
         if (code == TOOL_DONE) code = avoid_written(t, &written, objects, i, first->name);
-        if (code == TOOL_DONE) code = tool_save_mesh_as(t, objects->paths[i], &all, def);
+        if (code == TOOL_DONE) code = bake_save_mesh(t, objects->paths[i], &all, def);
         if (code == TOOL_DONE && !guard_add_input(&written, objects->paths[i]))
             code = tool_fail(t, TOOL_MEMORY, "out of memory for the names of files");
         if (code == TOOL_DONE)
