@@ -1,5 +1,7 @@
 /* mesh/save.c: selects the writer by the ending of the file name, and replaces the file as a whole. */
 #define _GNU_SOURCE
+#include "mesh/save.h"
+
 #include <string.h>
 #include <strings.h>
 
@@ -37,13 +39,15 @@ fct_mesh_save_def fct_mesh_save_def_default(void) {
     return (fct_mesh_save_def){.size = sizeof(fct_mesh_save_def), .exposure = 1, .display = FCT_MESH_COLORS};
 }
 
-/* The light that makes the colours for display. False if the mesh does not have it. */
-static bool choose_display(const fct_mesh *mesh, unsigned display, float **out) {
+fct_result fct_choose_display(const fct_env *env, const char *path, const fct_mesh *mesh, unsigned display,
+                              float **out) {
     *out = display == FCT_MESH_IRRADIANCE ? mesh->irradiance
            : display == FCT_MESH_DIRECT   ? mesh->direct
            : display == FCT_MESH_INDIRECT ? mesh->indirect
                                           : mesh->colors;
-    return display == FCT_MESH_COLORS || *out;
+    if (display == FCT_MESH_COLORS || *out) return FCT_OK;
+    return fct_fail(env, FCT_ERROR_DATA, "%s: the mesh does not have the light to display (bit %u)", path,
+                    display);
 }
 
 fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
@@ -63,8 +67,7 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
                         "%s: unknown kind of file; .ply, .obj, .off, .stl, .om and .glb are known", path);
     fct_result result = fct_mesh_check(env, path, mesh);
     if (result != FCT_OK) return result;
-    if (!choose_display(mesh, def->display, &shown.colors))
-        return fct_fail(env, FCT_ERROR_DATA, "%s: the mesh does not have the light to display (bit %u)", path,
-                        def->display);
+    result = fct_choose_display(env, path, mesh, def->display, &shown.colors);
+    if (result != FCT_OK) return result;
     return fct_sink_write(env, path, produce, &j);
 }

@@ -9,8 +9,7 @@ static const fct_scene_view *view_of(const fct_bake *bake) {
     return &fct_bake_solution(bake)->elements.view;
 }
 
-/* The instances [*first, *first + *count) of an object. */
-static void find_parts(const fct_scene_view *view, uint32_t object, uint32_t *first, uint32_t *count) {
+void fct_bake_parts(const fct_scene_view *view, uint32_t object, uint32_t *first, uint32_t *count) {
     uint32_t low = 0, high = view->instance_count; /* objects are in ascending order */
     while (low < high) {
         const uint32_t middle = low + (high - low) / 2;
@@ -63,7 +62,7 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     uint32_t first, count;
     *out = (fct_mesh){0};
     if (s->def.keep == FCT_KEEP_NONE) return join_sides(bake, instance, out);
-    find_parts(&s->elements.view, i->object, &first, &count);
+    fct_bake_parts(&s->elements.view, i->object, &first, &count);
     if (count > 1)
         return fct_fail(s->env, FCT_ERROR_DATA,
                         "instance %u is a part of object \"%s\", which is kept as a whole", instance,
@@ -71,9 +70,8 @@ fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     return keep_parts(bake, first, 1, out);
 }
 
-/* Joins the lit meshes of parts and releases them. */
-static fct_result join_parts(const fct_env *env, fct_mesh *parts, uint32_t count, fct_result result,
-                             fct_mesh *out) {
+fct_result fct_bake_join(const fct_env *env, fct_mesh *parts, uint32_t count, fct_result result,
+                         fct_mesh *out) {
     if (result == FCT_OK && count == 1) {
         *out = parts[0];
         parts[0] = (fct_mesh){0};
@@ -89,16 +87,16 @@ fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out) {
     const fct_solution *s = fct_bake_solution(bake);
     uint32_t first, count;
     *out = (fct_mesh){0};
-    find_parts(&s->elements.view, object, &first, &count);
+    fct_bake_parts(&s->elements.view, object, &first, &count);
     if (s->def.keep != FCT_KEEP_NONE) return keep_parts(bake, first, count, out);
     fct_mesh *parts = fct_allocate_zero(s->env, count, sizeof *parts);
     if (!parts) return fct_fail_memory(s->env, "the lit mesh");
     fct_result result = FCT_OK;
     for (uint32_t p = 0; p < count && result == FCT_OK; ++p) result = join_sides(bake, first + p, &parts[p]);
-    return join_parts(s->env, parts, count, result, out);
+    return fct_bake_join(s->env, parts, count, result, out);
 }
 
-static void drop_sources(const fct_env *env, fct_mesh *mesh) {
+void fct_bake_drop_sources(const fct_env *env, fct_mesh *mesh) {
     fct_release(env, mesh->source_faces);
     fct_release(env, mesh->source_uv);
     mesh->source_faces = NULL, mesh->source_uv = NULL;
@@ -122,8 +120,8 @@ fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
     fct_result result = FCT_OK;
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         result = kept ? fct_bake_object(bake, i, &parts[i]) : join_sides(bake, i, &parts[i]);
-        if (!s->def.sources) drop_sources(s->env, &parts[i]);
+        if (!s->def.sources) fct_bake_drop_sources(s->env, &parts[i]);
     }
     if (result == FCT_OK && face_counts) count_faces(view, parts, kept, face_counts);
-    return join_parts(s->env, parts, count, result, out);
+    return fct_bake_join(s->env, parts, count, result, out);
 }

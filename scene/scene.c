@@ -353,7 +353,7 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
         result = fct_grow(env, (void **)&scene->objects, &scene->object_capacity,
                           (size_t)scene->object_count + 1, sizeof *scene->objects);
     if (result != FCT_OK) return result;
-    scene->objects[scene->object_count++] = (fct_scene_object){scene->instance_count, count};
+    scene->objects[scene->object_count++] = (fct_scene_object){scene->instance_count, count, -1, -1};
     for (uint32_t k = 0; k < count; ++k) {
         assert(materials[k] < scene->material_count);
         instance.model = first + k;

@@ -34,6 +34,7 @@ typedef struct fct_scene_model {
 /* Instances [first, first + count) are the parts of one object. */
 typedef struct fct_scene_object {
     uint32_t first, count;
+    int64_t node, mesh; /* of the glTF file that the scene was read from, or -1 */
 } fct_scene_object;
 
 struct fct_scene {

@@ -103,6 +103,17 @@ FCT_API fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *ou
  * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */
 FCT_API fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts);
 
+/* Writes the lit scene as a .glb that keeps its nodes: each object has a node with its name and transform,
+ * and a mesh in the space of that node, with a primitive per material. Colours, _RADIOSITY and other lights
+ * are those of fct_mesh_save. docs/radiosity.md lists what is kept.
+ *
+ * document: the .glb or .gltf that the scene was read from, which keeps its hierarchy, materials, textures,
+ * cameras, lights and extras; or NULL: the nodes, materials and camera are those of the scene. def may be
+ * NULL. merged (may be NULL) receives what fct_bake_mesh gives. Errors: OUTPUT, INPUT, DATA (the scene is not
+ * that of the document, other than .glb, more than 4 GB), MEMORY, CANCELLED. */
+FCT_API fct_result fct_bake_save_scene(fct_bake *bake, const char *path, const char *document,
+                                       const fct_mesh_save_def *def, fct_mesh *merged);
+
 typedef struct fct_probe {
     float radiosity[3], irradiance[3];
     uint32_t instance, face; /* the probe's surface; FCT_NONE in free space, where radiosity is 0 */

@@ -188,7 +188,7 @@ static fct_result append_triangles(fct_glb_builder *b, const fct_glb_primitive *
     return FCT_OK;
 }
 
-static bool share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b) {
+bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b) {
     return a->position == b->position && a->normal == b->normal && a->color == b->color &&
            a->light == b->light;
 }
@@ -280,7 +280,7 @@ fct_result fct_glb_append_mesh(fct_glb_builder *b, int64_t index, const fct_glb_
         result = check_primitive(b, object, &p);
         if (result != FCT_OK) return result;
         if (is_left_out(b, p.mode)) continue;
-        if (!share_vertices(&before, &p)) {
+        if (!fct_glb_share_vertices(&before, &p)) {
             first = b->soup->vertex_count;
             result = append_vertices(b, t, &p);
         }

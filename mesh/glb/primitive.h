@@ -33,6 +33,9 @@ typedef struct fct_glb_builder {
  * _INDIRECT, else NULL. */
 const char *fct_glb_find_light(json_t *attributes);
 
+/* Whether two consecutive primitives have the same vertices in the soup. */
+bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b);
+
 /* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
  * normals if all primitives have them. *unnamed: a primitive has no material. Errors: DATA. */
 fct_result fct_glb_choose_arrays(fct_glb_builder *builder, bool *unnamed);

@@ -11,6 +11,7 @@
 #include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
 #include "tools/bake/save.h"
+#include "tools/bake/scene.h"
 #include "tools/commands.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
@@ -24,7 +25,7 @@ typedef struct bake_options {
     fct_mesh_save_def save;
     bake_outputs outputs;
     const char *also;
-    bool two_sided;
+    bool two_sided, merge;
     int quality; /* of qualities */
     bool error_given, final_given;
 } bake_options;
@@ -50,6 +51,7 @@ enum {
     KEY_TWO_SIDED,
     KEY_LIGHT,
     KEY_KEEP,
+    KEY_MERGE,
     KEY_SOURCE
 };
 
@@ -102,7 +104,10 @@ static const struct argp_option bake_options_table[] = {
      0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
      "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
-    {"also", KEY_ALSO, "FILE", 0, "Also write the mesh to a second file, in the format of its name", 0},
+    {"merge", KEY_MERGE, NULL, 0,
+     "Write a .glb as one unlit mesh in world space, without the nodes and materials of the scene", 0},
+    {"also", KEY_ALSO, "FILE", 0,
+     "Also write all objects as one mesh to a second file, in the format of its name", 0},
     {0}};
 
 static error_t parse_bake(int key, char *text, struct argp_state *state) {
@@ -164,6 +169,9 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_ALSO:
         o->also = text;
         return 0;
+    case KEY_MERGE:
+        o->merge = true;
+        return 0;
     case KEY_TWO_SIDED:
         o->two_sided = true;
         return 0;
@@ -178,6 +186,7 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
 
 static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     fct_mesh mesh;
+    if (tool_ends(t->output, "glb") && !o->merge) return bake_write_scene(t, bake, o->also, &o->save);
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
     code = bake_save_mesh(t, t->output, &mesh, &o->save);

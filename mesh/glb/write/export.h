@@ -12,12 +12,24 @@
 
 #include "mesh/glb/write/layout.h"
 
+/* A further attribute: floats per vertex of the mesh. */
+typedef struct fct_glb_extra {
+    char name[64];
+    int width; /* 1 to 4 floats per vertex */
+    float *values;
+} fct_glb_extra;
+
+enum { FCT_GLB_EXTRAS = 16 };
+
 typedef struct fct_glb_geometry {
     const fct_mesh *mesh;
     fct_glb_layout layout;
     const float *light;     /* floats per vertex of the mesh to write beside its colours, or NULL */
     const char *light_name; /* their attribute, such as _RADIOSITY */
-    size_t accessor, view;  /* numbers of its first accessor and buffer view */
+    const char *color_name; /* attribute of the colours; NULL: COLOR_0 */
+    const fct_glb_extra *extras;
+    size_t extra_count;    /* at most FCT_GLB_EXTRAS */
+    size_t accessor, view; /* numbers of its first accessor and buffer view */
 } fct_glb_geometry;
 
 /* Bytes of another kind, such as an image, in a buffer view of their own. */

@@ -205,6 +205,17 @@ static void expect_face(fct_bake *bake, const fct_mesh *corners, const fct_mesh 
     }
 }
 
+/* Three triangles in the plane z = 0, and between them face 1, whose corners lie on a line. */
+static fct_mesh make_thin(void) {
+    static const float positions[15] = {3, 1, 0, 5, 1, 0, 4, 3, 0, 4, 1, 0, 4, -1, 0};
+    static const uint32_t triangles[12] = {0, 1, 2, 1, 0, 3, 0, 4, 3, 3, 4, 1};
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&plain, 5, 4, 0, &mesh), FCT_OK);
+    memcpy(mesh.positions, positions, sizeof positions);
+    memcpy(mesh.triangles, triangles, sizeof triangles);
+    return mesh;
+}
+
 /* Without reflections between surfaces the light is exact. */
 static void faces_have_the_mean_of_corners_and_centre(void **state) {
     (void)state;
@@ -215,11 +226,18 @@ static void faces_have_the_mean_of_corners_and_centre(void **state) {
                    lamp = place_material(scene, 0, 60, false);
     place_sheet(&plain, scene, floor, 2, v3_make(-2, -2, -.1), v3_make(7, 0, 0), v3_make(0, 6, 0));
     place_sheet(&plain, scene, lamp, 1, v3_make(1.4, .2, 2), v3_make(0, .5, 0), v3_make(.5, 0, 0));
+    fct_mesh thin = make_thin();
+    place_mesh(scene, &thin, floor, NULL);
+    fct_mesh_release(&plain, &thin);
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
     fct_mesh corners = light(scene, FCT_KEEP_CORNER, 0, 0), faces = light(scene, FCT_KEEP_FACE, 0, 0);
     fct_bake *bake = start(scene, &plain, FCT_KEEP_NONE, 0);
     assert_true(!faces.colors && faces.face_count == 8 && faces.vertex_count == 9);
     for (size_t f = 0; f < 8; ++f) expect_face(bake, &corners, &faces, f, .01);
+    fct_mesh_release(&plain, &corners), fct_mesh_release(&plain, &faces);
+    corners = light(scene, FCT_KEEP_CORNER, 0, 2), faces = light(scene, FCT_KEEP_FACE, 0, 2);
+    for (size_t f = 0; f < 4; ++f) expect_face(bake, &corners, &faces, f, .02);
+    assert_true(faces.face_colors[3] > .1F); /* its corners are lit */
     fct_bake_destroy(bake);
     fct_mesh_release(&plain, &corners), fct_mesh_release(&plain, &faces);
     fct_scene_destroy(scene);
@@ -248,7 +266,7 @@ static void faces_of_parts_are_kept(void **state) {
 static void two_sided_surfaces_show_the_brighter_side(void **state) {
     (void)state;
     plain = fct_env_default();
-    for (int kind = 0; kind < 4; ++kind) {
+    for (int kind = 0; kind < 8; ++kind) {
         const bool below = kind % 2;
         fct_scene *scene;
         fct_bake_def def = fct_bake_def_default();
@@ -260,8 +278,8 @@ static void two_sided_surfaces_show_the_brighter_side(void **state) {
         place_sheet(&plain, scene, lamps[0], 1, v3_make(0, 0, 1), v3_make(0, 1, 0), v3_make(1, 0, 0));
         place_sheet(&plain, scene, lamps[1], 1, v3_make(0, 0, -1), v3_make(1, 0, 0), v3_make(0, 1, 0));
         assert_int_equal(fct_scene_commit(scene), FCT_OK);
-        def.method = kind < 2 ? FCT_BAKE_FACE : FCT_BAKE_REFERENCE;
-        def.keep = FCT_KEEP_VERTEX, def.error = 1e-3;
+        def.method = kind % 4 < 2 ? FCT_BAKE_FACE : FCT_BAKE_REFERENCE;
+        def.keep = kind < 4 ? FCT_KEEP_VERTEX : FCT_KEEP_CORNER, def.error = 1e-3;
         fct_bake *bake;
         fct_mesh mesh;
         assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_OK);
@@ -270,6 +288,7 @@ static void two_sided_surfaces_show_the_brighter_side(void **state) {
         assert_true(mesh.vertex_count == 9 && mesh.face_count == 8);
         const uint32_t first[3] = {0, 1, 4}; /* the winding of the front */
         assert_memory_equal(mesh.triangles, first, sizeof first);
+        assert_true(mesh.source_uv[2] == 1 && mesh.source_uv[5] == 1);
         /* 9 times .2 (the form factor of equal squares at distance 1) times .5 on average */
         double mean = 0;
         for (size_t v = 0; v < 9; ++v) mean += mesh.colors[3 * v] / 9.;
