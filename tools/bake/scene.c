@@ -2,6 +2,7 @@
 #include "tools/bake/scene.h"
 
 #include <string.h>
+#include <sys/stat.h>
 
 #include "tools/bake/save.h"
 #include "tools/guard/inputs.h"
@@ -9,9 +10,11 @@
 #include "tools/kit/model.h"
 
 int bake_write_scene(tool *t, fct_bake *bake, const char *also, const fct_mesh_save_def *def) {
-    /* Standard input can be read only once, so its nodes come from the scene. */
+    /* A pipe can be read only once, so its nodes come from the scene. */
     const char *input = t->inputs[0];
-    const char *document = tool_is_gltf(t, input) && strcmp(input, "-") != 0 ? input : NULL;
+    struct stat status;
+    const bool again = strcmp(input, "-") != 0 && !stat(input, &status) && S_ISREG(status.st_mode);
+    const char *document = tool_is_gltf(t, input) && again ? input : NULL;
     fct_mesh merged = {0};
     int code = tool_refuse_input(t, t->output);
     if (code == TOOL_DONE) code = tool_check_inputs(t);

@@ -1,4 +1,4 @@
-/* mesh/glb/scene/scene.c: builds the document: nodes, materials, and the pieces of lit meshes. */
+/* mesh/glb/scene/build.c: builds the document: nodes, materials, and the pieces of lit meshes. */
 #include <math.h>
 #include <string.h>
 
