@@ -25,15 +25,44 @@ char *fct_copy_text(const fct_env *env, const char *text, size_t length) {
     return copy;
 }
 
+void fct_mesh_arrays(fct_mesh *m, fct_mesh_array out[FCT_MESH_ARRAYS]) {
+    const fct_mesh_array arrays[FCT_MESH_ARRAYS] = {
+        {&m->positions, 3 * sizeof(float), 0, false},
+        {&m->triangles, 3 * sizeof(uint32_t), 0, true},
+        {&m->colors, 3 * sizeof(float), FCT_MESH_COLORS, false},
+        {&m->irradiance, 3 * sizeof(float), FCT_MESH_IRRADIANCE, false},
+        {&m->direct, 3 * sizeof(float), FCT_MESH_DIRECT, false},
+        {&m->indirect, 3 * sizeof(float), FCT_MESH_INDIRECT, false},
+        {&m->normals, 3 * sizeof(float), FCT_MESH_NORMALS, false},
+        {&m->texcoords, 6 * sizeof(float), FCT_MESH_TEXCOORDS, true},
+        {&m->face_colors, 3 * sizeof(float), FCT_MESH_FACE_COLORS, true},
+        {&m->materials, sizeof(uint32_t), FCT_MESH_MATERIALS, true},
+        {&m->source_faces, sizeof(uint32_t), FCT_MESH_SOURCE_FACES, true},
+        {&m->source_uv, 6 * sizeof(float), FCT_MESH_SOURCE_UV, true},
+    };
+    memcpy(out, arrays, sizeof arrays);
+}
+
+static void *get_array(const fct_mesh_array *array) {
+    void *values;
+    memcpy(&values, array->member, sizeof values);
+    return values;
+}
+
+static void set_array(const fct_mesh_array *array, void *values) {
+    memcpy(array->member, &values, sizeof values);
+}
+
+/* The arrays of a mesh that is only read. */
+static void list_arrays(const fct_mesh *mesh, fct_mesh *room, fct_mesh_array out[FCT_MESH_ARRAYS]) {
+    *room = *mesh;
+    fct_mesh_arrays(room, out);
+}
+
 void fct_mesh_release(const fct_env *env, fct_mesh *mesh) {
-    fct_release(env, mesh->positions);
-    fct_release(env, mesh->triangles);
-    fct_release(env, mesh->colors);
-    fct_release(env, mesh->normals);
-    fct_release(env, mesh->texcoords);
-    fct_release(env, mesh->face_colors);
-    fct_release(env, mesh->materials);
-    fct_release(env, mesh->source_faces);
+    fct_mesh_array arrays[FCT_MESH_ARRAYS];
+    fct_mesh_arrays(mesh, arrays);
+    for (int i = 0; i < FCT_MESH_ARRAYS; ++i) fct_release(env, get_array(arrays + i));
     fct_names_release(env, mesh->material_names, mesh->material_count);
     *mesh = (fct_mesh){0};
 }
@@ -41,26 +70,26 @@ void fct_mesh_release(const fct_env *env, fct_mesh *mesh) {
 fct_result fct_mesh_create(const fct_env *env, uint32_t vertex_count, uint32_t face_count, unsigned arrays,
                            fct_mesh *out) {
     *out = (fct_mesh){.vertex_count = vertex_count, .face_count = face_count};
-    size_t vertices = vertex_count, faces = face_count;
-    const fct_array all[] = {
-        FCT_ARRAY(out->positions, 3 * vertices),
-        FCT_ARRAY(out->triangles, 3 * faces),
-        FCT_ARRAY_IF(arrays & FCT_MESH_COLORS, out->colors, 3 * vertices),
-        FCT_ARRAY_IF(arrays & FCT_MESH_NORMALS, out->normals, 3 * vertices),
-        FCT_ARRAY_IF(arrays & FCT_MESH_TEXCOORDS, out->texcoords, 6 * faces),
-        FCT_ARRAY_IF(arrays & FCT_MESH_FACE_COLORS, out->face_colors, 3 * faces),
-        FCT_ARRAY_IF(arrays & FCT_MESH_MATERIALS, out->materials, faces),
-        FCT_ARRAY_IF(arrays & FCT_MESH_SOURCE_FACES, out->source_faces, faces),
-    };
-    fct_result result = fct_allocate_all(env, all, FCT_LENGTH(all), "a mesh");
-    if (result != FCT_OK) *out = (fct_mesh){0};
-    return result;
+    fct_mesh_array all[FCT_MESH_ARRAYS];
+    fct_mesh_arrays(out, all);
+    for (int i = 0; i < FCT_MESH_ARRAYS; ++i) {
+        if (all[i].bit && !(arrays & all[i].bit)) continue;
+        void *values = fct_allocate(env, all[i].of_faces ? face_count : vertex_count, all[i].size);
+        set_array(all + i, values);
+        if (values) continue;
+        fct_mesh_release(env, out);
+        return fct_fail_memory(env, "a mesh");
+    }
+    return FCT_OK;
 }
 
-static unsigned arrays_of(const fct_mesh *mesh) {
-    return (mesh->colors ? FCT_MESH_COLORS : 0u) | (mesh->normals ? FCT_MESH_NORMALS : 0u) |
-           (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0u) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0u) |
-           (mesh->materials ? FCT_MESH_MATERIALS : 0u) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0u);
+unsigned fct_mesh_bits(const fct_mesh *mesh) {
+    fct_mesh room;
+    fct_mesh_array arrays[FCT_MESH_ARRAYS];
+    unsigned bits = 0;
+    list_arrays(mesh, &room, arrays);
+    for (int i = 0; i < FCT_MESH_ARRAYS; ++i) bits |= get_array(arrays + i) ? arrays[i].bit : 0;
+    return bits;
 }
 
 /* Copies the material names. On failure out owns the names copied so far. */
@@ -80,27 +109,55 @@ static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh 
     return FCT_OK;
 }
 
-static void copy(void *to, const void *from, size_t count, size_t size) {
-    if (from && count) memcpy(to, from, count * size);
+/* Copies the arrays that both meshes have behind the first `vertices` and `faces` elements of `to`. */
+static void copy_arrays(const fct_mesh *from, fct_mesh *to, size_t vertices, size_t faces) {
+    fct_mesh room;
+    fct_mesh_array sources[FCT_MESH_ARRAYS], targets[FCT_MESH_ARRAYS];
+    list_arrays(from, &room, sources);
+    fct_mesh_arrays(to, targets);
+    for (int i = 0; i < FCT_MESH_ARRAYS; ++i) {
+        const size_t count = sources[i].of_faces ? from->face_count : from->vertex_count;
+        const size_t before = sources[i].of_faces ? faces : vertices;
+        const void *values = get_array(sources + i);
+        char *copies = get_array(targets + i);
+        if (values && copies && count)
+            memcpy(copies + before * sources[i].size, values, count * sources[i].size);
+    }
 }
 
 fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
-    fct_result result = fct_mesh_create(env, mesh->vertex_count, mesh->face_count, arrays_of(mesh), out);
+    fct_result result = fct_mesh_create(env, mesh->vertex_count, mesh->face_count, fct_mesh_bits(mesh), out);
     if (result != FCT_OK) return result;
-    size_t vertices = mesh->vertex_count, faces = mesh->face_count;
     memcpy(out->origin, mesh->origin, sizeof out->origin);
     out->source_count = mesh->source_count;
-    copy(out->positions, mesh->positions, vertices, 3 * sizeof(float));
-    copy(out->colors, mesh->colors, vertices, 3 * sizeof(float));
-    copy(out->normals, mesh->normals, vertices, 3 * sizeof(float));
-    copy(out->triangles, mesh->triangles, faces, 3 * sizeof(uint32_t));
-    copy(out->texcoords, mesh->texcoords, faces, 6 * sizeof(float));
-    copy(out->face_colors, mesh->face_colors, faces, 3 * sizeof(float));
-    copy(out->materials, mesh->materials, faces, sizeof(uint32_t));
-    copy(out->source_faces, mesh->source_faces, faces, sizeof(uint32_t));
+    copy_arrays(mesh, out, 0, 0);
     result = copy_names(env, mesh, out);
     if (result != FCT_OK) fct_mesh_release(env, out);
     return result;
+}
+
+fct_result fct_mesh_join(const fct_env *env, const fct_mesh *parts, size_t count, fct_mesh *out) {
+    uint64_t vertices = 0, faces = 0;
+    unsigned arrays = ~0u;
+    *out = (fct_mesh){0};
+    for (size_t i = 0; i < count; ++i) {
+        vertices += parts[i].vertex_count, faces += parts[i].face_count;
+        if (parts[i].vertex_count || parts[i].face_count) arrays &= fct_mesh_bits(&parts[i]);
+    }
+    if (vertices > FCT_MESH_LIMIT || faces > FCT_MESH_LIMIT)
+        return fct_fail(env, FCT_ERROR_MEMORY, "the joined mesh has more than 2^31 vertices or faces");
+    arrays = vertices || faces ? arrays & ~(unsigned)FCT_MESH_MATERIALS : 0;
+    fct_result result = fct_mesh_create(env, (uint32_t)vertices, (uint32_t)faces, arrays, out);
+    if (result != FCT_OK) return result;
+    if (count) memcpy(out->origin, parts[0].origin, sizeof out->origin);
+    uint32_t vertex = 0, face = 0;
+    for (size_t i = 0; i < count; ++i) {
+        copy_arrays(&parts[i], out, vertex, face);
+        uint32_t *corners = out->triangles + 3 * (size_t)face;
+        for (size_t c = 0; c < 3 * (size_t)parts[i].face_count; ++c) corners[c] += vertex;
+        vertex += parts[i].vertex_count, face += parts[i].face_count;
+    }
+    return FCT_OK;
 }
 
 /* The vertices of some faces. The span from the least to the greatest is all that an extraction looks at, so
@@ -134,30 +191,27 @@ static uint32_t number_vertices(const fct_mesh *mesh, const uint32_t *faces, uin
     return used;
 }
 
-static void extract_vertices(const fct_mesh *mesh, const vertex_span *span, fct_mesh *out, uint32_t *ids) {
-    for (uint32_t i = 0; i < span->count; ++i) {
-        if (span->numbers[i] == FCT_NONE) continue;
-        uint32_t v = span->first + i;
-        size_t from = 3 * (size_t)v, to = 3 * (size_t)span->numbers[i];
-        copy(out->positions + to, mesh->positions + from, 3, sizeof(float));
-        if (mesh->colors) copy(out->colors + to, mesh->colors + from, 3, sizeof(float));
-        if (mesh->normals) copy(out->normals + to, mesh->normals + from, 3, sizeof(float));
-        if (ids) ids[span->numbers[i]] = v;
+/* Copies the elements of the listed faces and of their vertices. ids: the old vertices, or NULL. */
+static void extract_elements(const fct_mesh *mesh, const vertex_span *span, const uint32_t *faces,
+                             uint32_t count, fct_mesh *out, uint32_t *ids) {
+    fct_mesh room;
+    fct_mesh_array sources[FCT_MESH_ARRAYS], targets[FCT_MESH_ARRAYS];
+    list_arrays(mesh, &room, sources);
+    fct_mesh_arrays(out, targets);
+    for (int k = 0; k < FCT_MESH_ARRAYS; ++k) {
+        const size_t size = sources[k].size;
+        const char *from = get_array(sources + k);
+        char *to = get_array(targets + k);
+        for (size_t i = 0; from && sources[k].of_faces && i < count; ++i)
+            memcpy(to + i * size, from + faces[i] * size, size);
+        for (size_t i = 0; from && !sources[k].of_faces && i < span->count; ++i)
+            if (span->numbers[i] != FCT_NONE)
+                memcpy(to + span->numbers[i] * size, from + (span->first + i) * size, size);
     }
-}
-
-static void extract_faces(const fct_mesh *mesh, const vertex_span *span, const uint32_t *faces,
-                          uint32_t count, fct_mesh *out) {
-    for (uint32_t i = 0; i < count; ++i) {
-        size_t from = faces[i], to = i;
-        for (int j = 0; j < 3; ++j)
-            out->triangles[3 * to + j] = span->numbers[mesh->triangles[3 * from + j] - span->first];
-        if (mesh->texcoords) copy(out->texcoords + 6 * to, mesh->texcoords + 6 * from, 6, sizeof(float));
-        if (mesh->face_colors)
-            copy(out->face_colors + 3 * to, mesh->face_colors + 3 * from, 3, sizeof(float));
-        if (mesh->materials) out->materials[to] = mesh->materials[from];
-        if (mesh->source_faces) out->source_faces[to] = mesh->source_faces[from];
-    }
+    for (uint32_t i = 0; ids && i < span->count; ++i)
+        if (span->numbers[i] != FCT_NONE) ids[span->numbers[i]] = span->first + i;
+    for (size_t c = 0; c < 3 * (size_t)count; ++c)
+        out->triangles[c] = span->numbers[out->triangles[c] - span->first];
 }
 
 fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint32_t *faces, uint32_t count,
@@ -170,14 +224,13 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
     span.numbers = fct_allocate(env, span.count, sizeof(uint32_t));
     if (!span.numbers) return fct_fail_memory(env, "vertex numbers");
     uint32_t used = number_vertices(mesh, faces, count, &span);
-    fct_result result = fct_mesh_create(env, used, count, arrays_of(mesh), out);
+    fct_result result = fct_mesh_create(env, used, count, fct_mesh_bits(mesh), out);
     if (result == FCT_OK && vertex_ids && !(ids = fct_allocate(env, used, sizeof(uint32_t))))
         result = fct_fail_memory(env, "vertex ids");
     if (result == FCT_OK) {
         memcpy(out->origin, mesh->origin, sizeof out->origin);
         out->source_count = mesh->source_count;
-        extract_vertices(mesh, &span, out, ids);
-        extract_faces(mesh, &span, faces, count, out);
+        extract_elements(mesh, &span, faces, count, out, ids);
         result = copy_names(env, mesh, out);
     }
     fct_release(env, span.numbers);
@@ -259,9 +312,13 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
         unsigned width;
     } floats[] = {{"vertex", "position", mesh->positions, vertices, 3},
                   {"vertex", "colour", mesh->colors, vertices, 3},
+                  {"vertex", "irradiance", mesh->irradiance, vertices, 3},
+                  {"vertex", "direct light", mesh->direct, vertices, 3},
+                  {"vertex", "indirect light", mesh->indirect, vertices, 3},
                   {"vertex", "normal", mesh->normals, vertices, 3},
                   {"face", "texture coordinate", mesh->texcoords, faces, 6},
-                  {"face", "colour", mesh->face_colors, faces, 3}};
+                  {"face", "colour", mesh->face_colors, faces, 3},
+                  {"face", "place in its source face", mesh->source_uv, faces, 6}};
     for (size_t i = 0; result == FCT_OK && i < sizeof floats / sizeof *floats; ++i)
         result = check_floats(env, prefix, floats[i].element, floats[i].what, floats[i].values,
                               floats[i].count, floats[i].width);
@@ -272,14 +329,20 @@ fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh) {
     return fct_mesh_check(env, NULL, mesh);
 }
 
+/* Swaps the second and the third pair of every six floats. NULL is allowed. */
+static void swap_corners(float *pairs, size_t faces) {
+    for (size_t f = 0; pairs && f < faces; ++f)
+        for (size_t k = 0; k < 2; ++k) {
+            float *second = pairs + 6 * f + 2 + k, swap = *second;
+            *second = second[2], second[2] = swap;
+        }
+}
+
 void fct_mesh_turn_over(fct_mesh *mesh) {
     for (size_t f = 0; f < mesh->face_count; ++f) {
         uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
         t[1] = t[2], t[2] = swap;
-        float *c = mesh->texcoords ? mesh->texcoords + 6 * f : NULL;
-        for (int k = 0; c && k < 2; ++k) {
-            float second = c[2 + k];
-            c[2 + k] = c[4 + k], c[4 + k] = second;
-        }
     }
+    swap_corners(mesh->texcoords, mesh->face_count);
+    swap_corners(mesh->source_uv, mesh->face_count);
 }

@@ -11,6 +11,19 @@
 /* fct_mesh_validate whose messages begin with `name`. NULL: they begin with the element. */
 fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *mesh);
 
+/* An array of a mesh. */
+typedef struct fct_mesh_array {
+    void *member;  /* where the mesh keeps the pointer to the array */
+    size_t size;   /* bytes per element */
+    unsigned bit;  /* FCT_MESH_, 0 for positions and triangles */
+    bool of_faces; /* an element per face, else per vertex */
+} fct_mesh_array;
+enum { FCT_MESH_ARRAYS = 12 };
+/* Lists all arrays, also those that are NULL. */
+void fct_mesh_arrays(fct_mesh *mesh, fct_mesh_array out[FCT_MESH_ARRAYS]);
+/* The FCT_MESH_ bits of the arrays that the mesh has. */
+unsigned fct_mesh_bits(const fct_mesh *mesh);
+
 /* Reverses the winding of every face. */
 void fct_mesh_turn_over(fct_mesh *mesh);
 

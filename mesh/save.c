@@ -1,5 +1,7 @@
 /* mesh/save.c: selects the writer by the ending of the file name, and replaces the file as a whole. */
 #define _GNU_SOURCE
+#include "mesh/save.h"
+
 #include <string.h>
 #include <strings.h>
 
@@ -34,7 +36,18 @@ static fct_result produce(void *user, FILE *stream) {
 }
 
 fct_mesh_save_def fct_mesh_save_def_default(void) {
-    return (fct_mesh_save_def){.size = sizeof(fct_mesh_save_def), .exposure = 1};
+    return (fct_mesh_save_def){.size = sizeof(fct_mesh_save_def), .exposure = 1, .display = FCT_MESH_COLORS};
+}
+
+fct_result fct_choose_display(const fct_env *env, const char *path, const fct_mesh *mesh, unsigned display,
+                              float **out) {
+    *out = display == FCT_MESH_IRRADIANCE ? mesh->irradiance
+           : display == FCT_MESH_DIRECT   ? mesh->direct
+           : display == FCT_MESH_INDIRECT ? mesh->indirect
+                                          : mesh->colors;
+    if (display == FCT_MESH_COLORS || *out) return FCT_OK;
+    return fct_fail(env, FCT_ERROR_DATA, "%s: the mesh does not have the light to display (bit %u)", path,
+                    display);
 }
 
 fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
@@ -45,12 +58,16 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
         return fct_fail(env, FCT_ERROR_DATA, "%s: a save def of another version, or a negative exposure",
                         path);
     const char *dot = strrchr(path, '.');
-    job j = {{env, path, mesh, def}, find_writer(dot ? dot + 1 : "")};
+    fct_mesh shown = *mesh;
+    job j = {{env, path, &shown, def, def->no_radiosity ? NULL : mesh->colors},
+             find_writer(dot ? dot + 1 : "")};
     if (!j.write && (!strcmp(path, "-") || fct_output_is_device(path))) j.write = fct_write_ply;
     if (!j.write)
         return fct_fail(env, FCT_ERROR_DATA,
                         "%s: unknown kind of file; .ply, .obj, .off, .stl, .om and .glb are known", path);
     fct_result result = fct_mesh_check(env, path, mesh);
+    if (result != FCT_OK) return result;
+    result = fct_choose_display(env, path, mesh, def->display, &shown.colors);
     if (result != FCT_OK) return result;
     return fct_sink_write(env, path, produce, &j);
 }

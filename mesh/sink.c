@@ -19,8 +19,11 @@ void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
                {FCT_MESH_NORMALS, m->normals, "normals"},
                {FCT_MESH_TEXCOORDS, m->texcoords, "texture coordinates"},
                {FCT_MESH_FACE_COLORS, m->face_colors, "face colours"},
-               {FCT_MESH_MATERIALS, m->materials, "materials"}};
-    char text[128] = "";
+               {FCT_MESH_MATERIALS, m->materials, "materials"},
+               {FCT_MESH_IRRADIANCE, m->irradiance, "irradiance"},
+               {FCT_MESH_DIRECT, m->direct, "direct light"},
+               {FCT_MESH_INDIRECT, m->indirect, "indirect light"}};
+    char text[192] = "";
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         if ((arrays & all[i].flag) && all[i].there) strcat(strcat(text, *text ? ", " : ""), all[i].name);
     if (*text) fct_note(sink->env, FCT_MESSAGE_NOTE, "%s: this format has no place for %s", sink->name, text);

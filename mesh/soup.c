@@ -9,6 +9,9 @@ void fct_soup_release(const fct_env *env, fct_soup *soup) {
     fct_release(env, soup->positions);
     fct_release(env, soup->colors);
     fct_release(env, soup->normals);
+    fct_release(env, soup->irradiance);
+    fct_release(env, soup->direct);
+    fct_release(env, soup->indirect);
     fct_release(env, soup->corners);
     fct_release(env, soup->starts);
     fct_release(env, soup->texcoords);
@@ -79,6 +82,9 @@ static void drop_if_not_finite(const fct_env *env, const char *name, const char 
 static void drop_wrong_attributes(const fct_env *env, const char *name, fct_soup *soup) {
     size_t vertices = soup->vertex_count, polygons = soup->polygon_count;
     drop_if_not_finite(env, name, "vertex", "colours", &soup->colors, vertices, 3);
+    drop_if_not_finite(env, name, "vertex", "irradiance", &soup->irradiance, vertices, 3);
+    drop_if_not_finite(env, name, "vertex", "direct light", &soup->direct, vertices, 3);
+    drop_if_not_finite(env, name, "vertex", "indirect light", &soup->indirect, vertices, 3);
     drop_if_not_finite(env, name, "vertex", "normals", &soup->normals, vertices, 3);
     drop_if_not_finite(env, name, "corner", "texture coordinates", &soup->texcoords, soup->corner_count, 2);
     drop_if_not_finite(env, name, "face", "face colours", &soup->polygon_colors, polygons, 3);
@@ -91,9 +97,13 @@ static void move_shared(fct_soup *soup, fct_mesh *out) {
     out->positions = soup->positions;
     out->colors = soup->colors;
     out->normals = soup->normals;
+    out->irradiance = soup->irradiance;
+    out->direct = soup->direct;
+    out->indirect = soup->indirect;
     out->material_count = soup->material_count;
     out->material_names = soup->material_names;
     soup->positions = soup->colors = soup->normals = NULL;
+    soup->irradiance = soup->direct = soup->indirect = NULL;
     soup->material_names = NULL;
     soup->material_count = 0;
 }

@@ -4,6 +4,8 @@
 
 #include "facetree/radiosity.h"
 #include "mesh/mesh.h"
+#include "radiosity/bake.h"
+#include "radiosity/output/attributes.h"
 #include "radiosity/output/output.h"
 #include "radiosity/output/probe.h"
 #include "radiosity/rivals/reference.h"
@@ -172,7 +174,8 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     if (def->size != sizeof *def || !(def->error > 0) || !(def->max_edge >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "error must be positive and max_edge not negative");
     fct_scene_view view = fct_scene_get(scene);
-    fct_result result = check_extents(env, &view);
+    fct_result result = fct_attributes_check(env, def);
+    if (result == FCT_OK) result = check_extents(env, &view);
     if (result != FCT_OK) return result;
     fct_bake *bake = fct_allocate_zero(env, 1, sizeof *bake);
     if (!bake) return fct_fail_memory(env, "a bake");
@@ -268,7 +271,7 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     const fct_scene_view *view = &s->elements.view;
     const fct_material *m = &view->materials[view->instances[instance].material];
     fct_surface f;
-    fct_result result = fct_surface_build(s->env, s->scene, instance, s->max_edge, &f);
+    fct_result result = fct_output_surface(s, instance, &f);
     if (result != FCT_OK) return result;
     float *lost = fct_allocate(s->env, f.mesh.vertex_count, sizeof *lost);
     for (size_t i = 0; back && i < 3 * (size_t)f.mesh.vertex_count; ++i) f.normals[i] = -f.normals[i];
@@ -279,6 +282,7 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     else
         result = fct_fail_memory(s->env, "a reference");
     *power = 0;
+    if (result == FCT_OK) result = fct_attributes_add(s->env, s->def.outputs, NULL, f.mesh.colors, &f.mesh);
     for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
         if (!s->def.indirect_only) count_power(&bake->stats, m, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
         for (int c = 0; c < 3; ++c) {
@@ -291,17 +295,26 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     if (result == FCT_OK) {
         *out = f.mesh;
         f.mesh = (fct_mesh){0};
-        if (back) fct_mesh_turn_over(out);
+        if (back && s->def.keep == FCT_KEEP_NONE) fct_mesh_turn_over(out);
     }
     fct_surface_release(s->env, &f);
     return result;
 }
 
+/* Of two lit sides, only the first one has a place on a mesh that is kept. */
+static uint32_t count_places(fct_bake *bake, uint32_t sides) {
+    if (sides < 2 || bake->solution.def.keep == FCT_KEEP_NONE) return sides;
+    ++bake->stats.sides_left_out;
+    return 1;
+}
+
 /* The sides of an instance by path tracing, the brighter one first. */
-static fct_result trace_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], uint32_t *count) {
+static fct_result trace_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], bool back[2],
+                              uint32_t *count) {
     const fct_scene_view *view = &bake->solution.elements.view;
     double power[2] = {0, 0};
     *count = view->materials[view->instances[instance].material].two_sided ? 2 : 1;
+    back[0] = false, back[1] = true;
     for (uint32_t k = 0; k < *count; ++k) {
         fct_result result = trace_side(bake, instance, k == 1, &sides[k], &power[k]);
         if (result != FCT_OK) return result;
@@ -310,8 +323,10 @@ static fct_result trace_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[
     if (power[1] > power[0]) {
         fct_mesh swap = sides[0];
         sides[0] = sides[1], sides[1] = swap;
+        back[0] = true, back[1] = false;
     }
     if (fct_min(power[0], power[1]) <= FCT_OUTPUT_DARK * fct_max(power[0], power[1])) *count = 1;
+    *count = count_places(bake, *count);
     return FCT_OK;
 }
 
@@ -324,85 +339,40 @@ static fct_result light_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     return result;
 }
 
-static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], uint32_t *count) {
-    bool back[2];
-    if (bake->solution.def.method != FCT_BAKE_FACE) return trace_sides(bake, instance, sides, count);
-    *count = fct_output_sides(&bake->solution, instance, back);
+static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], bool back[2],
+                              uint32_t *count) {
+    if (bake->solution.def.method != FCT_BAKE_FACE) return trace_sides(bake, instance, sides, back, count);
+    *count = count_places(bake, fct_output_sides(&bake->solution, instance, back));
     fct_result result = FCT_OK;
     for (uint32_t k = 0; k < *count && result == FCT_OK; ++k)
         result = light_side(bake, instance, back[k], &sides[k]);
     return result;
 }
 
-/* Appends `part` to `whole`, whose arrays are large enough. */
-static void append_mesh(fct_mesh *whole, const fct_mesh *part) {
-    memcpy(whole->positions + 3 * (size_t)whole->vertex_count, part->positions,
-           3 * (size_t)part->vertex_count * sizeof(float));
-    memcpy(whole->colors + 3 * (size_t)whole->vertex_count, part->colors,
-           3 * (size_t)part->vertex_count * sizeof(float));
-    for (size_t i = 0; i < 3 * (size_t)part->face_count; ++i)
-        whole->triangles[3 * (size_t)whole->face_count + i] = part->triangles[i] + whole->vertex_count;
-    if (whole->source_faces)
-        memcpy(whole->source_faces + whole->face_count, part->source_faces,
-               part->face_count * sizeof *part->source_faces);
-    whole->vertex_count += part->vertex_count;
-    whole->face_count += part->face_count;
+const fct_solution *fct_bake_solution(const fct_bake *bake) {
+    return &bake->solution;
 }
 
-/* Joins parts into one mesh. arrays: FCT_MESH_ bits. */
-static fct_result join_meshes(const fct_env *env, const fct_mesh *parts, uint32_t count, unsigned arrays,
-                              fct_mesh *out) {
-    uint64_t vertices = 0, faces = 0;
-    for (uint32_t i = 0; i < count; ++i) vertices += parts[i].vertex_count, faces += parts[i].face_count;
-    if (vertices >= INT32_MAX || faces >= INT32_MAX)
-        return fct_fail(env, FCT_ERROR_MEMORY, "the lit mesh has more than 2^31 vertices or faces");
-    fct_result result = fct_mesh_create(env, (uint32_t)vertices, (uint32_t)faces, arrays, out);
-    if (result != FCT_OK) return result;
-    out->vertex_count = out->face_count = 0;
-    for (uint32_t i = 0; i < count; ++i) append_mesh(out, &parts[i]);
-    return FCT_OK;
-}
-
-fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
+fct_result fct_bake_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], bool back[2],
+                          uint32_t *count) {
     const fct_env *env = bake->solution.env;
-    fct_mesh sides[2] = {{0}, {0}};
-    uint32_t count = 0;
-    *out = (fct_mesh){0};
+    sides[0] = sides[1] = (fct_mesh){0};
     double start = fct_seconds();
-    fct_result result = light_sides(bake, instance, sides, &count);
-    if (result == FCT_OK && count == 2) {
-        result = join_meshes(env, sides, 2, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, out);
-    } else if (result == FCT_OK) {
-        *out = sides[0];
-        sides[0] = (fct_mesh){0};
-    }
-    for (int k = 0; k < 2; ++k) fct_mesh_release(env, &sides[k]);
-    memcpy(out->origin, bake->solution.elements.view.origin, sizeof out->origin);
+    fct_result result = light_sides(bake, instance, sides, back, count);
     bake->stats.seconds_push += fct_seconds() - start;
-    bake->stats.vertices += out->vertex_count;
-    bake->stats.faces += out->face_count;
-    if (result != FCT_OK) return result;
-    bake->lit_work += estimate_work(&bake->solution.elements.view, instance, bake->solution.max_edge);
-    result = fct_progress(env, "objects", fct_min(bake->lit_work / bake->whole_work, 1));
-    if (result != FCT_OK) fct_mesh_release(env, out);
-    return result;
-}
-
-fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
-    const fct_env *env = bake->solution.env;
-    uint32_t count = bake->solution.elements.view.instance_count;
-    *out = (fct_mesh){0};
-    fct_mesh *parts = fct_allocate_zero(env, count, sizeof *parts);
-    if (!parts) return fct_fail_memory(env, "the lit mesh");
-    fct_result result = FCT_OK;
-    for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
-        result = fct_bake_instance(bake, i, &parts[i]);
-        if (face_counts) face_counts[i] = parts[i].face_count;
+    if (result == FCT_OK) {
+        bake->lit_work += estimate_work(&bake->solution.elements.view, instance, bake->solution.max_edge);
+        result = fct_progress(env, "objects", fct_min(bake->lit_work / bake->whole_work, 1));
     }
-    if (result == FCT_OK) result = join_meshes(env, parts, count, FCT_MESH_COLORS, out);
-    memcpy(out->origin, bake->solution.elements.view.origin, sizeof out->origin);
-    for (uint32_t i = 0; i < count; ++i) fct_mesh_release(env, &parts[i]);
-    fct_release(env, parts);
+    for (uint32_t k = 0; k < 2; ++k) {
+        if (result != FCT_OK || k >= *count) {
+            fct_mesh_release(env, &sides[k]);
+            continue;
+        }
+        memcpy(sides[k].origin, bake->solution.elements.view.origin, sizeof sides[k].origin);
+        bake->stats.vertices += sides[k].vertex_count;
+        bake->stats.faces += sides[k].face_count;
+    }
     return result;
 }
 

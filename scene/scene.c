@@ -30,6 +30,8 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
     if (model->tree) fct_tree_destroy(model->tree);
     fct_release(env, model->source_faces);
     fct_release(env, model->source_vertices);
+    fct_release(env, model->loose_vertices);
+    fct_release(env, model->loose_positions);
 }
 
 void fct_scene_destroy(fct_scene *scene) {
@@ -142,6 +144,8 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
     fct_model model = {.tree = own->tree,
                        .source_faces = own->source_faces,
                        .source_vertices = own->source_vertices,
+                       .source_face_count = fct_tree_get(own->tree).face_count,
+                       .source_vertex_count = fct_tree_get(own->tree).vertex_count,
                        .inward = fct_tree_get(own->tree).inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
@@ -246,6 +250,7 @@ static fct_result split_by_label(fct_scene *scene, const char *name, const fct_m
         parts->labels[parts->count++] = k;
         if (bodies > 0 && inward[faces[starts[k]]]) scene->models[scene->model_count - 1].inward = true;
     }
+    if (result == FCT_OK && used > 1) result = fct_scene_note_loose(scene, parts->first, mesh);
 done:
     fct_release(env, inward);
     fct_release(env, starts);
@@ -348,7 +353,7 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
         result = fct_grow(env, (void **)&scene->objects, &scene->object_capacity,
                           (size_t)scene->object_count + 1, sizeof *scene->objects);
     if (result != FCT_OK) return result;
-    scene->objects[scene->object_count++] = (fct_scene_object){scene->instance_count, count};
+    scene->objects[scene->object_count++] = (fct_scene_object){scene->instance_count, count, -1, -1};
     for (uint32_t k = 0; k < count; ++k) {
         assert(materials[k] < scene->material_count);
         instance.model = first + k;

@@ -26,13 +26,15 @@ typedef struct fct_scene_model {
     fct_tree *tree;
     fct_bvh *bvh;
     fct_bvh *points; /* answers closest points if bvh cannot (Embree), else NULL */
-    uint32_t *source_faces, *source_vertices;
+    uint32_t *source_faces, *source_vertices, *loose_vertices;
+    float *loose_positions;
     double origin[3]; /* the tree's positions are relative to it */
 } fct_scene_model;
 
 /* Instances [first, first + count) are the parts of one object. */
 typedef struct fct_scene_object {
     uint32_t first, count;
+    int64_t node, mesh; /* of the glTF file that the scene was read from, or -1 */
 } fct_scene_object;
 
 struct fct_scene {
@@ -71,6 +73,9 @@ typedef struct fct_scene_parts {
  * CANCELLED. */
 fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *mesh, fct_tree *tree,
                            const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts);
+/* Notes in the models from `first` on that they are the parts of `mesh`: its counts, and in the first one the
+ * vertices that no part has. Errors: MEMORY. */
+fct_result fct_scene_note_loose(fct_scene *scene, uint32_t first, const fct_mesh *mesh);
 /* Adds an object of models [first, first + count); `materials` has `count` ids. Errors: DATA, MEMORY. */
 fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, uint32_t count,
                            const uint32_t *materials, const float transform[12]);

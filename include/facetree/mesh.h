@@ -21,12 +21,17 @@ typedef struct fct_mesh {
     float *positions;       /* vertex_count x 3, finite */
     uint32_t *triangles;    /* face_count x 3, each < vertex_count */
     float *colors;          /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
+    float *irradiance;      /* vertex_count x 3: the light that arrives per area, or NULL */
+    float *direct;          /* vertex_count x 3: its part straight from the lamps, or NULL */
+    float *indirect;        /* vertex_count x 3: its other part, or NULL */
     float *normals;         /* vertex_count x 3, or NULL */
     float *texcoords;       /* face_count x 3 x 2, per corner, so seams need no extra vertices, or NULL */
     float *face_colors;     /* face_count x 3, linear, or NULL */
     uint32_t *materials;    /* face_count, index into material_names, or NULL */
     uint32_t *source_faces; /* face_count, polygon of each triangle, or NULL: the face number */
     uint32_t source_count;  /* polygons of the file, also those left out; 0 without source_faces */
+    float *source_uv;       /* face_count x 3 x 2: where each corner lies in the triangle source_faces[f]: the
+                               weights of that triangle's second and third corner; or NULL */
     uint32_t material_count;
     char **material_names; /* material_count strings, or NULL */
     double origin[3];      /* the vertex is at origin + position; 0 unless a reader set it (docs/mesh.md) */
@@ -39,7 +44,11 @@ enum {
     FCT_MESH_TEXCOORDS = 4,
     FCT_MESH_FACE_COLORS = 8,
     FCT_MESH_MATERIALS = 16,
-    FCT_MESH_SOURCE_FACES = 32
+    FCT_MESH_SOURCE_FACES = 32,
+    FCT_MESH_SOURCE_UV = 64,
+    FCT_MESH_IRRADIANCE = 128,
+    FCT_MESH_DIRECT = 256,
+    FCT_MESH_INDIRECT = 512
 };
 
 /* Allocates the arrays (contents undefined). On failure *out is all zero. Errors: MEMORY. */
@@ -56,6 +65,10 @@ FCT_API fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_m
 FCT_API fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint32_t *faces,
                                     uint32_t count, fct_mesh *out, uint32_t **vertex_ids);
 FCT_API void fct_memory_release(const fct_env *env, void *memory);
+/* Joins parts: their vertices, and their faces, one part after the other, with the arrays that all parts with
+ * vertices or faces have, except materials. *out has the origin of the first part; all must have the same.
+ * Errors: MEMORY (also above 2^31 vertices or faces). */
+FCT_API fct_result fct_mesh_join(const fct_env *env, const fct_mesh *parts, size_t count, fct_mesh *out);
 
 /* Counts of a mesh. All counts of defects are zero for a closed oriented manifold. */
 typedef struct fct_mesh_report {
@@ -85,12 +98,12 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
 
 /* Reads OBJ, PLY (text, both byte orders, strips), OFF, STL (corners with equal coordinates become one
  * vertex), OM and glTF 2.0 (.glb, .gltf: meshes placed by their nodes; colours from _RADIOSITY, else
- * COLOR_0; buffers in the folder of the file or below, anywhere with env->allow_outside). The ending of the
- * name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB and become linear.
- * Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other colours. A mesh
- * without faces is valid. Messages name the data that a mesh cannot store (lines, normals that differ by
- * corner, ...). docs/mesh.md lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY,
- * CANCELLED. */
+ * another light, else COLOR_0; buffers in the folder of the file or below, anywhere with env->allow_outside).
+ * The ending of the name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB
+ * and become linear. Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other
+ * colours; without them irradiance_r/g/b do, or direct_, or indirect_. A mesh without faces is valid.
+ * Messages name the data that a mesh cannot store (lines, normals that differ by corner, ...). docs/mesh.md
+ * lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
 
 /* The counts of a file that can be clustered without loading it (a binary PLY of triangles), from its header.
@@ -98,9 +111,9 @@ FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh 
 FCT_API fct_result fct_mesh_file_counts(const fct_env *env, const char *path, bool *known,
                                         uint32_t *face_count, uint32_t *vertex_count);
 
-/* Whether a glTF file stores light at its vertices (_RADIOSITY), as a bake does. Such a file is a lit mesh;
- * another glTF file is a scene. *out is false for other kinds of files, and for pipes, which can be read only
- * once. Errors: INPUT, DATA, MEMORY. */
+/* Whether a glTF file stores light at its vertices (_RADIOSITY, _IRRADIANCE, ...), as a bake does. Such a
+ * file is a lit mesh; another glTF file is a scene. *out is false for other kinds of files, and for pipes,
+ * which can be read only once. Errors: INPUT, DATA, MEMORY. */
 FCT_API fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool *out);
 
 /* A hash that changes when the mesh of a file does: XXH3-64 of the bytes of the file and, for glTF, of the
@@ -113,16 +126,22 @@ typedef struct fct_mesh_save_def {
     float exposure; /* factor on colours before they are clamped for display: PLY bytes, GLB COLOR_0; default
                        1 */
     bool ascii;     /* text instead of binary where the format has both; default false */
+    unsigned display;  /* the light that makes the colours for display: FCT_MESH_COLORS (default),
+                          FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT or FCT_MESH_INDIRECT */
+    bool no_radiosity; /* leave out the floats of mesh->colors; default false */
+    bool sources;      /* PLY: write source_face and source_uv of each face; default false */
 } fct_mesh_save_def;
 FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
 
 /* Writes .ply (binary little endian; colours as sRGB bytes and float radiosity_r/g/b), .obj, .off, .stl, .om
  * or .glb (unlit; COLOR_0 exposed, clamped and linear, and float _RADIOSITY). "-" writes a PLY to standard
  * output, and a pipe or a device without such an ending receives a PLY. Replaces the target as a whole:
- * temporary file, fsync, rename. PLY keeps every array except source_faces, bit for bit. A note names the
+ * temporary file, fsync, rename. PLY and GLB also write irradiance, direct and indirect light as floats
+ * (irradiance_r/g/b, ...; _IRRADIANCE, ...). PLY keeps every array except source_faces and source_uv, bit for
+ * bit; fct_mesh_load skips these two. A note names the
  * arrays that the format cannot store. GLB groups faces by material and splits vertices whose texture
  * coordinates differ. OM keeps colours as bytes. def may be NULL. Errors: OUTPUT, DATA (unknown ending,
- * invalid mesh), MEMORY, CANCELLED. */
+ * invalid mesh, a display that the mesh does not have), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *mesh,
                                  const fct_mesh_save_def *def);
 

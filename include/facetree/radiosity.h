@@ -23,6 +23,15 @@ typedef enum fct_bake_method { FCT_BAKE_FACE, FCT_BAKE_REFERENCE } fct_bake_meth
  * GATHER: the same with enough anchors for contacts and relief. */
 typedef enum fct_final { FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER } fct_final;
 
+/* The mesh of the output.
+ * NONE: finer than the model where light needs it.
+ * CORNER: the faces of the mesh as it was added, in its order, with a vertex per smooth side of a crease: its
+ * vertices keep their numbers, others follow.
+ * VERTEX: the mesh as it was added. A vertex on a crease has the mean of its sides, weighted by their area.
+ * FACE: the same with face_colors instead of colors: the mean of each face, from its corners and its centre.
+ */
+typedef enum fct_keep { FCT_KEEP_NONE, FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE } fct_keep;
+
 typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
@@ -32,6 +41,11 @@ typedef struct fct_bake_def {
     uint32_t samples; /* REFERENCE: paths per vertex, default 256; FACE: gather rays per anchor; 0: default */
     uint64_t seed;    /* of all random numbers; equal seeds give equal results */
     bool indirect_only; /* the output leaves out emission and direct light */
+    unsigned outputs;   /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
+                           FCT_MESH_INDIRECT; default 0. REFERENCE knows the irradiance alone, and NONE does not
+                           know its parts. indirect_only leaves the direct part out of the irradiance too */
+    fct_keep keep;      /* default NONE. FACE has no outputs beside the colours */
+    bool sources;       /* fct_bake_mesh also gives source_faces and source_uv; default false */
     double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
                            72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
@@ -47,6 +61,7 @@ typedef struct fct_bake_stats {
     double seconds_solve;       /* iterations and gathers */
     double seconds_push;        /* output so far */
     double seconds_total;       /* all of fct_bake_create, and the output so far */
+    uint32_t sides_left_out;    /* lit sides of two-sided instances that keep has no place for, so far */
     uint64_t touched_bytes;     /* pages of the hierarchies that were read, without rays */
     /* The reference counts the power of the instances that it has written. */
     double power_emitted;                 /* area times emission, summed over RGB */
@@ -70,7 +85,8 @@ typedef struct fct_bake_error {
 } fct_bake_error;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
- * (error <= 0, max_edge < 0, a scene or model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
+ * (error <= 0, max_edge < 0, outputs that the method does not know, a scene or model with a diagonal outside
+ * [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 /* NULL is allowed. */
@@ -81,14 +97,34 @@ FCT_API fct_bake_error fct_bake_get_error(const fct_bake *bake, uint32_t object)
 
 /* The lit mesh of one instance in world space, with the scene's origin; colours are radiosity per vertex.
  * Large flat triangles are tessellated, and vertices on creases are doubled; source_faces gives the face of
- * the mesh as it was added. A two-sided instance has each of its sides that is lit, with its own vertices and
- * wound so that this side is in front: first the side with more radiosity, then the other one unless it has
- * less than 1e-4 of that. The caller releases *out with fct_mesh_release. Errors: MEMORY, CANCELLED; *out is
- * empty then. */
+ * the mesh as it was added, and source_uv where in this face each corner lies. With env->flip_inward, a face
+ * that was turned has its corners in the turned order. A two-sided instance has each of its sides that is
+ * lit, with its own vertices and wound so that this side is in front: first the side with more radiosity,
+ * then the other one unless it has less than 1e-4 of that. The caller releases *out with fct_mesh_release.
+ * Errors: MEMORY, CANCELLED; *out is empty then.
+ *
+ * With def.keep, the mesh is that of the object, in world space, with all its vertices: those without faces
+ * are black. A mirrored instance has corners 1 and 2 of each face exchanged, so that its front stays outside.
+ * A two-sided instance has the light of its brighter side and the winding of its front. An instance that is
+ * one of several parts of an object is an error (DATA): use fct_bake_object. */
 FCT_API fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out);
+/* The lit mesh of an object: of all its instances. With def.keep, its parts are one mesh again, in the order
+ * of the mesh as it was added. Errors: as above. */
+FCT_API fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out);
 /* All instances in one mesh, in their order. face_counts (may be NULL) receives the number of faces of each
  * instance. Errors: as above; MEMORY also above 2^31 vertices or faces. */
 FCT_API fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts);
+
+/* Writes the lit scene as a .glb that keeps its nodes: each object has a node with its name and transform,
+ * and a mesh in the space of that node, with a primitive per material. Colours, _RADIOSITY and other lights
+ * are those of fct_mesh_save. docs/radiosity.md lists what is kept.
+ *
+ * document: the .glb or .gltf that the scene was read from, which keeps its hierarchy, materials, textures,
+ * cameras, lights and extras; or NULL: the nodes, materials and camera are those of the scene. def may be
+ * NULL. merged (may be NULL) receives what fct_bake_mesh gives. Errors: OUTPUT, INPUT, DATA (the scene is not
+ * that of the document, other than .glb, more than 4 GB), MEMORY, CANCELLED. */
+FCT_API fct_result fct_bake_save_scene(fct_bake *bake, const char *path, const char *document,
+                                       const fct_mesh_save_def *def, fct_mesh *merged);
 
 typedef struct fct_probe {
     float radiosity[3], irradiance[3];

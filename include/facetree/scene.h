@@ -34,7 +34,13 @@ typedef struct fct_model {
     const fct_bvh *bvh;
     /* Input face of the tree -> face of the mesh that was added; NULL if they are the same. */
     const uint32_t *source_faces;
-    const uint32_t *source_vertices; /* likewise for vertices */
+    const uint32_t *source_vertices;                 /* likewise for vertices */
+    uint32_t source_face_count, source_vertex_count; /* of the mesh that was added */
+    /* Vertices of that mesh which no face uses, and their positions (x 3) in the model's space. Only the
+     * first part of a mesh of several materials has them; the tree of a whole mesh has all vertices. */
+    const uint32_t *loose_vertices;
+    const float *loose_positions;
+    uint32_t loose_count;
     bool inward; /* closed and wound inwards, as rooms are: the tree is, or the mesh before it was split */
 } fct_model;
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "mesh/glb/document/accessor.h"
+#include "mesh/glb/primitive.h"
 
 typedef struct use_counts {
     size_t color_textures, emissive_textures, other_textures, transparent;
@@ -66,11 +67,13 @@ static void count_nodes(const fct_glb *glb, use_counts *n) {
 
 /* Whether the primitive has an attribute that fct_mesh has no place for. */
 static bool has_other_attribute(json_t *primitive) {
-    static const char *const known[] = {"POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0", "_RADIOSITY"};
+    static const char *const known[] = {"POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0"};
     const char *key;
     json_t *value;
     json_object_foreach(json_object_get(primitive, "attributes"), key, value) {
         bool found = false;
+        const char *light = fct_glb_find_light(json_object_get(primitive, "attributes"));
+        found = light && !strcmp(key, light);
         for (size_t i = 0; i < sizeof known / sizeof *known; ++i) found = found || !strcmp(key, known[i]);
         if (!found) return true;
     }

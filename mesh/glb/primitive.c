@@ -104,7 +104,7 @@ static fct_result append_vertices(fct_glb_builder *b, const fct_glb_transform *t
     }
     if (b->has_colors) {
         float *to = soup->colors + 3 * (size_t)soup->vertex_count;
-        int64_t index = p->radiosity >= 0 ? p->radiosity : p->color;
+        int64_t index = p->light >= 0 ? p->light : p->color;
         if (index >= 0) result = get_array(b, index, 3, 4, positions->count, &values);
         if (result != FCT_OK) return result;
         b->without_color += index < 0 ? positions->count : 0;
@@ -188,9 +188,16 @@ static fct_result append_triangles(fct_glb_builder *b, const fct_glb_primitive *
     return FCT_OK;
 }
 
-static bool share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b) {
+bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b) {
     return a->position == b->position && a->normal == b->normal && a->color == b->color &&
-           a->radiosity == b->radiosity;
+           a->light == b->light;
+}
+
+const char *fct_glb_find_light(json_t *attributes) {
+    static const char *const names[] = {"_RADIOSITY", "_IRRADIANCE", "_DIRECT", "_INDIRECT"};
+    for (size_t i = 0; i < FCT_LENGTH(names); ++i)
+        if (json_object_get(attributes, names[i])) return names[i];
+    return NULL;
 }
 
 fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_primitive *out) {
@@ -198,7 +205,9 @@ fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_pr
     fct_result result = fct_glb_index(glb, attributes, "POSITION", &out->position);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "NORMAL", &out->normal);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "COLOR_0", &out->color);
-    if (result == FCT_OK) result = fct_glb_index(glb, attributes, "_RADIOSITY", &out->radiosity);
+    out->light_name = fct_glb_find_light(attributes), out->light = FCT_GLB_ABSENT;
+    if (result == FCT_OK && out->light_name)
+        result = fct_glb_index(glb, attributes, out->light_name, &out->light);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "TEXCOORD_0", &out->texcoord);
     if (result == FCT_OK) result = fct_glb_index(glb, object, "indices", &out->indices);
     if (result == FCT_OK) result = fct_glb_index(glb, object, "material", &out->material);
@@ -224,7 +233,7 @@ fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
         if (p.position == FCT_GLB_ABSENT || is_left_out(b, p.mode)) continue;
         ++primitives;
         with_normals += p.normal >= 0;
-        b->has_colors |= p.color >= 0 || p.radiosity >= 0;
+        b->has_colors |= p.color >= 0 || p.light >= 0;
         b->has_texcoords |= p.texcoord >= 0;
         *unnamed |= p.material < 0;
         if (p.material < 0) continue;
@@ -271,7 +280,7 @@ fct_result fct_glb_append_mesh(fct_glb_builder *b, int64_t index, const fct_glb_
         result = check_primitive(b, object, &p);
         if (result != FCT_OK) return result;
         if (is_left_out(b, p.mode)) continue;
-        if (!share_vertices(&before, &p)) {
+        if (!fct_glb_share_vertices(&before, &p)) {
             first = b->soup->vertex_count;
             result = append_vertices(b, t, &p);
         }

@@ -6,7 +6,8 @@
 
 /* The accessors of a primitive; FCT_GLB_ABSENT: none. */
 typedef struct fct_glb_primitive {
-    int64_t position, normal, color, radiosity, texcoord, indices, material, mode;
+    int64_t position, normal, color, light, texcoord, indices, material, mode;
+    const char *light_name; /* the attribute of `light`: _RADIOSITY, or another quantity of a bake */
 } fct_glb_primitive;
 
 /* Collects triangles. Set glb, soup and the has_ members; the rest begins as zeros. */
@@ -27,6 +28,13 @@ typedef struct fct_glb_builder {
     size_t vertex_capacity, color_capacity, normal_capacity, corner_capacity, texcoord_capacity,
         material_capacity;
 } fct_glb_builder;
+
+/* The name of the light that a primitive's attributes hold: _RADIOSITY, else _IRRADIANCE, _DIRECT or
+ * _INDIRECT, else NULL. */
+const char *fct_glb_find_light(json_t *attributes);
+
+/* Whether two consecutive primitives have the same vertices in the soup. */
+bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b);
 
 /* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
  * normals if all primitives have them. *unnamed: a primitive has no material. Errors: DATA. */

@@ -68,7 +68,7 @@ fct_result fct_glb_holds_light(const fct_source *source, bool *out) {
     *out = false;
     json_array_foreach(json_object_get(glb.root, "meshes"), i, mesh)
         json_array_foreach(json_object_get(mesh, "primitives"), j, object) *out |=
-        json_object_get(json_object_get(object, "attributes"), "_RADIOSITY") != NULL;
+        fct_glb_find_light(json_object_get(object, "attributes")) != NULL;
     fct_glb_close(&glb);
     return result;
 }

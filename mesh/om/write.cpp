@@ -193,7 +193,7 @@ struct file_buffer : std::streambuf {
 
 extern "C" fct_result fct_write_om(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
-    fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS);
+    fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_LIGHTS);
     fct_warn_of_origin(sink);
     size_t count = 3 * size_t(m->face_count);
     auto *keys = static_cast<uint64_t *>(fct_allocate(sink->env, count, sizeof(uint64_t)));

@@ -12,7 +12,7 @@ typedef struct group {
     fct_ply_kind kind;
     const char *names[3];
     size_t width;
-    enum { POSITIONS, NORMALS, COLORS, TEXCOORDS, POLYGON_COLORS } destination;
+    enum { POSITIONS, NORMALS, COLORS, TEXCOORDS, POLYGON_COLORS, IRRADIANCE, DIRECT, INDIRECT } destination;
 } group;
 
 static const group groups[] = {
@@ -22,7 +22,13 @@ static const group groups[] = {
     {FCT_PLY_VERTICES, {"diffuse_r", "diffuse_g", "diffuse_b"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"diffuse_red", "diffuse_green", "diffuse_blue"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"red", "green", "blue"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"indirect_r", "indirect_g", "indirect_b"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"direct_r", "direct_g", "direct_b"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"irradiance_r", "irradiance_g", "irradiance_b"}, 3, COLORS},
     {FCT_PLY_VERTICES, {"radiosity_r", "radiosity_g", "radiosity_b"}, 3, COLORS},
+    {FCT_PLY_VERTICES, {"irradiance_r", "irradiance_g", "irradiance_b"}, 3, IRRADIANCE},
+    {FCT_PLY_VERTICES, {"direct_r", "direct_g", "direct_b"}, 3, DIRECT},
+    {FCT_PLY_VERTICES, {"indirect_r", "indirect_g", "indirect_b"}, 3, INDIRECT},
     {FCT_PLY_VERTICES, {"texture_u", "texture_v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"u", "v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"s", "t"}, 2, TEXCOORDS},
@@ -51,13 +57,21 @@ static ptrdiff_t find_either(const fct_ply_property *properties, size_t count, b
     return found != FCT_PLY_NOWHERE ? found : find_property(properties, count, list, b);
 }
 
+/* Whether the property is a light of a bake, which is linear, and not a colour of any scale. */
+static bool is_light(const char *name) {
+    static const char *const lights[] = {"radiosity_r", "irradiance_r", "direct_r", "indirect_r"};
+    for (size_t i = 0; i < sizeof lights / sizeof *lights; ++i)
+        if (!strcmp(name, lights[i])) return true;
+    return false;
+}
+
 /* Appends the columns of the group, which are at the properties `found`. */
 static void append_columns(const group *g, const ptrdiff_t *found, const fct_ply_property *properties,
                            const double *origin, float *array, fct_ply_target *out) {
     bool color = g->destination == COLORS || g->destination == POLYGON_COLORS;
     if (color) { /* replaces the earlier group */
         while (out->column_count && out->columns[out->column_count - 1].color) --out->column_count;
-        out->any_scale = strncmp(g->names[0], "radiosity", 9) != 0;
+        out->any_scale = !is_light(g->names[0]);
     } else if (g->destination == TEXCOORDS) {
         while (out->column_count && out->columns[out->column_count - 1].stride == 2) --out->column_count;
     }
@@ -105,8 +119,8 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
                             .indices = FCT_PLY_NOWHERE,
                             .texcoords = FCT_PLY_NOWHERE,
                             .material = FCT_PLY_NOWHERE};
-    float **arrays[] = {&soup->positions, &soup->normals, &soup->colors, vertex_texcoords,
-                        &soup->polygon_colors};
+    float **arrays[] = {&soup->positions,      &soup->normals,    &soup->colors, vertex_texcoords,
+                        &soup->polygon_colors, &soup->irradiance, &soup->direct, &soup->indirect};
     for (size_t i = 0; i < sizeof groups / sizeof *groups; ++i) {
         if (groups[i].kind != out->kind) continue;
         fct_result result = bind_group(t->env, groups + i, properties, element, soup->origin,

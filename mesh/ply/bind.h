@@ -16,7 +16,7 @@ typedef struct fct_ply_column {
     bool color;    /* integers are sRGB */
 } fct_ply_column;
 
-enum { FCT_PLY_COLUMNS = 16, FCT_PLY_NOWHERE = -1 };
+enum { FCT_PLY_COLUMNS = 24, FCT_PLY_NOWHERE = -1 };
 
 typedef struct fct_ply_target {
     fct_ply_kind kind;

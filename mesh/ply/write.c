@@ -1,7 +1,9 @@
 /* mesh/ply/write.c: writes every array of an fct_mesh as PLY. The reader restores the same bits.
  *
- *   vertex: x y z [nx ny nz] [red green blue radiosity_r radiosity_g radiosity_b]
+ *   vertex: x y z [nx ny nz] [red green blue] [radiosity_r radiosity_g radiosity_b] [irradiance_r ...]
+ *           [direct_r ...] [indirect_r ...]
  *   face:   vertex_indices [texcoord, six floats] [red green blue radiosity_r ...] [material_index]
+ *           [source_face] [source_uv, six floats]
  *
  * red, green and blue are bytes for viewers (exposed, clamped, sRGB). radiosity_* are the linear floats.
  * Positions are floats, or doubles if the mesh has an origin.
@@ -15,7 +17,21 @@
 #include "mesh/color.h"
 #include "mesh/mesh.h"
 
-enum { ROWS = 4096, ROW_SIZE = 64 };
+enum { ROWS = 4096, ROW_SIZE = 128, LIGHTS = 4 };
+
+/* The float lights of the vertices; NULL: absent. */
+static void list_lights(const fct_sink *sink, const float *out[LIGHTS]) {
+    const fct_mesh *m = sink->mesh;
+    out[0] = sink->radiosity, out[1] = m->irradiance, out[2] = m->direct, out[3] = m->indirect;
+}
+
+static void print_properties(FILE *stream, const char *prefix) {
+    for (const char *c = "rgb"; *c; ++c) fprintf(stream, "property float %s_%c\n", prefix, *c);
+}
+
+static bool writes_sources(const fct_sink *sink) {
+    return sink->def->sources && sink->mesh->source_faces && sink->mesh->source_uv;
+}
 
 static void write_header(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
@@ -27,14 +43,22 @@ static void write_header(const fct_sink *sink, FILE *stream) {
     fprintf(stream, "element vertex %u\nproperty %s x\nproperty %s y\nproperty %s z\n", m->vertex_count, type,
             type, type);
     if (m->normals) fprintf(stream, "property float nx\nproperty float ny\nproperty float nz\n");
-    static const char colors[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                                 "property float radiosity_r\nproperty float radiosity_g\n"
-                                 "property float radiosity_b\n";
+    static const char colors[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    static const char *const names[LIGHTS] = {"radiosity", "irradiance", "direct", "indirect"};
+    const float *lights[LIGHTS];
+    list_lights(sink, lights);
     if (m->colors) fputs(colors, stream);
+    for (int i = 0; i < LIGHTS; ++i)
+        if (lights[i]) print_properties(stream, names[i]);
     fprintf(stream, "element face %u\nproperty list uchar int vertex_indices\n", m->face_count);
     if (m->texcoords) fprintf(stream, "property list uchar float texcoord\n");
-    if (m->face_colors) fputs(colors, stream);
+    if (m->face_colors) {
+        fputs(colors, stream);
+        print_properties(stream, names[0]);
+    }
     if (m->materials) fprintf(stream, "property int material_index\n");
+    if (writes_sources(sink))
+        fprintf(stream, "property int source_face\nproperty list uchar float source_uv\n");
     fprintf(stream, "end_header\n");
 }
 
@@ -77,7 +101,14 @@ static unsigned char *put_vertex(unsigned char *p, const fct_sink *sink, size_t 
     const fct_mesh *m = sink->mesh;
     p = put_position(p, m, v);
     if (m->normals) p = put_floats(p, m->normals + 3 * v, 3);
-    if (m->colors) p = put_color(p, sink, m->colors + 3 * v);
+    if (m->colors) {
+        convert_color(sink, m->colors + 3 * v, p);
+        p += 3;
+    }
+    const float *lights[LIGHTS];
+    list_lights(sink, lights);
+    for (int i = 0; i < LIGHTS; ++i)
+        if (lights[i]) p = put_floats(p, lights[i] + 3 * v, 3);
     return p;
 }
 
@@ -91,6 +122,11 @@ static unsigned char *put_face(unsigned char *p, const fct_sink *sink, size_t f)
     }
     if (m->face_colors) p = put_color(p, sink, m->face_colors + 3 * f);
     if (m->materials) p = put_32(p, m->materials[f]);
+    if (writes_sources(sink)) {
+        p = put_32(p, m->source_faces[f]);
+        *p++ = 6;
+        p = put_floats(p, m->source_uv + 6 * f, 6);
+    }
     return p;
 }
 
@@ -131,29 +167,42 @@ static void print_position(FILE *stream, const fct_mesh *m, size_t v) {
         fprintf(stream, "%s%.17g", k ? " " : "", m->origin[k] + (double)m->positions[3 * v + k]);
 }
 
-static void print_color(const fct_sink *sink, FILE *stream, const float *color) {
+static void print_bytes(const fct_sink *sink, FILE *stream, const float *color) {
     unsigned char bytes[3];
     convert_color(sink, color, bytes);
     fprintf(stream, " %u %u %u", bytes[0], bytes[1], bytes[2]);
-    print_floats(stream, " ", color, 3);
+}
+
+static void print_face(const fct_sink *sink, FILE *stream, size_t f) {
+    const fct_mesh *m = sink->mesh;
+    const uint32_t *t = m->triangles + 3 * f;
+    fprintf(stream, "3 %u %u %u", t[0], t[1], t[2]);
+    if (m->texcoords) print_floats(stream, " 6 ", m->texcoords + 6 * f, 6);
+    if (m->face_colors) {
+        print_bytes(sink, stream, m->face_colors + 3 * f);
+        print_floats(stream, " ", m->face_colors + 3 * f, 3);
+    }
+    if (m->materials) fprintf(stream, " %u", m->materials[f]);
+    if (writes_sources(sink)) {
+        fprintf(stream, " %u", m->source_faces[f]);
+        print_floats(stream, " 6 ", m->source_uv + 6 * f, 6);
+    }
+    fputc('\n', stream);
 }
 
 static fct_result write_ascii(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
+    const float *lights[LIGHTS];
+    list_lights(sink, lights);
     for (size_t v = 0; v < m->vertex_count; ++v) {
         print_position(stream, m, v);
         if (m->normals) print_floats(stream, " ", m->normals + 3 * v, 3);
-        if (m->colors) print_color(sink, stream, m->colors + 3 * v);
+        if (m->colors) print_bytes(sink, stream, m->colors + 3 * v);
+        for (int i = 0; i < LIGHTS; ++i)
+            if (lights[i]) print_floats(stream, " ", lights[i] + 3 * v, 3);
         fputc('\n', stream);
     }
-    for (size_t f = 0; f < m->face_count; ++f) {
-        const uint32_t *t = m->triangles + 3 * f;
-        fprintf(stream, "3 %u %u %u", t[0], t[1], t[2]);
-        if (m->texcoords) print_floats(stream, " 6 ", m->texcoords + 6 * f, 6);
-        if (m->face_colors) print_color(sink, stream, m->face_colors + 3 * f);
-        if (m->materials) fprintf(stream, " %u", m->materials[f]);
-        fputc('\n', stream);
-    }
+    for (size_t f = 0; f < m->face_count; ++f) print_face(sink, stream, f);
     return FCT_OK;
 }
 

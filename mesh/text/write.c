@@ -63,7 +63,7 @@ fct_result fct_write_obj(const fct_sink *sink, FILE *stream) {
         if (strpbrk(m->material_names[i], "\r\n"))
             return fct_fail(sink->env, FCT_ERROR_DATA, "%s: material %u has a line end in its name",
                             sink->name, i);
-    fct_note_left_out(sink, FCT_MESH_FACE_COLORS);
+    fct_note_left_out(sink, FCT_MESH_FACE_COLORS | FCT_MESH_LIGHTS);
     fprintf(stream, "# Facetree %s\n", fct_version());
     for (size_t v = 0; v < m->vertex_count; ++v) {
         fputc('v', stream);
@@ -102,7 +102,7 @@ static bool has_bright_color(const fct_mesh *m) {
  * would take them for bytes. */
 fct_result fct_write_off(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
-    fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS);
+    fct_note_left_out(sink, FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_LIGHTS);
     fprintf(stream, "%s%sOFF\n%s%u %u 0\n", m->colors ? "C" : "", m->normals ? "N" : "",
             has_bright_color(m) ? "# facetree linear\n" : "", m->vertex_count, m->face_count);
     for (size_t v = 0; v < m->vertex_count; ++v) {
@@ -166,8 +166,8 @@ static void write_stl_facet(const fct_mesh *m, size_t f, bool ascii, FILE *strea
 /* The header of a binary file must not begin with "solid", because readers take that for text. */
 fct_result fct_write_stl(const fct_sink *sink, FILE *stream) {
     const fct_mesh *m = sink->mesh;
-    fct_note_left_out(sink, FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_FACE_COLORS |
-                                FCT_MESH_MATERIALS);
+    fct_note_left_out(sink, FCT_MESH_LIGHTS | FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS |
+                                FCT_MESH_FACE_COLORS | FCT_MESH_MATERIALS);
     if (!sink->def->ascii) fct_warn_of_origin(sink);
     if (sink->def->ascii) {
         fprintf(stream, "solid facetree\n");

@@ -15,7 +15,9 @@
 #include "mesh/mesh.h"
 
 #include "radiosity/output/anchor.h"
+#include "radiosity/output/attributes.h"
 #include "radiosity/output/blend.h"
+#include "radiosity/output/keep.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/surface/cover.h"
 #include "radiosity/surface/refine.h"
@@ -363,34 +365,47 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     return fct_anchors_create(s->env, &source, l->surface, &def, anchors);
 }
 
+fct_result fct_output_surface(const fct_solution *s, uint32_t instance, fct_surface *out) {
+    const bool kept = s->def.keep != FCT_KEEP_NONE;
+    fct_result result =
+        fct_surface_build(s->env, s->scene, instance, kept ? (double)INFINITY : s->max_edge, out);
+    if (result != FCT_OK || s->def.keep != FCT_KEEP_FACE) return result;
+    result = fct_keep_centres(s->env, out);
+    if (result != FCT_OK) fct_surface_release(s->env, out);
+    return result;
+}
+
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
                            fct_check *check, fct_output_rays *counts) {
     const fct_env *env = s->env;
     uint64_t *rays = &counts->light;
-    bool gathers = s->def.final != FCT_FINAL_NONE;
+    const bool gathers = s->def.final != FCT_FINAL_NONE, kept = s->def.keep != FCT_KEEP_NONE;
+    const int rounds = kept ? 0 : BORDER_ROUNDS;
     fct_surface surface = {0};
     fct_anchors anchors = {0};
-    fct_result result = fct_surface_build(env, s->scene, instance, s->max_edge, &surface);
+    fct_result result = fct_output_surface(s, instance, &surface);
     if (result != FCT_OK) return result;
     lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
     result = cover_vertices(&l, rays);
-    if (result == FCT_OK) result = cut_covers(&l, rays);
+    if (result == FCT_OK && !kept) result = cut_covers(&l, rays);
     if (result == FCT_OK && gathers) result = make_anchors(&l, &anchors);
     *rays += anchors.rays;
     for (int round = 0; result == FCT_OK; ++round) {
         uint32_t added = 0;
-        if ((result = light_vertices(&l, rays)) != FCT_OK || round == BORDER_ROUNDS) break;
+        if ((result = light_vertices(&l, rays)) != FCT_OK || round == rounds) break;
         result = fct_surface_refine(env, &surface, cut_at_border, &l, &added);
         if (result == FCT_OK && added > 0) result = cover_vertices(&l, rays);
         if (result == FCT_OK && added > 0) result = cut_covers(&l, rays);
         if (added == 0) break;
     }
     if (result == FCT_OK) result = finish_colors(&l);
+    if (result == FCT_OK)
+        result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);
     if (result == FCT_OK) result = check_light(&l, check, &counts->check);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};
-        if (back) fct_mesh_turn_over(out);
+        if (back && !kept) fct_mesh_turn_over(out);
     }
     fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
     fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.again);

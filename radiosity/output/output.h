@@ -10,9 +10,13 @@ typedef struct fct_output_rays {
 } fct_output_rays;
 
 /* The lit mesh of one side of an instance in world space, wound so that this side is in front. *check grows
- * by what check.h finds, *rays by the rays traced. Errors: MEMORY, CANCELLED. */
+ * by what check.h finds, *rays by the rays traced. With def.keep, the surface is not refined and keeps the
+ * winding of the front. Errors: MEMORY, CANCELLED. */
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
                            fct_check *check, fct_output_rays *rays);
+
+/* The surface to light: with def.keep, the model's faces without splits. Errors: MEMORY, CANCELLED. */
+fct_result fct_output_surface(const fct_solution *s, uint32_t instance, fct_surface *out);
 
 /* Share of the power of an instance's brighter side below which the other side counts as dark. */
 #define FCT_OUTPUT_DARK 1e-4

@@ -219,7 +219,7 @@ static void list_scratch(work *w, size_t threads, fct_array out[SCRATCH]) {
 }
 
 /* Numbers the added vertices in the order of positions, and allocates the surface. */
-static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_faces,
+static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_faces, const float *source_uv,
                             const uint32_t *face_places) {
     uint64_t total = w->mesh->vertex_count;
     for (size_t v = 0; v < w->mesh->vertex_count; ++v) {
@@ -233,6 +233,7 @@ static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_
     if (result != FCT_OK) return result;
     size_t faces = w->mesh->face_count, vertices = w->mesh->vertex_count;
     memcpy(w->out->mesh.source_faces, source_faces, faces * sizeof *source_faces);
+    memcpy(w->out->mesh.source_uv, source_uv, 6 * faces * sizeof *source_uv);
     memcpy(w->out->face_places, face_places, faces * sizeof *face_places);
     memcpy(w->out->mesh.positions, w->mesh->positions, 3 * vertices * sizeof(float));
     memcpy(w->out->sample_points, w->mesh->positions, 3 * vertices * sizeof(float));
@@ -240,7 +241,7 @@ static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_
 }
 
 fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, const uint32_t *source_faces,
-                                const uint32_t *face_places, fct_surface *out) {
+                                const float *source_uv, const uint32_t *face_places, fct_surface *out) {
     *out = (fct_surface){0};
     if (mesh->face_count > UINT32_MAX / 3)
         return fct_fail(env, FCT_ERROR_MEMORY, "a surface of %u triangles has too many corners",
@@ -258,7 +259,7 @@ fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, con
     result = fct_allocate_all(env, scratch, SCRATCH, "the vertices of a surface");
     if (result != FCT_OK) goto done;
     fct_parallel_for(env, mesh->vertex_count, GRAIN, group_positions, &w);
-    result = make_room(env, &w, source_faces, face_places);
+    result = make_room(env, &w, source_faces, source_uv, face_places);
     if (result == FCT_OK) fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_positions, &w);
     fct_release_all(env, scratch, SCRATCH);
 done:

@@ -71,6 +71,20 @@ static v3 mix(v3 a, v3 b, double share) {
     return v3_add(v3_scale(a, 1 - share), v3_scale(b, share));
 }
 
+/* Sets the barycentrics of the parts' corners in their source faces. */
+static void copy_uv(const fct_surface *old, const fct_split *split, const cut_list *cuts, fct_surface *out) {
+    for (size_t f = 0; f < split->face_count; ++f) {
+        const size_t parent = split->parents[f];
+        const uint32_t *t = old->mesh.triangles + 3 * parent;
+        double shares[3] = {0, 0, 0};
+        for (size_t c = 0; c < 3; ++c) {
+            const size_t place = split->places[3 * f + c];
+            if (place >= 3) shares[place - 3] = find_share(cuts, t[place - 3], t[(place - 2) % 3]);
+        }
+        fct_split_uv(split, f, old->mesh.source_uv + 6 * parent, shares, out->mesh.source_uv + 6 * f);
+    }
+}
+
 /* Copies the old vertices and the faces of the split, and appends the new vertices. */
 static void copy_surface(const fct_surface *old, const fct_split *split, const cut_list *cuts,
                          fct_surface *out) {
@@ -96,6 +110,7 @@ static void copy_surface(const fct_surface *old, const fct_split *split, const c
         out->mesh.source_faces[f] = old->mesh.source_faces[split->parents[f]];
         out->face_places[f] = old->face_places[split->parents[f]];
     }
+    copy_uv(old, split, cuts, out);
 }
 
 /* Adds a third of each face's area to its vertices. */

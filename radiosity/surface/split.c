@@ -64,39 +64,37 @@ static bool first_diagonal_is_shorter(const float *positions, uint32_t a, uint32
     return measure_distance2(positions, a, b) <= measure_distance2(positions, b, c);
 }
 
-static uint32_t *emit_triangle(uint32_t *out, uint32_t a, uint32_t b, uint32_t c) {
-    out[0] = a, out[1] = b, out[2] = c;
+/* Places (see split.h) of the corners of a part. Returns where those of the next part go. */
+static uint8_t *emit_part(uint8_t *out, int a, int b, int c) {
+    out[0] = (uint8_t)a, out[1] = (uint8_t)b, out[2] = (uint8_t)c;
     return out + 3;
 }
 
-/* Writes the parts of a triangle with corners t and new vertices m on its marked edges. Returns their number.
- */
-static uint32_t split_face(const float *positions, const uint32_t t[3], const uint32_t m[3], unsigned mark,
-                           uint32_t *out) {
+/* Writes the places of the parts of a triangle with corners t. Returns their number. */
+static uint32_t split_face(const float *positions, const uint32_t t[3], unsigned mark, uint8_t *out) {
     int edges = __builtin_popcount(mark), turn = 0;
-    if (edges == 0) return emit_triangle(out, t[0], t[1], t[2]), 1;
+    if (edges == 0) return emit_part(out, 0, 1, 2), 1;
     if (edges == 3) {
-        out = emit_triangle(out, t[0], m[0], m[2]);
-        out = emit_triangle(out, m[0], t[1], m[1]);
-        out = emit_triangle(out, m[2], m[1], t[2]);
-        return emit_triangle(out, m[0], m[1], m[2]), 4;
+        out = emit_part(out, 0, 3, 5);
+        out = emit_part(out, 3, 1, 4);
+        out = emit_part(out, 5, 4, 2);
+        return emit_part(out, 3, 4, 5), 4;
     }
     /* Turn the triangle until edge 0, or edges 0 and 1, are the marked ones. */
     unsigned wanted = edges == 1 ? 1 : 3;
     while (((mark >> turn | mark << (3 - turn)) & 7) != wanted) ++turn;
-    uint32_t a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
-    uint32_t ab = m[turn], bc = m[(turn + 1) % 3];
+    const int a = turn, b = (turn + 1) % 3, c = (turn + 2) % 3, ab = 3 + a, bc = 3 + b;
     if (edges == 1) {
-        out = emit_triangle(out, a, ab, c);
-        return emit_triangle(out, ab, b, c), 2;
+        out = emit_part(out, a, ab, c);
+        return emit_part(out, ab, b, c), 2;
     }
-    out = emit_triangle(out, ab, b, bc);
-    if (first_diagonal_is_shorter(positions, a, b, c)) {
-        out = emit_triangle(out, a, ab, bc);
-        return emit_triangle(out, a, bc, c), 3;
+    out = emit_part(out, ab, b, bc);
+    if (first_diagonal_is_shorter(positions, t[a], t[b], t[c])) {
+        out = emit_part(out, a, ab, bc);
+        return emit_part(out, a, bc, c), 3;
     }
-    out = emit_triangle(out, a, ab, c);
-    return emit_triangle(out, ab, bc, c), 3;
+    out = emit_part(out, a, ab, c);
+    return emit_part(out, ab, bc, c), 3;
 }
 
 fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const float *positions,
@@ -112,12 +110,12 @@ fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const floa
     fct_result result = fct_edge_table_init(env, marked, &table);
     if (result != FCT_OK) return result;
     const fct_array arrays[] = {FCT_ARRAY(out->triangles, 3 * faces), FCT_ARRAY(out->parents, faces),
-                                FCT_ARRAY(out->ends, 2 * marked)};
+                                FCT_ARRAY(out->ends, 2 * marked), FCT_ARRAY(out->places, 3 * faces)};
     result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "split triangles");
     if (result != FCT_OK) goto done;
     for (uint32_t f = 0; f < face_count; ++f) {
         const uint32_t *t = triangles + 3 * (size_t)f;
-        uint32_t m[3] = {0, 0, 0};
+        uint32_t corners[6] = {t[0], t[1], t[2], 0, 0, 0}; /* by place */
         for (int k = 0; k < 3; ++k) {
             if (!(marks[f] >> k & 1)) continue;
             bool fresh;
@@ -127,10 +125,12 @@ fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const floa
                 *value = out->vertex_count++;
                 out->ends[2 * (size_t)*value] = a, out->ends[2 * (size_t)*value + 1] = b;
             }
-            m[k] = vertex_count + *value;
+            corners[3 + k] = vertex_count + *value;
         }
-        uint32_t parts =
-            split_face(positions, t, m, marks[f] & 7u, out->triangles + 3 * (size_t)out->face_count);
+        const size_t first = 3 * (size_t)out->face_count;
+        uint32_t parts = split_face(positions, t, marks[f] & 7u, out->places + first);
+        for (size_t c = first; c < first + 3 * (size_t)parts; ++c)
+            out->triangles[c] = corners[out->places[c]];
         while (parts--) out->parents[out->face_count++] = f;
     }
 done:
@@ -143,7 +143,19 @@ void fct_split_release(const fct_env *env, fct_split *split) {
     fct_release(env, split->triangles);
     fct_release(env, split->parents);
     fct_release(env, split->ends);
+    fct_release(env, split->places);
     *split = (fct_split){0};
+}
+
+void fct_split_uv(const fct_split *split, size_t face, const float *old_uv, const double shares[3],
+                  float *uv) {
+    for (size_t c = 0; c < 3; ++c) {
+        const uint32_t place = split->places[3 * face + c];
+        const float *a = old_uv + 2 * (size_t)(place % 3), *b = old_uv + 2 * (size_t)((place + 1) % 3);
+        const double share = place < 3 ? 0 : shares[place - 3];
+        for (size_t k = 0; k < 2; ++k)
+            uv[2 * c + k] = (float)((1 - share) * (double)a[k] + share * (double)b[k]);
+    }
 }
 
 static uint64_t hash_position(const float *p, uint32_t bits[3]) {

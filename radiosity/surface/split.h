@@ -13,6 +13,8 @@ typedef struct fct_split {
     uint32_t *triangles;               /* face_count x 3; vertex old_count + i is new vertex i */
     uint32_t *parents;                 /* face_count: the old face of each part, ascending */
     uint32_t *ends;                    /* vertex_count x 2: the edge that new vertex i halves */
+    uint8_t *places;                   /* face_count x 3: corner k of the old face, or 3 + k: its new vertex
+                                          between the corners k and k + 1 */
 } fct_split;
 
 /* Splits the marked edges. Bit k of marks[f] marks the edge from corner k to corner k + 1 of face f. Both
@@ -23,6 +25,11 @@ fct_result fct_split_edges(const fct_env *env, uint32_t vertex_count, const floa
                            uint32_t face_count, const uint32_t *triangles, const uint8_t *marks,
                            fct_split *out);
 void fct_split_release(const fct_env *env, fct_split *split);
+
+/* Barycentrics (3 x 2) of the corners of part `face`, from those of the corners of its old face. shares[k] is
+ * the share of the way from corner k to corner k + 1 at which the old face is split. */
+void fct_split_uv(const fct_split *split, size_t face, const float *old_uv, const double shares[3],
+                  float *uv);
 
 /* A hash table from edges (pairs of ids in either order) to numbers. */
 typedef struct fct_edge_table {

@@ -22,7 +22,8 @@ fct_result fct_surface_allocate(const fct_env *env, uint32_t vertex_count, uint3
                                 fct_surface *out) {
     *out = (fct_surface){0};
     fct_result result =
-        fct_mesh_create(env, vertex_count, face_count, FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES, &out->mesh);
+        fct_mesh_create(env, vertex_count, face_count,
+                        FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES | FCT_MESH_SOURCE_UV, &out->mesh);
     if (result != FCT_OK) return result;
     fct_array arrays[ARRAYS];
     list_arrays(out, vertex_count, face_count, arrays);

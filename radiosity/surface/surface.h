@@ -13,8 +13,8 @@
 #include "radiosity/surface/foothold.h"
 
 typedef struct fct_surface {
-    fct_mesh mesh;  /* world positions, triangles, source_faces (faces of the mesh as it was added), and
-                       colours, which are undefined until the output lights them */
+    fct_mesh mesh;  /* world positions, triangles, source_faces and source_uv (in the mesh as it was added),
+                       and colours, which are undefined until the output lights them */
     float *normals; /* per vertex x 3: unit, n . n_f > 0 for all its faces; zero if all are degenerate */
     float *sample_points; /* per vertex x 3: the vertex, or a point inside a face if the vertex is on the rim
                              of its smooth group */

@@ -39,6 +39,7 @@ typedef struct patch {
     uint32_t vertex_count, face_count;
     float *positions;
     uint32_t *triangles, *faces; /* faces: input face of the model's tree */
+    float *uv;                   /* face_count x 3 x 2: barycentrics of the corners in that face */
     uint8_t *marks;
     uint8_t *settled; /* per face: an earlier round left it whole */
 } patch;
@@ -150,12 +151,14 @@ static fct_result add_midpoints(const fct_env *env, const float *old, uint32_t o
 
 /* Replaces the faces by their parts. */
 static fct_result apply_split(patch *c, fct_split *split) {
+    static const double halves[3] = {.5, .5, .5};
     const fct_env *env = c->env;
-    float *positions = NULL;
+    float *positions = NULL, *uv;
     uint32_t *faces;
     uint8_t *marks, *settled;
     const size_t count = split->face_count;
-    const fct_array arrays[] = {FCT_ARRAY(faces, count), FCT_ARRAY(marks, count), FCT_ARRAY(settled, count)};
+    const fct_array arrays[] = {FCT_ARRAY(faces, count), FCT_ARRAY(uv, 6 * count), FCT_ARRAY(marks, count),
+                                FCT_ARRAY(settled, count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "split triangles");
     if (result != FCT_OK) return result;
     result = add_midpoints(env, c->positions, c->vertex_count, split, &positions);
@@ -166,10 +169,11 @@ static fct_result apply_split(patch *c, fct_split *split) {
     for (size_t f = 0; f < split->face_count; ++f) {
         faces[f] = c->faces[split->parents[f]];
         settled[f] = c->settled[split->parents[f]];
+        fct_split_uv(split, f, c->uv + 6 * (size_t)split->parents[f], halves, uv + 6 * f);
     }
     fct_release(env, c->positions), fct_release(env, c->triangles), fct_release(env, c->faces);
-    fct_release(env, c->marks), fct_release(env, c->settled);
-    c->positions = positions, c->faces = faces, c->marks = marks, c->settled = settled;
+    fct_release(env, c->uv), fct_release(env, c->marks), fct_release(env, c->settled);
+    c->positions = positions, c->faces = faces, c->uv = uv, c->marks = marks, c->settled = settled;
     c->triangles = split->triangles;
     split->triangles = NULL;
     c->face_count = split->face_count;
@@ -203,6 +207,7 @@ static fct_result place_model(patch *c) {
     const fct_array arrays[] = {FCT_ARRAY(c->positions, 3 * vertices),
                                 FCT_ARRAY(c->triangles, 3 * faces),
                                 FCT_ARRAY(c->faces, faces),
+                                FCT_ARRAY_ZERO(c->uv, 6 * faces),
                                 FCT_ARRAY(c->marks, faces),
                                 FCT_ARRAY_ZERO(c->settled, faces),
                                 FCT_ARRAY(c->shrinks, c->view.instance_count)};
@@ -216,6 +221,8 @@ static fct_result place_model(patch *c) {
         uint32_t *to = c->triangles + 3 * (size_t)f;
         to[0] = t[0], to[1] = t[placed->mirrored ? 2 : 1], to[2] = t[placed->mirrored ? 1 : 2];
         c->faces[f] = f;
+        float *uv = c->uv + 6 * (size_t)f;
+        uv[placed->mirrored ? 4 : 2] = uv[placed->mirrored ? 3 : 5] = 1;
     }
     for (uint32_t i = 0; i < c->view.instance_count; ++i)
         c->shrinks[i] = fct_transform_shrink(c->view.instances + i);
@@ -242,7 +249,7 @@ static fct_result store_surface(patch *c, fct_surface *out) {
         if (model->source_faces) c->faces[f] = model->source_faces[c->faces[f]];
     }
     fct_corners mesh = {c->vertex_count, c->face_count, c->positions, c->triangles};
-    result = fct_surface_vertices(env, &mesh, c->faces, places, out);
+    result = fct_surface_vertices(env, &mesh, c->faces, c->uv, places, out);
 done:
     fct_release(env, place_of);
     fct_release(env, places);
@@ -284,6 +291,7 @@ fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_
     fct_release(env, c.positions);
     fct_release(env, c.triangles);
     fct_release(env, c.faces);
+    fct_release(env, c.uv);
     fct_release(env, c.marks);
     fct_release(env, c.settled);
     fct_release(env, c.shrinks);

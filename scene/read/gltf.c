@@ -179,7 +179,11 @@ static fct_result place_mesh(reader *r, const fct_glb_place *place) {
         name_item(json_array_get(json_object_get(r->glb.root, "meshes"), (size_t)place->mesh), "mesh",
                   (size_t)place->mesh, name, sizeof name);
     const fct_scene_parts *parts = r->meshes + place->mesh;
-    return fct_scene_place(r->scene, name, parts->first, parts->count, parts->labels, to_world);
+    result = fct_scene_place(r->scene, name, parts->first, parts->count, parts->labels, to_world);
+    if (result != FCT_OK) return result;
+    fct_scene_object *object = r->scene->objects + r->scene->object_count - 1;
+    object->node = place->index, object->mesh = place->mesh;
+    return FCT_OK;
 }
 
 static fct_result visit_node(void *user, const fct_glb_place *place) {

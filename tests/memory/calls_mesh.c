@@ -41,6 +41,12 @@ static fct_result copy_mesh(const fct_env *env) {
     return finish_mesh(env, &mesh, STARVE(fct_mesh_copy(env, &inputs.sheet, &mesh)));
 }
 
+static fct_result join_meshes(const fct_env *env) {
+    const fct_mesh parts[2] = {inputs.sheet, inputs.sheet};
+    fct_mesh mesh;
+    return finish_mesh(env, &mesh, STARVE(fct_mesh_join(env, parts, 2, &mesh)));
+}
+
 static fct_result extract_mesh(const fct_env *env) {
     static const uint32_t faces[3] = {9, 1, 7};
     fct_mesh mesh;
@@ -234,6 +240,7 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_output_check", "", check_output, false},
                                   {"fct_mesh_create", "", create_mesh, false},
                                   {"fct_mesh_copy", "", copy_mesh, false},
+                                  {"fct_mesh_join", "", join_meshes, false},
                                   {"fct_mesh_extract", "", extract_mesh, false},
                                   {"fct_mesh_inspect", "", inspect_mesh, false},
                                   {"fct_mesh_validate", "", validate_mesh, false},

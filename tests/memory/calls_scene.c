@@ -183,6 +183,40 @@ static fct_result bake_instance_with(const fct_env *env, fct_bake_method method,
     return finish_bake(env, bake, &mesh, STARVE(fct_bake_instance(bake, 0, &mesh)));
 }
 
+static fct_result bake_lights(const fct_env *env) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_DIRECT);
+    def.outputs = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT;
+    fct_bake *bake;
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);
+    return finish_bake(env, bake, &mesh, STARVE(fct_bake_instance(bake, 0, &mesh)));
+}
+
+static fct_result bake_object_with(const fct_env *env, fct_keep keep) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_DIRECT);
+    def.keep = keep;
+    fct_bake *bake;
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);
+    return finish_bake(env, bake, &mesh, STARVE(fct_bake_object(bake, 0, &mesh)));
+}
+
+static fct_result bake_object(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_NONE);
+}
+
+static fct_result bake_corners(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_CORNER);
+}
+
+static fct_result bake_vertices(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_VERTEX);
+}
+
+static fct_result bake_faces(const fct_env *env) {
+    return bake_object_with(env, FCT_KEEP_FACE);
+}
+
 static fct_result bake_instance(const fct_env *env) {
     return bake_instance_with(env, FCT_BAKE_FACE, FCT_FINAL_GATHER);
 }
@@ -203,6 +237,39 @@ static fct_result bake_mesh(const fct_env *env) {
     fct_bake *bake = must_bake(env, FCT_BAKE_FACE, FCT_FINAL_NONE);
     fct_mesh mesh;
     return finish_bake(env, bake, &mesh, STARVE(fct_bake_mesh(bake, &mesh, NULL)));
+}
+
+static fct_result save_bake(const fct_env *env, fct_bake *bake, const char *document, bool merge) {
+    fct_mesh merged = {0};
+    fct_result result =
+        STARVE(fct_bake_save_scene(bake, OUT "lit.glb", document, NULL, merge ? &merged : NULL));
+    if (result != FCT_OK) assert_null(merged.positions);
+    fct_mesh_release(env, &merged);
+    fct_bake_destroy(bake);
+    return result;
+}
+
+static fct_result save_scene(const fct_env *env) {
+    return save_bake(env, must_bake(env, FCT_BAKE_FACE, FCT_FINAL_NONE), NULL, true);
+}
+
+static fct_result save_faces(const fct_env *env) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_NONE);
+    def.keep = FCT_KEEP_FACE;
+    fct_bake *bake;
+    assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);
+    return save_bake(env, bake, NULL, false);
+}
+
+static fct_result save_document(const fct_env *env) {
+    fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_NONE);
+    fct_scene *scene;
+    fct_bake *bake;
+    assert_int_equal(fct_scene_load(env, IN "corner.gltf", FCT_BACKEND_OBB, &scene), FCT_OK);
+    assert_int_equal(fct_bake_create(env, scene, &def, &bake), FCT_OK);
+    fct_result result = save_bake(env, bake, IN "corner.gltf", false);
+    fct_scene_destroy(scene);
+    return result;
 }
 
 static fct_result bake_probe_with(const fct_env *env, fct_bake_method method) {
@@ -243,7 +310,15 @@ const memory_call scene_calls[] = {{"fct_scene_create", "", create_scene, false}
                                    {"fct_bake_instance", "direct", bake_instance_direct, false},
                                    {"fct_bake_instance", "none", bake_instance_plain, false},
                                    {"fct_bake_instance", "reference", bake_reference, false},
+                                   {"fct_bake_instance", "all outputs", bake_lights, false},
+                                   {"fct_bake_object", "", bake_object, false},
+                                   {"fct_bake_object", "corner", bake_corners, false},
+                                   {"fct_bake_object", "vertex", bake_vertices, false},
+                                   {"fct_bake_object", "face", bake_faces, false},
                                    {"fct_bake_mesh", "", bake_mesh, false},
+                                   {"fct_bake_save_scene", "new", save_scene, false},
+                                   {"fct_bake_save_scene", "faces", save_faces, false},
+                                   {"fct_bake_save_scene", "document", save_document, false},
                                    {"fct_bake_probe", "face", bake_probe, false},
                                    {"fct_bake_probe", "reference", bake_probe_reference, false},
                                    {NULL, NULL, NULL, false}};

@@ -69,6 +69,26 @@ check "a bake is a mesh" test "$(value kind)" = mesh
 expect 0 render lit.glb -o lit.png --size 40x30
 check "it shows its light" test "$(cmp -s lit.png glb.png; echo $?)" = 1
 
+# A baked .glb keeps nodes and materials; --merge does not. Both are the same mesh with the same light.
+expect 0 bake in/s.gltf -o kept.glb --also kept.ply --json
+expect 0 bake in/s.gltf -o one.glb --merge
+check "the nodes" grep -qaF '"nodes":[{"name":"a","mesh":0},{"name":"b","scale":[2,2,2],"translation":[0,0,-1],"mesh":1}]' kept.glb
+check "the material" grep -qaF '{"name":"lamp","doubleSided":false,"emissiveFactor"' kept.glb
+check "not unlit" test "$(grep -ac KHR_materials_unlit kept.glb)" = 0
+check "unlit" grep -qa KHR_materials_unlit one.glb
+expect 0 compare kept.glb one.glb --samples 3 --json
+holds "$(value e_max) < 1e-6 && $(value color_rms) < 1e-6"
+expect 0 bake in/s.gltf -o one.ply
+check "--also" cmp -s kept.ply one.ply
+expect 0 simplify kept.glb --faces 40 -o few.glb
+check "names stay" grep -qaF '"name":"b"' few.glb
+expect 0 info few.glb --json
+holds "$(value faces) <= 40 && $(value faces) > 0"
+expect 0 bake - --format glb -o pipe.glb <in/s.glb
+check "nodes of a pipe" grep -qaF '"nodes":[{"name":"a","mesh":0},{"name":"b"' pipe.glb
+check "unlit" grep -qa KHR_materials_unlit pipe.glb
+expect 73 bake in/s.gltf -o missing/x.glb
+
 # Each feature that is left out has one warning, once, also with --quiet and in --json.
 document '"uri": "buffer.bin"' '"animations": [{}], "extensionsUsed": ["KHR_lights_punctual"],
     "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point"}]}},' >in/more.gltf

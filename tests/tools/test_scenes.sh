@@ -51,6 +51,45 @@ for bad in '0 0 0 1 0' '0 0 0 0 0 x' '0 0 0 0 0 0' '0 0 nan 0 0 1'; do
 done
 expect 66 bake furnace.json --probe missing.txt
 
+# Other quantities: in the furnace E = 2, direct 1 and indirect 1; the first one makes the colours.
+expect 0 bake furnace.json -o some.ply --light irradiance,direct,indirect --source --json
+check "the outputs are listed" grep -q '"irradiance",' out
+head -n 25 some.ply | grep -a '^property' | tr '\n' ' ' >layout
+check "the layout" grep -q 'uchar blue property float irradiance_r .* direct_b property float indirect_r .*indices property int source_face property list uchar float source_uv $' layout
+check "no radiosity" test "$(grep -c radiosity layout)" = 0
+expect 0 bake furnace.json -o plain.ply --light radiosity
+expect 0 bake furnace.json -o lit.ply
+check "radiosity is the default" cmp -s plain.ply lit.ply
+expect 0 compare some.ply lit.ply --json # both are 2
+holds "$(value color_rms) < .02"
+expect 0 bake furnace.json -o some.glb --light direct,radiosity
+for name in _DIRECT _RADIOSITY KHR_materials_unlit; do check "$name" grep -qa "$name" some.glb; done
+expect 0 info some.glb
+expect 64 bake furnace.json -o x.ply --light direct,direct
+says "'direct' twice"
+expect 64 bake furnace.json -o x.ply --light ''
+expect 64 bake furnace.json -o x.ply --light albedo
+expect 65 bake furnace.json -o x.ply --light direct --final none
+expect 65 bake furnace.json -o x.ply --light indirect --method reference
+says "radiosity and irradiance"
+check "no file" test ! -e x.ply
+
+# --keep-mesh: the faces of the input; colours of faces in every format.
+for how in vertex corner face; do
+    for form in ply off glb obj; do
+        expect 0 bake furnace.json -o kept.$form --keep-mesh $how --quality draft
+        expect 0 info kept.$form --json
+        holds "$(value faces) == 528"
+        [ $how = corner ] || [ $how$form = faceglb ] || [ $how$form = faceobj ] || holds "$(value vertices) == 266"
+    done
+    expect 0 compare kept.glb lit.ply --json
+    holds "$(value color_rms) < .06"
+done
+expect 0 info kept.glb --json
+holds "$(value vertices) == 3 * 528"
+expect 64 bake furnace.json -o kept.ply --keep-mesh edge
+expect 65 bake furnace.json -o kept.ply --keep-mesh face --light irradiance
+
 # A folder receives one file per object.
 cat >two.json <<'END'
 {"models": {"room": "inside.off", "box": "cube.off"},

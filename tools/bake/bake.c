@@ -8,7 +8,10 @@
 #include <string.h>
 
 #include "tools/bake/objects.h"
+#include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
+#include "tools/bake/save.h"
+#include "tools/bake/scene.h"
 #include "tools/commands.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
@@ -19,9 +22,10 @@ typedef struct bake_options {
     fct_bake_def def;
     fct_backend backend;
     const char *probes;
-    double exposure;
+    fct_mesh_save_def save;
+    bake_outputs outputs;
     const char *also;
-    bool two_sided;
+    bool two_sided, merge;
     int quality; /* of qualities */
     bool error_given, final_given;
 } bake_options;
@@ -44,7 +48,11 @@ enum {
     KEY_EXPOSURE,
     KEY_MAX_EDGE,
     KEY_ALSO,
-    KEY_TWO_SIDED
+    KEY_TWO_SIDED,
+    KEY_LIGHT,
+    KEY_KEEP,
+    KEY_MERGE,
+    KEY_SOURCE
 };
 
 static const struct argp_option bake_options_table[] = {
@@ -72,13 +80,34 @@ static const struct argp_option bake_options_table[] = {
      "Also compute the light at points, one per line: x y z nx ny nz; - is standard input", 0},
     {"exposure", KEY_EXPOSURE, "F", 0,
      "Factor on the colours for display (default 1); the stored radiosity does not change", 0},
+    {"light", KEY_LIGHT, "LIST", 0,
+     "What to write, separated by commas: radiosity (default), the light that leaves a surface; irradiance, "
+     "the "
+     "light that arrives, before the surface's own colour; direct and indirect, the two parts of the "
+     "irradiance. All are per area, in the unit of the scene's emission. The first one makes the colours, "
+     "and "
+     "all are written as floats. reference gives radiosity and irradiance",
+     0},
+    {"keep-mesh", KEY_KEEP, "HOW", 0,
+     "Write the faces of the input in its order, and divide none. vertex: one colour per vertex, on a crease "
+     "the "
+     "mean of its sides; corner: a vertex more for each other side of a crease; face: one colour per face. A "
+     "two-sided surface has the light of its brighter side",
+     0},
+    {"source", KEY_SOURCE, NULL, 0,
+     "Also write where each face of a .ply comes from: source_face, a face of the object's mesh, and "
+     "source_uv, the weights of the second and the third corner of that face at each corner",
+     0},
     {"max-edge", KEY_MAX_EDGE, "L", 0,
      "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
      "scene)",
      0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
      "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
-    {"also", KEY_ALSO, "FILE", 0, "Also write the mesh to a second file, in the format of its name", 0},
+    {"merge", KEY_MERGE, NULL, 0,
+     "Write a .glb as one unlit mesh in world space, without the nodes and materials of the scene", 0},
+    {"also", KEY_ALSO, "FILE", 0,
+     "Also write all objects as one mesh to a second file, in the format of its name", 0},
     {0}};
 
 static error_t parse_bake(int key, char *text, struct argp_state *state) {
@@ -87,8 +116,11 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const fct_bake_method method_values[] = {FCT_BAKE_FACE, FCT_BAKE_REFERENCE};
     static const fct_final final_values[] = {FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER};
     static const char *const names[] = {"draft", "normal", "fine", NULL};
+    static const char *const keeps[] = {"corner", "vertex", "face", NULL};
+    static const fct_keep keep_values[] = {FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE};
     bake_options *o = state->input;
     int index = 0;
+    double exposure = 1;
     error_t error;
     switch (key) {
     case KEY_METHOD:
@@ -100,6 +132,17 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case ARGP_KEY_END:
         if (!o->error_given) o->def.error = qualities[o->quality].error;
         if (!o->final_given) o->def.final = qualities[o->quality].final;
+        o->def.outputs = o->outputs.lights & ~(unsigned)FCT_MESH_COLORS;
+        bake_set_save(&o->outputs, &o->save);
+        return 0;
+    case KEY_LIGHT:
+        return bake_parse_outputs(state, text, &o->outputs);
+    case KEY_KEEP:
+        error = tool_parse_choice(state, "--keep-mesh", text, keeps, &index);
+        o->def.keep = keep_values[index];
+        return error;
+    case KEY_SOURCE:
+        o->def.sources = o->save.sources = true;
         return 0;
     case KEY_FINAL:
         o->final_given = true;
@@ -120,9 +163,14 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         o->probes = text;
         return 0;
     case KEY_EXPOSURE:
-        return tool_parse_real(state, "--exposure", text, 0, 1e12, &o->exposure);
+        error = tool_parse_real(state, "--exposure", text, 0, 1e12, &exposure);
+        o->save.exposure = (float)exposure;
+        return error;
     case KEY_ALSO:
         o->also = text;
+        return 0;
+    case KEY_MERGE:
+        o->merge = true;
         return 0;
     case KEY_TWO_SIDED:
         o->two_sided = true;
@@ -138,10 +186,11 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
 
 static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     fct_mesh mesh;
+    if (tool_ends(t->output, "glb") && !o->merge) return bake_write_scene(t, bake, o->also, &o->save);
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
-    code = tool_save_mesh(t, t->output, &mesh, o->exposure);
-    if (code == TOOL_DONE && o->also) code = tool_save_mesh(t, o->also, &mesh, o->exposure);
+    code = bake_save_mesh(t, t->output, &mesh, &o->save);
+    if (code == TOOL_DONE && o->also) code = bake_save_mesh(t, o->also, &mesh, &o->save);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -190,6 +239,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
         (json_int_t)tool_peak_bytes(), "touched_bytes", (json_int_t)s->touched_bytes, "power", "emitted",
         s->power_emitted, "absorbed", s->power_absorbed, "escaped", s->power_escaped, "error_estimate",
         s->error_estimate);
+    if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (probes && object) json_object_set(object, "probes", probes);
     if (files && object) json_object_set(object, "files", files);
     int code = tool_json(t, object);
@@ -214,6 +264,15 @@ static int check_light(tool *t, const fct_scene_view *scene) {
         t->inputs[0]);
 }
 
+static void warn_sides(tool *t, const fct_bake_stats *s) {
+    const bool one = s->sides_left_out == 1;
+    if (s->sides_left_out)
+        tool_warn(t,
+                  "%u two-sided surface%s lit on both sides; --keep-mesh has a place for the brighter side "
+                  "alone",
+                  s->sides_left_out, one ? " is" : "s are");
+}
+
 static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, fct_scene *scene, double load,
                        bake_answers *answers) {
     fct_bake *bake = NULL;
@@ -225,13 +284,14 @@ static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, f
     if (code == TOOL_DONE) code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
     if (code == TOOL_DONE && folder) {
         answers->files = json_array();
-        code = bake_write_objects(t, bake, &view, &objects, o->exposure, answers->files);
+        code = bake_write_objects(t, bake, &view, &objects, &o->save, answers->files);
     } else if (code == TOOL_DONE && t->output) {
         code = write_file(t, o, bake);
     }
     if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
     if (code == TOOL_DONE) {
         fct_bake_stats stats = fct_bake_get_stats(bake);
+        warn_sides(t, &stats);
         code = report_bake(t, o, &stats, load, answers->probes, answers->files);
     }
     bake_release_objects(t, &objects);
@@ -322,12 +382,22 @@ int tool_bake(int argc, char **argv) {
         .summary = "compute the radiosity of a scene as vertex colours",
         .text =
             "SCENE is a scene.json, an OBJ with its MTL, a glTF file (.gltf, .glb) or a mesh. OUT is "
-            "either a mesh in world "
-            "space or a folder, which receives one .ply per object. A .glb holds linear COLOR_0, exposed "
+            "a folder, which receives one .ply per object; a .glb, which keeps the nodes of the scene; or a "
+            "mesh of another kind in world space. A .glb holds linear COLOR_0, exposed "
             "and clamped, "
-            "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. Large flat "
-            "triangles are divided, so "
-            "that they can carry shadows. A scene in which nothing emits light is an error. The exit code is "
+            "and float _RADIOSITY. A .ply holds sRGB bytes and float radiosity_r/g/b. With --light they hold "
+            "_IRRADIANCE, _DIRECT, _INDIRECT, irradiance_r/g/b, ...\n\n"
+            "In a .glb each object is a node with its name and transform, and a mesh with a primitive per "
+            "material. From a glTF input all nodes, materials, textures, texture coordinates, cameras, "
+            "lights "
+            "and extras stay as they are; the light is in COLOR_0, or in COLOR_1 where the input has "
+            "colours. "
+            "From other inputs the materials are unlit, so that viewers show the light; their extras hold "
+            "the "
+            "reflectance and the emission. --merge writes one unlit mesh instead.\n\n"
+            "Large flat triangles are divided, so "
+            "that they can carry shadows; --keep-mesh keeps the faces of the input instead. A scene in which "
+            "nothing emits light is an error. The exit code is "
             "1 if the solution has not converged.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
@@ -339,7 +409,7 @@ int tool_bake(int argc, char **argv) {
             "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
             "seconds{load, open, "
             "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
-            "error_estimate, "
+            "error_estimate, outputs[] (the quantities of --light), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
             "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
             "name of its model. Powers are sums over "
@@ -347,6 +417,8 @@ int tool_bake(int argc, char **argv) {
         .examples = "  facetree bake scene.json -o lit.glb\n"
                     "  facetree bake room.obj -o lit.glb --quality draft\n"
                     "  facetree bake scene.json -o lit/ --json\n"
+                    "  facetree bake scene.json -o lit.glb --light irradiance,direct\n"
+                    "  facetree bake model.obj -o lit/ --keep-mesh vertex\n"
                     "  facetree bake scene.json --probe points.txt",
         .options = bake_options_table,
         .parse = parse_bake,
@@ -358,6 +430,9 @@ int tool_bake(int argc, char **argv) {
         .inputs_max = 1,
         .output = TOOL_OUTPUT_OPTIONAL,
         .output_folder = true};
-    bake_options options = {.def = fct_bake_def_default(), .exposure = 1, .quality = 1};
+    bake_options options = {.def = fct_bake_def_default(),
+                            .save = fct_mesh_save_def_default(),
+                            .outputs = {FCT_MESH_COLORS, FCT_MESH_COLORS},
+                            .quality = 1};
     return tool_main(&command, argc, argv, &options);
 }

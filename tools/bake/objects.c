@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/bake/save.h"
 #include "tools/guard/inputs.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -42,48 +43,6 @@ int bake_plan_objects(tool *t, const fct_scene_view *scene, bake_objects *out) {
     return code;
 }
 
-/* Appends the positions, triangles, colours and normals of `part` to `all`. */
-static int append_part(tool *t, fct_mesh *all, const fct_mesh *part) {
-    bool normals = part->normals && (all->normals || !all->vertex_count);
-    fct_mesh sum;
-    if (all->vertex_count > INT32_MAX - part->vertex_count || all->face_count > INT32_MAX - part->face_count)
-        return tool_fail(t, TOOL_DATA, "an object has more than 2^31 vertices or faces");
-    int code = tool_result(t, fct_mesh_create(&t->env, all->vertex_count + part->vertex_count,
-                                              all->face_count + part->face_count,
-                                              FCT_MESH_COLORS | (normals ? FCT_MESH_NORMALS : 0), &sum));
-    if (code != TOOL_DONE) return code;
-    memcpy(sum.origin, part->origin, sizeof sum.origin);
-    const fct_mesh *parts[2] = {all, part};
-    size_t vertex = 0, corner = 0;
-    for (int p = 0; p < 2; ++p) {
-        const size_t floats = 3 * (size_t)parts[p]->vertex_count, corners = 3 * (size_t)parts[p]->face_count;
-        if (!floats) continue;
-        memcpy(sum.positions + 3 * vertex, parts[p]->positions, floats * sizeof(float));
-        memcpy(sum.colors + 3 * vertex, parts[p]->colors, floats * sizeof(float));
-        if (normals) memcpy(sum.normals + 3 * vertex, parts[p]->normals, floats * sizeof(float));
-        for (size_t c = 0; c < corners; ++c)
-            sum.triangles[corner + c] = parts[p]->triangles[c] + (uint32_t)vertex;
-        vertex += parts[p]->vertex_count;
-        corner += corners;
-    }
-    fct_mesh_release(&t->env, all);
-    *all = sum;
-    return TOOL_DONE;
-}
-
-static int merge_parts(tool *t, fct_bake *bake, const fct_scene_view *scene, uint32_t first, fct_mesh *all) {
-    int code = TOOL_DONE;
-    for (uint32_t i = first; i < scene->instance_count && code == TOOL_DONE; ++i) {
-        fct_mesh part;
-        if (scene->instances[i].object != scene->instances[first].object) break;
-        code = tool_result(t, fct_bake_instance(bake, i, &part));
-        if (code != TOOL_DONE) break;
-        code = append_part(t, all, &part);
-        fct_mesh_release(&t->env, &part);
-    }
-    return code;
-}
-
 /* A file system may take two names for one in ways that bake_make_name does not know. The file of an earlier
  * object then stays, and this object gets another name. */
 static int avoid_written(tool *t, const guard_inputs *written, bake_objects *objects, uint32_t object,
@@ -97,16 +56,16 @@ static int avoid_written(tool *t, const guard_inputs *written, bake_objects *obj
 }
 
 int bake_write_objects(tool *t, fct_bake *bake, const fct_scene_view *scene, bake_objects *objects,
-                       double exposure, json_t *files) {
+                       const fct_mesh_save_def *def, json_t *files) {
     guard_inputs written = {0};
     int code = TOOL_DONE;
     for (uint32_t i = 0; i < objects->count && code == TOOL_DONE; ++i) {
         if (objects->first[i] == FCT_NONE) continue;
         const fct_instance *first = scene->instances + objects->first[i];
         fct_mesh all = {0};
-        code = merge_parts(t, bake, scene, objects->first[i], &all);
+        code = tool_result(t, fct_bake_object(bake, first->object, &all));
         if (code == TOOL_DONE) code = avoid_written(t, &written, objects, i, first->name);
-        if (code == TOOL_DONE) code = tool_save_mesh(t, objects->paths[i], &all, exposure);
+        if (code == TOOL_DONE) code = bake_save_mesh(t, objects->paths[i], &all, def);
         if (code == TOOL_DONE && !guard_add_input(&written, objects->paths[i]))
             code = tool_fail(t, TOOL_MEMORY, "out of memory for the names of files");
         if (code == TOOL_DONE)

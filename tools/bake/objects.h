@@ -17,7 +17,7 @@ typedef struct bake_objects {
 int bake_plan_objects(tool *t, const fct_scene_view *scene, bake_objects *out);
 /* Writes the files. `files` receives one {object, file, faces, source} per object. Returns an exit code. */
 int bake_write_objects(tool *t, fct_bake *bake, const fct_scene_view *scene, bake_objects *objects,
-                       double exposure, json_t *files);
+                       const fct_mesh_save_def *def, json_t *files);
 void bake_release_objects(tool *t, bake_objects *objects);
 
 #endif

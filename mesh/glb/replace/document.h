@@ -14,11 +14,12 @@ typedef struct fct_gltf_part {
 /* A mesh of the document. */
 typedef struct fct_gltf_group {
     double to_world[12], to_node[12];
-    bool placed;                       /* it has been read */
-    bool identity;                     /* both transforms */
-    bool mirrored;                     /* to_world reverses the winding */
-    bool colors, texcoords, radiosity; /* any of its primitives has them */
-    uint32_t first, count;             /* its parts */
+    bool placed;            /* it has been read */
+    bool identity;          /* both transforms */
+    bool mirrored;          /* to_world reverses the winding */
+    bool colors, texcoords; /* any of its primitives has them */
+    const char *light;      /* attribute of the light of its first primitive that has one, or NULL */
+    uint32_t first, count;  /* its parts */
 } fct_gltf_group;
 
 struct fct_gltf {

@@ -5,7 +5,7 @@
 #include "base/math/vec.h"
 #include "mesh/glb/features.h"
 #include "mesh/glb/primitive.h"
-#include "mesh/glb/replace/document.h"
+#include "mesh/glb/replace/carry.h"
 
 /* Inverts R|t. False if it flattens space. */
 static bool invert(const double m[12], double out[12]) {
@@ -49,8 +49,8 @@ static fct_result list_parts(fct_gltf *d, uint32_t mesh) {
         if (result != FCT_OK) return result;
         d->parts[d->part_count++] = (fct_gltf_part){mesh, (uint32_t)i};
         ++g->count;
-        g->colors |= p.color >= 0 || p.radiosity >= 0;
-        g->radiosity |= p.radiosity >= 0;
+        g->colors |= p.color >= 0 || p.light >= 0;
+        if (!g->light) g->light = p.light_name;
         g->texcoords |= p.texcoord >= 0;
     }
     return FCT_OK;
@@ -106,9 +106,7 @@ static fct_result read_soup(fct_gltf *d, fct_soup *soup) {
 
 static fct_result read_document(fct_gltf *d, fct_mesh *mesh) {
     fct_soup soup = {0}, far = {0};
-    d->source = (fct_source){d->env, d->name, d->file.data, d->file.size, d->folder};
-    fct_result result = fct_glb_open(&d->source, &d->glb);
-    if (result != FCT_OK) return result;
+    fct_result result;
     d->group_count = fct_glb_count(&d->glb, "meshes");
     d->groups = fct_allocate(d->env, d->group_count, sizeof *d->groups);
     if (!d->groups) return fct_fail_memory(d->env, "a glTF document");
@@ -124,9 +122,8 @@ static fct_result read_document(fct_gltf *d, fct_mesh *mesh) {
     return result;
 }
 
-fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, fct_mesh *mesh) {
+fct_result fct_gltf_open_document(const fct_env *env, const char *path, fct_gltf **out) {
     *out = NULL;
-    *mesh = (fct_mesh){0};
     fct_gltf *d = fct_allocate_zero(env, 1, sizeof *d);
     if (!d) return fct_fail_memory(env, "a glTF document");
     d->env = env;
@@ -137,7 +134,22 @@ fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, f
     fct_result result = d->folder ? fct_file_open(env, path, &d->file) : FCT_ERROR_MEMORY;
     if (!d->name) result = fct_fail_memory(env, "a glTF document");
     if (result == FCT_OK) result = fct_progress(env, "read", 0);
-    if (result == FCT_OK) result = read_document(d, mesh);
+    d->source = (fct_source){env, d->name, d->file.data, d->file.size, d->folder};
+    if (result == FCT_OK) result = fct_glb_open(&d->source, &d->glb);
+    if (result == FCT_OK)
+        *out = d;
+    else
+        fct_gltf_close(d);
+    return result;
+}
+
+fct_result fct_gltf_open(const fct_env *env, const char *path, fct_gltf **out, fct_mesh *mesh) {
+    fct_gltf *d;
+    *out = NULL;
+    *mesh = (fct_mesh){0};
+    fct_result result = fct_gltf_open_document(env, path, &d);
+    if (result != FCT_OK) return result;
+    result = read_document(d, mesh);
     if (result == FCT_OK)
         *out = d;
     else

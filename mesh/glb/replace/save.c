@@ -8,7 +8,7 @@
 #include <strings.h>
 
 #include "base/math/vec.h"
-#include "mesh/glb/document/buffer.h"
+#include "mesh/glb/replace/carry.h"
 #include "mesh/glb/replace/document.h"
 #include "mesh/glb/write/export.h"
 
@@ -69,8 +69,8 @@ typedef struct writing {
     fct_mesh *meshes; /* per geometry */
     size_t *groups;   /* the group of each geometry */
     fct_glb_content content;
-    fct_glb_buffer *images; /* per image: what keeps its bytes */
-    bool failed;            /* memory for text was exhausted */
+    fct_gltf_images images;
+    bool failed; /* memory for text was exhausted */
 } writing;
 
 static fct_result fail_json(const fct_gltf *d) {
@@ -98,8 +98,9 @@ static fct_result make_geometries(writing *w) {
         fct_glb_geometry *geometry = w->content.geometries + at;
         w->groups[at] = g;
         result = make_group_mesh(d, m, g, faces + starts[g], count, w->meshes + at);
-        *geometry = (fct_glb_geometry){.mesh = w->meshes + at, .radiosity = d->groups[g].radiosity};
-        fct_sink sink = {d->env, w->path, w->meshes + at, w->def};
+        *geometry = (fct_glb_geometry){.mesh = w->meshes + at, .light_name = d->groups[g].light};
+        fct_sink sink = {d->env, w->path, w->meshes + at, w->def, NULL};
+        geometry->light = geometry->light_name ? w->meshes[at].colors : NULL;
         if (result == FCT_OK) result = fct_glb_layout_build(&sink, &geometry->layout);
         if (result == FCT_OK)
             result = fct_progress(d->env, "write", .5 * (double)(g + 1) / (double)d->group_count);
@@ -107,29 +108,6 @@ static fct_result make_geometries(writing *w) {
     fct_release(d->env, faces);
     fct_release(d->env, starts);
     return result;
-}
-
-/* Removes an extension from an object, and its list of extensions if it was the last. */
-static void remove_extension(json_t *object, const char *name) {
-    json_t *extensions = json_object_get(object, "extensions");
-    json_object_del(extensions, name);
-    if (extensions && json_object_size(extensions) == 0) json_object_del(object, "extensions");
-}
-
-/* Removes from a root's list of names those that stand for encodings of geometry. */
-static void remove_encodings(json_t *root, const char *list) {
-    static const char *const names[] = {"KHR_mesh_quantization", "EXT_meshopt_compression",
-                                        "KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing"};
-    json_t *array = json_object_get(root, list);
-    for (size_t i = json_array_size(array); i-- > 0;) {
-        const char *name = json_string_value(json_array_get(array, i));
-        for (size_t k = 0; name && k < FCT_LENGTH(names); ++k)
-            if (!strcmp(name, names[k])) {
-                json_array_remove(array, i);
-                break;
-            }
-    }
-    if (array && json_array_size(array) == 0) json_object_del(root, list);
 }
 
 /* Gives the meshes that stay new numbers, and removes the others from the nodes. numbers: group_count. False
@@ -140,11 +118,8 @@ static bool renumber_meshes(const writing *w, int64_t *numbers) {
     for (size_t g = 0; g < w->gltf->group_count; ++g) numbers[g] = FCT_GLB_ABSENT;
     for (size_t k = 0; k < w->content.geometry_count; ++k) numbers[w->groups[k]] = (int64_t)k;
     json_array_foreach(json_object_get(w->root, "nodes"), i, node) {
-        static const char *const lost[] = {"skin", "weights"};
         json_int_t mesh = json_integer_value(json_object_get(node, "mesh"));
         bool has_mesh = json_object_get(node, "mesh") && mesh >= 0 && (uint64_t)mesh < w->gltf->group_count;
-        for (size_t k = 0; k < FCT_LENGTH(lost); ++k) json_object_del(node, lost[k]);
-        remove_extension(node, "EXT_mesh_gpu_instancing");
         if (!has_mesh || numbers[mesh] == FCT_GLB_ABSENT)
             json_object_del(node, "mesh");
         else if (json_object_set_new(node, "mesh", json_integer(numbers[mesh])))
@@ -155,125 +130,20 @@ static bool renumber_meshes(const writing *w, int64_t *numbers) {
 
 /* Without nodes, a document places each mesh once; so does the copy. */
 static fct_result copy_document(writing *w) {
-    static const char *const lost[] = {"accessors", "bufferViews", "buffers",
-                                       "meshes",    "animations",  "skins"};
     fct_gltf *d = w->gltf;
     int64_t *numbers = fct_allocate(d->env, d->group_count, sizeof *numbers);
-    w->root = numbers ? json_deep_copy(d->glb.root) : NULL;
-    if (!w->root) {
-        fct_release(d->env, numbers);
-        return fail_json(d);
-    }
-    for (size_t k = 0; k < FCT_LENGTH(lost); ++k) json_object_del(w->root, lost[k]);
-    char generator[64];
-    snprintf(generator, sizeof generator, "Facetree %s", fct_version());
-    remove_encodings(w->root, "extensionsUsed");
-    remove_encodings(w->root, "extensionsRequired");
-    if (!json_is_object(json_object_get(w->root, "asset")))
-        json_object_set_new(w->root, "asset", json_pack("{s:s}", "version", "2.0"));
-    bool done = renumber_meshes(w, numbers) &&
-                !json_object_set_new(json_object_get(w->root, "asset"), "generator", json_string(generator));
+    fct_result result = numbers ? fct_gltf_copy_root(d, &w->root) : fail_json(d);
+    if (result == FCT_OK && !renumber_meshes(w, numbers)) result = fail_json(d);
     fct_release(d->env, numbers);
-    return done ? FCT_OK : fail_json(d);
-}
-
-/* Finds the bytes of an image. *found is false, after a warning, if its file cannot be read. */
-static fct_result open_image(fct_gltf *d, json_t *image, fct_glb_buffer *buffer, fct_glb_blob *blob,
-                             bool *found) {
-    int64_t view;
-    const fct_glb_view *bytes;
-    json_t *uri = json_object_get(image, "uri");
-    fct_result result = fct_glb_index(&d->glb, image, "bufferView", &view);
-    *found = false;
-    if (result != FCT_OK || (view == FCT_GLB_ABSENT && !json_is_string(uri))) return result;
-    if (view != FCT_GLB_ABSENT) {
-        result = fct_glb_view_of(&d->glb, view, &bytes);
-        if (result == FCT_OK) *blob = (fct_glb_blob){bytes->data, bytes->size};
-    } else {
-        result = fct_glb_open_uri(&d->glb, uri, buffer);
-        *blob = (fct_glb_blob){buffer->data, buffer->size};
-        if (result == FCT_ERROR_INPUT || result == FCT_ERROR_DATA) {
-            fct_glb_warn(&d->glb, "the image \"%.200s\" cannot be read, and the output names it as a file",
-                         json_string_value(uri));
-            return FCT_OK;
-        }
-    }
-    *found = result == FCT_OK;
     return result;
-}
-
-/* image/png and others by the first bytes, or NULL. */
-static const char *find_image_type(const fct_glb_blob *blob) {
-    static const struct {
-        const char *start, *type;
-        size_t size;
-    } kinds[] = {{"\x89PNG", "image/png", 4},
-                 {"\xff\xd8\xff", "image/jpeg", 3},
-                 {"RIFF", "image/webp", 4},
-                 {"\xabKTX 20", "image/ktx2", 7}};
-    for (size_t k = 0; k < FCT_LENGTH(kinds); ++k)
-        if (blob->size >= kinds[k].size && !memcmp(blob->data, kinds[k].start, kinds[k].size))
-            return kinds[k].type;
-    return NULL;
-}
-
-/* Stores every image in the file. */
-static fct_result store_images(writing *w) {
-    fct_gltf *d = w->gltf;
-    json_t *images = json_object_get(w->root, "images"), *image;
-    size_t i, count = json_array_size(images);
-    const fct_array arrays[] = {FCT_ARRAY_ZERO(w->images, count), FCT_ARRAY_ZERO(w->content.blobs, count)};
-    fct_result result = fct_allocate_all(d->env, arrays, FCT_LENGTH(arrays), "the images of a glTF file");
-    size_t view = fct_glb_number(&w->content);
-    json_array_foreach(images, i, image) {
-        size_t at = w->content.blob_count;
-        bool found;
-        if (result == FCT_OK) result = open_image(d, image, w->images + i, w->content.blobs + at, &found);
-        if (result != FCT_OK) return result;
-        if (!found) continue;
-        const char *type = find_image_type(w->content.blobs + at);
-        json_object_del(image, "uri");
-        if (json_object_set_new(image, "bufferView", json_integer((json_int_t)(view + at))) ||
-            (type && !json_object_get(image, "mimeType") &&
-             json_object_set_new(image, "mimeType", json_string(type))))
-            return fail_json(d);
-        ++w->content.blob_count;
-    }
-    return result;
-}
-
-/* Text that goes to a stream, except for its last byte. */
-typedef struct held_text {
-    FILE *stream;
-    size_t length;
-    char last;
-} held_text;
-
-static int hold_last_byte(const char *bytes, size_t size, void *user) {
-    held_text *t = user;
-    if (!size) return 0;
-    if (t->length) fputc(t->last, t->stream);
-    fwrite(bytes, 1, size - 1, t->stream);
-    t->last = bytes[size - 1];
-    t->length += size;
-    return 0;
-}
-
-/* Prints an object without its last brace. Returns whether it has members. (json_dumps of jansson 2.14 can
- * lose a key without an error when memory is exhausted.) */
-static bool print_open(writing *w, const json_t *object, FILE *json) {
-    held_text text = {.stream = json};
-    w->failed |=
-        !object || json_dump_callback(object, hold_last_byte, &text, JSON_COMPACT | JSON_REAL_PRECISION(17));
-    return text.length > 2;
 }
 
 static void print_primitive(writing *w, size_t k, uint32_t i, const json_t *object, FILE *json) {
     static const char *const replaced[] = {"attributes", "indices", "mode", "targets"};
     json_t *primitive = json_deep_copy(object);
     for (size_t r = 0; r < FCT_LENGTH(replaced); ++r) json_object_del(primitive, replaced[r]);
-    remove_extension(primitive, "KHR_draco_mesh_compression");
-    if (print_open(w, primitive, json)) fputc(',', json);
+    fct_gltf_remove_extension(primitive, "KHR_draco_mesh_compression");
+    if (fct_gltf_print_open(primitive, json, &w->failed)) fputc(',', json);
     fct_glb_print_primitive(w->content.geometries + k, i, json);
     fputc('}', json);
     json_decref(primitive);
@@ -287,7 +157,7 @@ static void print_mesh(writing *w, size_t k, FILE *json) {
     bool first = true;
     json_object_del(mesh, "primitives");
     json_object_del(mesh, "weights");
-    if (print_open(w, mesh, json)) fputc(',', json);
+    if (fct_gltf_print_open(mesh, json, &w->failed)) fputc(',', json);
     fprintf(json, "\"primitives\":[");
     for (uint32_t i = 0; i < g->count; ++i) {
         if (!fct_glb_primitive_faces(w->content.geometries + k, i)) continue;
@@ -302,7 +172,7 @@ static void print_mesh(writing *w, size_t k, FILE *json) {
 /* The root has members: copy_document gives it an asset. */
 static size_t print_document(void *user, FILE *json) {
     writing *w = user;
-    print_open(w, w->root, json);
+    fct_gltf_print_open(w->root, json, &w->failed);
     for (size_t k = 0; k < w->content.geometry_count; ++k) {
         fputs(k ? "," : ",\"meshes\":[", json);
         print_mesh(w, k, json);
@@ -315,27 +185,21 @@ static size_t print_document(void *user, FILE *json) {
 
 static fct_result produce(void *user, FILE *stream) {
     writing *w = user;
-    fct_sink sink = {w->gltf->env, w->path, w->mesh, w->def};
+    fct_sink sink = {w->gltf->env, w->path, w->mesh, w->def, NULL};
     fct_result result = fct_glb_write_file(&sink, &w->content, print_document, w, stream);
     return result == FCT_OK && w->failed ? fail_json(w->gltf) : result;
 }
 
 static void release_writing(writing *w) {
     const fct_env *env = w->gltf->env;
-    size_t images = json_array_size(json_object_get(w->root, "images"));
     for (size_t k = 0; k < w->content.geometry_count; ++k) {
         fct_glb_layout_release(env, &w->content.geometries[k].layout);
         fct_mesh_release(env, w->meshes + k);
     }
-    for (size_t k = 0; w->images && k < images; ++k) {
-        fct_file_close(env, &w->images[k].file);
-        fct_release(env, w->images[k].own);
-    }
+    fct_gltf_release_images(env, &w->images);
     fct_release(env, w->meshes);
     fct_release(env, w->groups);
-    fct_release(env, w->images);
     fct_release(env, w->content.geometries);
-    fct_release(env, w->content.blobs);
     json_decref(w->root);
 }
 
@@ -366,7 +230,8 @@ fct_result fct_gltf_save(fct_gltf *d, const char *path, const fct_mesh *mesh, co
     writing w = {.gltf = d, .def = def, .path = path, .mesh = mesh};
     result = make_geometries(&w);
     if (result == FCT_OK) result = copy_document(&w);
-    if (result == FCT_OK) result = store_images(&w);
+    if (result == FCT_OK) result = fct_gltf_store_images(d, w.root, fct_glb_number(&w.content), &w.images);
+    w.content.blobs = w.images.blobs, w.content.blob_count = w.images.count;
     if (result == FCT_OK) result = fct_sink_write(d->env, path, produce, &w);
     release_writing(&w);
     return result;

@@ -18,17 +18,35 @@ typedef struct array {
     bool there;
 } array;
 
-enum { ARRAYS = 5 };
+enum { FIXED = 8, ARRAYS = FIXED + FCT_GLB_EXTRAS, LIGHTS = 4 };
+
+/* The float lights of a geometry, in the order of their attributes; NULL: absent. */
+static void list_lights(const fct_glb_geometry *g, const float *out[LIGHTS]) {
+    out[0] = g->light, out[1] = g->mesh->irradiance, out[2] = g->mesh->direct, out[3] = g->mesh->indirect;
+}
 
 /* The attributes of a geometry, in the order of their views. */
 static void list_arrays(const fct_glb_geometry *g, array out[ARRAYS]) {
     const fct_mesh *m = g->mesh;
-    const array arrays[ARRAYS] = {{"POSITION", "VEC3", "", 5126, 12, true},
-                                  {"NORMAL", "VEC3", "", 5126, 12, m->normals != NULL},
-                                  {"COLOR_0", "VEC4", ",\"normalized\":true", 5123, 8, m->colors != NULL},
-                                  {"_RADIOSITY", "VEC3", "", 5126, 12, m->colors != NULL && g->radiosity},
-                                  {"TEXCOORD_0", "VEC2", "", 5126, 8, g->layout.texcoords != NULL}};
+    const float *lights[LIGHTS];
+    list_lights(g, lights);
+    static const char *const types[5] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+    const char *color = g->color_name ? g->color_name : "COLOR_0";
+    const array arrays[FIXED] = {{"POSITION", "VEC3", "", 5126, 12, true},
+                                 {"NORMAL", "VEC3", "", 5126, 12, m->normals != NULL},
+                                 {color, "VEC4", ",\"normalized\":true", 5123, 8, m->colors != NULL},
+                                 {g->light_name, "VEC3", "", 5126, 12, lights[0] != NULL},
+                                 {"_IRRADIANCE", "VEC3", "", 5126, 12, lights[1] != NULL},
+                                 {"_DIRECT", "VEC3", "", 5126, 12, lights[2] != NULL},
+                                 {"_INDIRECT", "VEC3", "", 5126, 12, lights[3] != NULL},
+                                 {"TEXCOORD_0", "VEC2", "", 5126, 8, g->layout.texcoords != NULL}};
     memcpy(out, arrays, sizeof arrays);
+    for (size_t i = 0; i < FCT_GLB_EXTRAS; ++i) {
+        const bool there = i < g->extra_count;
+        const fct_glb_extra *e = there ? g->extras + i : NULL;
+        out[FIXED + i] = there ? (array){e->name, types[e->width], "", 5126, 4 * (size_t)e->width, true}
+                               : (array){"", "", "", 0, 0, false};
+    }
 }
 
 static size_t count_arrays(const fct_glb_geometry *g) {
@@ -197,13 +215,19 @@ static void write_geometry(const fct_sink *sink, const fct_glb_geometry *g, FILE
     for (uint32_t i = 0; i < l->vertex_count; ++i)
         write_floats(stream, m->positions + 3 * find_origin(l, i), 3);
     if (m->normals) write_normals(m, l, stream);
-    if (m->colors) {
-        write_colors(sink, m, l, stream);
-        for (uint32_t i = 0; g->radiosity && i < l->vertex_count; ++i)
-            write_floats(stream, m->colors + 3 * find_origin(l, i), 3);
-    }
+    if (m->colors) write_colors(sink, m, l, stream);
+    const float *lights[LIGHTS];
+    list_lights(g, lights);
+    for (int k = 0; k < LIGHTS; ++k)
+        for (uint32_t i = 0; lights[k] && i < l->vertex_count; ++i)
+            write_floats(stream, lights[k] + 3 * find_origin(l, i), 3);
     if (l->texcoords)
         for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, l->texcoords + 2 * (size_t)i, 2);
+    for (size_t k = 0; k < g->extra_count; ++k)
+        for (uint32_t i = 0; i < l->vertex_count; ++i) {
+            const fct_glb_extra *e = g->extras + k;
+            write_floats(stream, e->values + (size_t)e->width * find_origin(l, i), e->width);
+        }
     const uint32_t *corners = l->corners ? l->corners : m->triangles;
     for (size_t i = 0; i < m->face_count; ++i)
         for (int k = 0; k < 3; ++k) write_32(stream, corners[3 * (l->order ? l->order[i] : i) + k]);

@@ -2,7 +2,8 @@
  *
  * A file holds a list of geometries: vertices with their attributes, and one primitive per material over
  * them. Each attribute is a buffer view and an accessor, and so are the indices of each primitive. COLOR_0
- * holds the exposed, clamped, linear colours as normalized shorts; _RADIOSITY holds the unchanged colours.
+ * holds the exposed, clamped, linear colours as normalized shorts; _RADIOSITY (or _IRRADIANCE, ...) holds
+ * light as floats.
  * All data are little endian and aligned to four bytes. The JSON is made first, because its length comes
  * before it in the file.
  */
@@ -11,10 +12,23 @@
 
 #include "mesh/glb/write/layout.h"
 
+/* A further attribute: floats per vertex of the mesh. */
+typedef struct fct_glb_extra {
+    char name[64];
+    int width; /* 1 to 4 floats per vertex */
+    float *values;
+} fct_glb_extra;
+
+enum { FCT_GLB_EXTRAS = 16 };
+
 typedef struct fct_glb_geometry {
     const fct_mesh *mesh;
     fct_glb_layout layout;
-    bool radiosity;        /* colours are also written as _RADIOSITY */
+    const float *light;     /* floats per vertex of the mesh to write beside its colours, or NULL */
+    const char *light_name; /* their attribute, such as _RADIOSITY */
+    const char *color_name; /* attribute of the colours; NULL: COLOR_0 */
+    const fct_glb_extra *extras;
+    size_t extra_count;    /* at most FCT_GLB_EXTRAS */
     size_t accessor, view; /* numbers of its first accessor and buffer view */
 } fct_glb_geometry;
 

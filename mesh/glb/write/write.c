@@ -7,6 +7,7 @@
 
 #include "base/env.h"
 #include "mesh/glb/write/export.h"
+#include "mesh/glb/write/utf8.h"
 #include "mesh/mesh.h"
 
 /* Prints a JSON string. Bytes that are not UTF-8 are read as Latin-1. */
@@ -14,15 +15,7 @@ static void print_string(FILE *json, const char *text) {
     const unsigned char *p = (const unsigned char *)text;
     fputc('"', json);
     while (*p) {
-        int length = *p < 0x80                 ? 1
-                     : *p >= 0xc2 && *p < 0xe0 ? 2
-                     : *p >= 0xe0 && *p < 0xf0 ? 3
-                     : *p >= 0xf0 && *p < 0xf5 ? 4
-                                               : 0;
-        for (int k = 1; k < length; ++k)
-            if ((p[k] & 0xc0) != 0x80) length = 0;
-        if (length == 3 && ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] > 0x9f))) length = 0;
-        if (length == 4 && ((*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] > 0x8f))) length = 0;
+        const int length = fct_utf8_length(p);
         if (length == 0 || *p < ' ' || *p == '"' || *p == '\\') {
             fprintf(json, "\\u%04x", *p++);
             continue;
@@ -92,7 +85,7 @@ static size_t print_json(void *user, FILE *json) {
 
 fct_result fct_write_glb(const fct_sink *sink, FILE *stream) {
     fct_note_left_out(sink, FCT_MESH_FACE_COLORS);
-    fct_glb_geometry geometry = {.mesh = sink->mesh, .radiosity = true};
+    fct_glb_geometry geometry = {.mesh = sink->mesh, .light = sink->radiosity, .light_name = "_RADIOSITY"};
     fct_glb_content content = {.geometries = &geometry, .geometry_count = 1};
     fct_result result = fct_progress(sink->env, "write", 0);
     if (result == FCT_OK) result = fct_glb_layout_build(sink, &geometry.layout);

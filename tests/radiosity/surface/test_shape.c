@@ -126,8 +126,12 @@ static void corners_share_vertices_by_the_rules(void **state) {
                  *group = malloc(corners * sizeof *group), pairs = 0, used = 0;
         bool *open = malloc(corners), *done = calloc(corners, 1);
         for (uint32_t f = 0; f < m.face_count; ++f) sources[f] = 7 * f + 3, places[f] = 5 * f + 1;
+        float *uv = malloc(6 * m.face_count * sizeof *uv);
+        for (uint32_t i = 0; i < 6 * m.face_count; ++i) uv[i] = (float)i;
         fct_surface s;
-        assert_int_equal(fct_surface_vertices(&plain, &m, sources, places, &s), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, sources, uv, places, &s), FCT_OK);
+        assert_memory_equal(s.mesh.source_uv, uv, 24 * (size_t)m.face_count);
+        free(uv);
         assert_memory_equal(s.mesh.source_faces, sources, 4 * (size_t)m.face_count);
         assert_memory_equal(s.face_places, places, 4 * (size_t)m.face_count);
         assert_memory_equal(s.mesh.positions, m.positions, 12 * (size_t)m.vertex_count);
@@ -197,9 +201,11 @@ static void refinement_splits_the_chosen_edges(void **state) {
         const fct_corners m = {mesh.vertex_count, mesh.face_count, mesh.positions, mesh.triangles};
         uint32_t *numbers = malloc(m.face_count * sizeof *numbers), added, face = 0, seen = 0;
         for (uint32_t f = 0; f < m.face_count; ++f) numbers[f] = f + 9;
+        float *uv = calloc(6 * m.face_count, sizeof *uv);
         fct_surface s, old;
-        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, numbers, &s), FCT_OK);
-        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, numbers, &old), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, &s), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, &old), FCT_OK);
+        free(uv);
         uint32_t n = s.mesh.vertex_count;
         for (size_t i = 0; i < 3 * (size_t)n; ++i)
             s.mesh.colors[i] = old.mesh.colors[i] = (float)fct_uniform(fct_hash2(seed, i));
