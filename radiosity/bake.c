@@ -10,6 +10,7 @@
 #include "radiosity/output/probe.h"
 #include "radiosity/rivals/reference.h"
 #include "radiosity/solve/refine.h"
+#include "radiosity/surface/paint.h"
 #include "radiosity/surface/tessellate.h"
 
 /* Default epsilon over the emitted power: 1.4 % RMS error of the vertices in the Cornell box, 3.4 % in the
@@ -254,12 +255,12 @@ static uint32_t choose_samples(const fct_bake *bake) {
 
 /* Adds the power of a vertex: its area emits, absorbs (1 - rho) E, and sends b to the share `lost` of its
  * directions. */
-static void count_power(fct_bake_stats *stats, const fct_material *m, double area, const float *irradiance,
-                        double lost) {
+static void count_power(fct_bake_stats *stats, const fct_material *m, const float *reflectance, double area,
+                        const float *irradiance, double lost) {
     for (int c = 0; c < 3; ++c) {
-        double e = irradiance[c], b = m->emission[c] + m->reflectance[c] * e;
+        double e = irradiance[c], b = m->emission[c] + reflectance[c] * e;
         stats->power_emitted += area * m->emission[c];
-        stats->power_absorbed += area * (1 - m->reflectance[c]) * e;
+        stats->power_absorbed += area * (1 - reflectance[c]) * e;
         stats->power_escaped += area * b * lost;
     }
 }
@@ -284,10 +285,13 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     *power = 0;
     if (result == FCT_OK) result = fct_attributes_add(s->env, s->def.outputs, NULL, f.mesh.colors, &f.mesh);
     for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
-        if (!s->def.indirect_only) count_power(&bake->stats, m, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
+        float rho[3];
+        fct_surface_reflectance(s->scene, instance, &f, i, rho);
+        if (!s->def.indirect_only)
+            count_power(&bake->stats, m, rho, f.areas[i], f.mesh.colors + 3 * i, lost[i]);
         for (int c = 0; c < 3; ++c) {
             float *x = &f.mesh.colors[3 * i + (size_t)c];
-            *x = (s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * *x;
+            *x = (s->def.indirect_only ? 0 : m->emission[c]) + rho[c] * *x;
             *power += f.areas[i] * *x;
         }
     }
@@ -381,9 +385,10 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
                                fct_probe *out) {
     fct_solution *s = &bake->solution;
     const fct_scene_view *view = &s->elements.view;
-    float *irradiance, *offsets, *units, *sites;
+    float *irradiance, *offsets, *units, *sites, *reflectances;
     const fct_array arrays[] = {FCT_ARRAY(irradiance, 3 * count), FCT_ARRAY(offsets, count),
-                                FCT_ARRAY(units, 3 * count), FCT_ARRAY(sites, 3 * count)};
+                                FCT_ARRAY(units, 3 * count), FCT_ARRAY(sites, 3 * count),
+                                FCT_ARRAY_ZERO(reflectances, 3 * count)};
     fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the probes");
     if (result != FCT_OK) return result;
     for (size_t i = 0; i < count; ++i) {
@@ -392,6 +397,9 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
         out[i] = (fct_probe){.instance = site.instance, .face = site.face};
         offsets[i] = site.offset;
         memcpy(sites + 3 * i, site.point, sizeof site.point);
+        if (site.instance != FCT_NONE)
+            fct_scene_reflectance(s->scene, site.instance, site.place, site.u, site.v, 0,
+                                  reflectances + 3 * i);
     }
     result =
         fct_reference_estimate(s->env, s->scene, count, sites, units, offsets, choose_samples(bake),
@@ -401,8 +409,8 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
             out[i].irradiance[c] = irradiance[3 * i + (size_t)c];
             if (out[i].instance == FCT_NONE) continue;
             const fct_material *m = &view->materials[view->instances[out[i].instance].material];
-            out[i].radiosity[c] =
-                (s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * out[i].irradiance[c];
+            out[i].radiosity[c] = (s->def.indirect_only ? 0 : m->emission[c]) +
+                                  reflectances[3 * i + (size_t)c] * out[i].irradiance[c];
         }
     fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
     return result;

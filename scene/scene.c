@@ -11,6 +11,7 @@
 #include "base/math/origin.h"
 #include "base/math/round.h"
 #include "facetree/dual.h"
+#include "scene/attributes.h"
 #include "scene/transform.h"
 #include "scene/winding.h"
 
@@ -32,6 +33,8 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
     fct_release(env, model->source_vertices);
     fct_release(env, model->loose_vertices);
     fct_release(env, model->loose_positions);
+    fct_release(env, model->texcoords);
+    fct_release(env, model->normals);
 }
 
 void fct_scene_destroy(fct_scene *scene) {
@@ -39,8 +42,9 @@ void fct_scene_destroy(fct_scene *scene) {
     const fct_env *env = scene->env;
     for (uint32_t m = 0; m < scene->model_count; ++m) release_model(env, scene->own + m);
     for (uint32_t g = 0; g < scene->light_group_count; ++g) fct_release(env, scene->light_groups[g]);
-    void *arrays[] = {scene->materials, scene->models,       scene->own,     scene->instances, scene->frames,
-                      scene->objects,   scene->light_groups, scene->volumes, scene->nodes};
+    fct_scene_release_textures(scene);
+    void *arrays[] = {scene->materials, scene->paints,  scene->models,       scene->own,     scene->instances,
+                      scene->frames,    scene->objects, scene->light_groups, scene->volumes, scene->nodes};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(env, arrays[i]);
     fct_release(env, scene);
 }
@@ -74,9 +78,13 @@ fct_result fct_scene_add_material(fct_scene *scene, const fct_material *material
     }
     fct_result result = fct_grow(env, (void **)&scene->materials, &scene->material_capacity,
                                  (size_t)scene->material_count + 1, sizeof *scene->materials);
+    if (result == FCT_OK)
+        result = fct_grow(env, (void **)&scene->paints, &scene->paint_capacity,
+                          (size_t)scene->material_count + 1, sizeof *scene->paints);
     if (result != FCT_OK) return result;
     *id = scene->material_count++;
     scene->materials[*id] = *material;
+    scene->paints[*id] = (fct_scene_paint){.pyramid = FCT_NONE};
     return FCT_OK;
 }
 
@@ -146,6 +154,8 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
                        .source_vertices = own->source_vertices,
                        .source_face_count = fct_tree_get(own->tree).face_count,
                        .source_vertex_count = fct_tree_get(own->tree).vertex_count,
+                       .texcoords = own->texcoords,
+                       .normals = own->normals,
                        .inward = fct_tree_get(own->tree).inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
@@ -187,6 +197,7 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     bool moved = false;
     if (result == FCT_OK) result = center_mesh(env, &plain, own.origin, &moved);
     if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
+    if (result == FCT_OK) result = fct_attributes_copy(env, &plain, own.tree, &own.texcoords, &own.normals);
     if (moved) fct_release(env, plain.positions);
     if (faces) fct_mesh_release(env, &part);
     if (result != FCT_OK) {
@@ -196,18 +207,28 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     return add_model(scene, name, &own);
 }
 
-/* Adds a model of a given tree, and destroys the tree after a failure. */
-static fct_result add_model_of_tree(fct_scene *scene, const char *name, fct_tree *tree) {
+/* Adds a model of a given tree, with the attributes of `from` if that is not NULL. Destroys the tree after a
+ * failure. */
+static fct_result add_model_of_tree(fct_scene *scene, const char *name, const fct_mesh *from,
+                                    fct_tree *tree) {
+    const fct_env *env = scene->env;
     fct_scene_model own = {.tree = tree};
     memcpy(own.origin, fct_tree_get(tree).origin, sizeof own.origin);
-    if (fct_tree_get(tree).root_count <= MOST_ROOTS) return add_model(scene, name, &own);
+    if (fct_tree_get(tree).root_count <= MOST_ROOTS) {
+        fct_result result =
+            from ? fct_attributes_copy(env, from, tree, &own.texcoords, &own.normals) : FCT_OK;
+        if (result == FCT_OK) return add_model(scene, name, &own);
+        release_model(env, &own);
+        return result;
+    }
     bool weld = fct_tree_get(tree).def.weld;
-    fct_mesh mesh;
-    fct_result result = fct_tree_mesh(scene->env, tree, &mesh);
+    fct_mesh copy = {0};
+    fct_result result = from ? FCT_OK : fct_tree_mesh(env, tree, &copy);
     fct_tree_destroy(tree);
     if (result != FCT_OK) return result;
-    result = add_model_of_faces(scene, name, &mesh, NULL, mesh.face_count, weld);
-    fct_mesh_release(scene->env, &mesh);
+    if (!from) from = &copy;
+    result = add_model_of_faces(scene, name, from, NULL, from->face_count, weld);
+    fct_mesh_release(env, &copy);
     return result;
 }
 
@@ -264,13 +285,13 @@ static fct_result split_turned(fct_scene *scene, const char *name, const fct_mes
     const fct_env *env = scene->env;
     fct_mesh own = {0}, turned = {0};
     bool weld = tree ? fct_tree_get(tree).def.weld : !env->no_weld;
-    fct_result result = tree ? fct_tree_mesh(env, tree, &own) : FCT_OK;
+    fct_result result = mesh ? FCT_OK : fct_tree_mesh(env, tree, &own);
     fct_tree_destroy(tree);
-    if (result == FCT_OK) result = fct_scene_turn(env, tree ? &own : mesh, &turned);
+    if (result == FCT_OK) result = fct_scene_turn(env, mesh ? mesh : &own, &turned);
     if (result == FCT_OK)
         result = labels ? split_by_label(scene, name, &turned, labels, label_count, parts)
                         : add_model_of_faces(scene, name, &turned, NULL, turned.face_count, weld);
-    fct_release(env, turned.triangles);
+    fct_scene_release_turned(env, &turned);
     fct_mesh_release(env, &own);
     return result;
 }
@@ -290,7 +311,7 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
             return fct_fail_memory(env, "a model");
         }
         result = env->flip_inward ? split_turned(scene, name, mesh, tree, NULL, 0, parts)
-                 : tree           ? add_model_of_tree(scene, name, tree)
+                 : tree           ? add_model_of_tree(scene, name, mesh, tree)
                         : add_model_of_faces(scene, name, mesh, NULL, mesh->face_count, !env->no_weld);
         parts->count = 1;
     }
@@ -381,7 +402,7 @@ fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_me
     fct_instance probe; /* a bad transform is reported before the mesh is clustered */
     fct_scene_frame frame;
     fct_result result = set_instance_transform(env, name, transform, &probe, &frame);
-    if (result == FCT_OK && !tree) result = fct_mesh_validate(env, mesh);
+    if (result == FCT_OK && mesh) result = fct_mesh_validate(env, mesh);
     if (result == FCT_OK && !tree && mesh->face_count == 0)
         result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\" has no faces", name);
     for (uint32_t f = 0; result == FCT_OK && face_materials && f < mesh->face_count; ++f)
@@ -541,6 +562,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
         result = fct_scene_build_nodes(env, scene->instance_count, scene->volumes, &scene->nodes);
     fct_release(env, bounds);
     if (result != FCT_OK) return result;
+    fct_scene_note_bare_textures(scene);
     scene->bounds = scene->volumes[0].bounds;
     if (!scene->camera.given) set_default_camera(scene);
     scene->committed = true;
@@ -556,6 +578,8 @@ fct_scene_view fct_scene_get(const fct_scene *scene) {
                             .volume_count = scene->committed ? 2 * scene->instance_count - 1 : 0,
                             .light_group_count = scene->light_group_count,
                             .object_count = scene->object_count,
+                            .texture_count = scene->texture_count,
+                            .textures = scene->textures,
                             .materials = scene->materials,
                             .models = scene->models,
                             .instances = scene->instances,

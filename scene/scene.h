@@ -2,6 +2,7 @@
 #ifndef FCT_SCENE_SCENE_H
 #define FCT_SCENE_SCENE_H
 
+#include "scene/texture/image.h"
 #include "scene/volume.h"
 
 /* A model's tree is at most this deep, or the model is refused. The trees that facetree builds have a depth
@@ -27,9 +28,18 @@ typedef struct fct_scene_model {
     fct_bvh *bvh;
     fct_bvh *points; /* answers closest points if bvh cannot (Embree), else NULL */
     uint32_t *source_faces, *source_vertices, *loose_vertices;
-    float *loose_positions;
-    double origin[3]; /* the tree's positions are relative to it */
+    float *loose_positions, *texcoords, *normals;
+    double origin[3];      /* the tree's positions are relative to it */
+    bool colors_are_light; /* or may be: they do not paint */
 } fct_scene_model;
+
+/* How a material is painted. */
+typedef struct fct_scene_paint {
+    fct_paint def;
+    uint32_t pyramid; /* FCT_NONE: no texture */
+    float scale[3];   /* times the texels of the pyramid */
+    bool painted;
+} fct_scene_paint;
 
 /* Instances [first, first + count) are the parts of one object. */
 typedef struct fct_scene_object {
@@ -43,15 +53,21 @@ struct fct_scene {
     bool committed;
 
     fct_material *materials;
-    fct_model *models;       /* public part; own[m] is the private part of models[m] */
-    fct_scene_model *own;    /* model_count */
-    fct_instance *instances; /* public part; frames[i] is the private part of instances[i] */
-    fct_scene_frame *frames; /* instance_count */
+    fct_scene_paint *paints; /* of the materials */
+    fct_texture *textures;
+    fct_image *images;             /* of the textures */
+    struct fct_pyramid **pyramids; /* of the textures that materials have */
+    fct_model *models;             /* public part; own[m] is the private part of models[m] */
+    fct_scene_model *own;          /* model_count */
+    fct_instance *instances;       /* public part; frames[i] is the private part of instances[i] */
+    fct_scene_frame *frames;       /* instance_count */
     fct_scene_object *objects;
     char **light_groups;
-    size_t material_capacity, model_capacity, own_capacity, instance_capacity, frame_capacity,
-        object_capacity, light_group_capacity;
-    uint32_t material_count, model_count, instance_count, object_count, light_group_count;
+    size_t material_capacity, paint_capacity, texture_capacity, image_capacity, pyramid_capacity,
+        model_capacity, own_capacity, instance_capacity, frame_capacity, object_capacity,
+        light_group_capacity;
+    uint32_t material_count, texture_count, pyramid_count, model_count, instance_count, object_count,
+        light_group_count;
 
     fct_volume *volumes; /* 2 instance_count - 1 */
     fct_scene_node *nodes;
@@ -61,6 +77,14 @@ struct fct_scene {
     double origin[3];
 };
 
+/* The texture of that name, or FCT_NONE. */
+uint32_t fct_scene_find_texture(const fct_scene *scene, const char *name);
+/* Adds an image, which the scene owns from here on, also after a failure. Errors: MEMORY. */
+fct_result fct_scene_own_texture(fct_scene *scene, const char *name, fct_image image, uint32_t *id);
+void fct_scene_release_textures(fct_scene *scene);
+/* Warns of instances that have a texture but no texture coordinates. */
+void fct_scene_note_bare_textures(const fct_scene *scene);
+
 /* Models [first, first + count) of one mesh, one per label, in ascending order of the labels. */
 typedef struct fct_scene_parts {
     uint32_t first, count;
@@ -69,8 +93,8 @@ typedef struct fct_scene_parts {
 
 /* Adds the mesh as models, one per distinct label. `labels` has mesh->face_count numbers below label_count;
  * NULL means that every label is 0. With NULL labels the caller may give `tree`, the tree of the whole mesh;
- * then `mesh` may be NULL. The scene owns `tree` from here on, also after a failure. Errors: DATA, MEMORY,
- * CANCELLED. */
+ * then `mesh` may be NULL; if it is not, the model keeps its texture coordinates and normals. The scene owns
+ * `tree` from here on, also after a failure. Errors: DATA, MEMORY, CANCELLED. */
 fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *mesh, fct_tree *tree,
                            const uint32_t *labels, uint32_t label_count, fct_scene_parts *parts);
 /* Notes in the models from `first` on that they are the parts of `mesh`: its counts, and in the first one the

@@ -160,6 +160,19 @@ static int describe_tree(tool *t, const char *path, bool verify, json_t *object)
     return code;
 }
 
+/* The width and height of each texture, by its name. */
+static void set_textures(json_t *object, const fct_scene_view *view) {
+    json_t *sizes = json_object();
+    for (uint32_t k = 0; k < view->texture_count; ++k) {
+        const fct_texture *x = &view->textures[k];
+        json_t *name = tool_json_text(x->name);
+        json_object_set_new(sizes, json_string_value(name),
+                            json_pack("[I, I]", (json_int_t)x->width, (json_int_t)x->height));
+        json_decref(name);
+    }
+    json_object_set_new(object, "textures", sizes);
+}
+
 static int describe_scene(tool *t, const char *path, json_t *object) {
     fct_scene *scene;
     int code = tool_result(t, fct_scene_load(&t->env, path, FCT_BACKEND_OBB, &scene));
@@ -178,6 +191,7 @@ static int describe_scene(tool *t, const char *path, json_t *object) {
     set_count(object, "inward_models", inward);
     set_count(object, "materials", view.material_count);
     set_count(object, "emitting_instances", emitters);
+    set_textures(object, &view);
     set_count(object, "light_groups", view.light_group_count);
     json_object_set_new(object, "camera", json_boolean(view.camera.given));
     double lower[3], upper[3];

@@ -81,6 +81,10 @@ typedef struct fct_env {
     /* Whether scenes cluster their models with fct_tree_def.weld false, so that vertices of equal position
      * stay apart. Hierarchy files keep the choice of their build. Default: false. */
     bool no_weld;
+
+    /* Whether scene files are read without their textures and vertex colours: only the factors of materials
+     * count. Default: false. */
+    bool no_textures;
 } fct_env;
 
 FCT_API fct_env fct_env_default(void);

@@ -27,6 +27,32 @@ typedef struct fct_material {
     uint32_t light_group; /* index; 0 unless the scene file names groups */
 } fct_material;
 
+/* An image whose texels multiply the reflectance of materials. */
+typedef struct fct_texture {
+    const char *name; /* of its file, or "images[3]" of a glTF file */
+    uint32_t width, height;
+    const uint8_t *pixels; /* height x width x 3 sRGB bytes, rows from the top */
+} fct_texture;
+
+/* What happens outside of [0, 1]. */
+typedef enum fct_wrap { FCT_WRAP_REPEAT, FCT_WRAP_CLAMP, FCT_WRAP_MIRROR } fct_wrap;
+
+/* How the reflectance of a material varies over a surface. The reflectance of a point is
+ *     min(factor * texel, .9) * colour    with a texture
+ *     min(factor * colour, .9)            without
+ * with the colour of the vertices, at most 1. Texels are interpolated between their centres, vertices inside
+ * triangles. A model without texture coordinates takes the
+ * factor instead of the texture. */
+typedef struct fct_paint {
+    uint32_t size;
+    float factor[3];  /* each >= 0; default 1 */
+    uint32_t texture; /* FCT_NONE, the default: none */
+    fct_wrap wrap[2];
+    float transform[6]; /* rows of a 2 x 3 matrix: image point = transform * (u, v, 1); default: identity */
+    bool vertex_colors; /* default false */
+} fct_paint;
+FCT_API fct_paint fct_paint_default(void);
+
 /* A model is one tree of one material. A mesh with several materials becomes one model per material. */
 typedef struct fct_model {
     char name[128];
@@ -41,6 +67,11 @@ typedef struct fct_model {
     const uint32_t *loose_vertices;
     const float *loose_positions;
     uint32_t loose_count;
+    /* Of the mesh, in the order of the tree, which holds its colours; NULL if the mesh has none, or if the
+     * model comes from a hierarchy file, which stores neither. v of a texture coordinate counts from the top
+     * of the image, as in glTF; readers of other files turn it. */
+    const float *texcoords; /* faces x 3 x 2, per place and corner */
+    const float *normals;   /* vertices x 3, per tree vertex */
     bool inward; /* closed and wound inwards, as rooms are: the tree is, or the mesh before it was split */
 } fct_model;
 
@@ -73,8 +104,10 @@ typedef struct fct_camera {
 } fct_camera;
 
 typedef struct fct_scene_view {
-    uint32_t material_count, model_count, instance_count, volume_count, light_group_count, object_count;
+    uint32_t material_count, model_count, instance_count, volume_count, light_group_count, object_count,
+        texture_count;
     const fct_material *materials;
+    const fct_texture *textures;
     const fct_model *models;
     const fct_instance *instances;
     const fct_volume *volumes;
@@ -92,12 +125,23 @@ FCT_API void fct_scene_destroy(fct_scene *scene);
 /* Adds a material; *id receives its number. Errors: DATA (a reflectance outside [0, 1), a negative or
  * infinite emission), MEMORY. */
 FCT_API fct_result fct_scene_add_material(fct_scene *scene, const fct_material *material, uint32_t *id);
+/* Adds an image of width x height x 3 sRGB bytes; *id receives its number. Copies everything. Errors: DATA
+ * (an empty image), MEMORY. */
+FCT_API fct_result fct_scene_add_texture(fct_scene *scene, const fct_texture *texture, uint32_t *id);
+/* Adds the image of a PNG or JPEG file, unless a texture has this name already. Errors: INPUT, DATA, MEMORY.
+ */
+FCT_API fct_result fct_scene_read_texture(fct_scene *scene, const char *path, uint32_t *id);
+/* Paints a material, once. Its reflectance becomes min(factor, .9), a bound of that of all its points. The
+ * models of its instances should have texture coordinates, or colours. Errors: DATA (a negative or infinite
+ * factor, a texture that does not exist, a transform that is not finite), MEMORY. */
+FCT_API fct_result fct_scene_paint_material(fct_scene *scene, uint32_t material, const fct_paint *paint);
 /* Adds an object: a mesh under a transform (3 x 4, rows of R|t; NULL: identity). It has one material, or one
  * per face if face_materials (mesh->face_count ids) is not NULL. The call clusters the mesh and does not keep
  * it.
  *
  * If `tree`, the tree of this mesh, is not NULL, the call does not cluster; then face_materials must be NULL,
- * and `mesh` may be NULL. The scene owns the tree from here on, and destroys it if the call fails.
+ * and `mesh` may be NULL; if it is not, the model keeps its texture coordinates and normals. The scene owns
+ * the tree from here on, and destroys it if the call fails.
  *
  * Objects are numbered in the order of fct_scene_add_object and fct_scene_add_instance calls. Errors: DATA
  * (singular transform, invalid mesh), MEMORY, CANCELLED. */
@@ -146,6 +190,13 @@ typedef struct fct_scene_hit {
 
 /* The bounds of all vertices in the world, exact up to the rounding of doubles; view.bounds may be larger. */
 FCT_API void fct_scene_bounds(const fct_scene *scene, double lower[3], double upper[3]);
+
+/* The reflectance at barycentrics (u, v) of the face at `place` of an instance's tree. width >= 0: the mean
+ * over an area of about width x width around the point; in the world. */
+FCT_API void fct_scene_reflectance(const fct_scene *scene, uint32_t instance, uint32_t place, float u,
+                                   float v, float width, float out[3]);
+/* Whether fct_scene_reflectance depends on the point. */
+FCT_API bool fct_scene_is_painted(const fct_scene *scene, uint32_t instance);
 
 /* Rays in the world; t is in units of the given direction. Equal t: the lower instance. hit->instance and
  * hit->face are FCT_NONE on a miss. visits may be NULL. */

@@ -179,13 +179,14 @@ static bool is_reported_elsewhere(const char *extension) {
     return false;
 }
 
-void fct_glb_report_features(const fct_glb *glb) {
+void fct_glb_report_features(const fct_glb *glb, bool textured) {
     use_counts n = {0};
     json_t *used = json_object_get(glb->root, "extensionsUsed"), *item;
     size_t i;
     count_materials(glb, &n);
     count_nodes(glb, &n);
     count_primitives(glb, &n);
+    if (textured) n.color_textures = 0;
     report_counts(glb, &n);
     json_array_foreach(used, i, item) {
         const char *name = json_string_value(item);

@@ -2,6 +2,7 @@
 #include "mesh/glb/primitive.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "mesh/glb/document/accessor.h"
@@ -216,6 +217,14 @@ fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_pr
     return result;
 }
 
+fct_result fct_glb_choose_texcoords(const fct_glb_builder *b, json_t *object, fct_glb_primitive *p) {
+    char key[24];
+    const bool known = p->material >= 0 && (uint64_t)p->material < fct_glb_count(b->glb, "materials");
+    if (!b->texcoord_sets || !known || !b->texcoord_sets[p->material]) return FCT_OK;
+    snprintf(key, sizeof key, "TEXCOORD_%u", b->texcoord_sets[p->material]);
+    return fct_glb_index(b->glb, json_object_get(object, "attributes"), key, &p->texcoord);
+}
+
 /* Lines are left out. Points only have vertices. */
 static bool is_left_out(const fct_glb_builder *b, int64_t mode) {
     return mode < 4 && (mode > 0 || b->by_primitive);
@@ -278,6 +287,7 @@ fct_result fct_glb_append_mesh(fct_glb_builder *b, int64_t index, const fct_glb_
         if (result != FCT_OK) return result;
         if (p.position == FCT_GLB_ABSENT) continue;
         result = check_primitive(b, object, &p);
+        if (result == FCT_OK) result = fct_glb_choose_texcoords(b, object, &p);
         if (result != FCT_OK) return result;
         if (is_left_out(b, p.mode)) continue;
         if (!fct_glb_share_vertices(&before, &p)) {

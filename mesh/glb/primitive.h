@@ -20,6 +20,8 @@ typedef struct fct_glb_builder {
     /* Faces get the number of their primitive of triangles instead of a material, and points are left out. */
     bool by_primitive;
     uint32_t primitive_count; /* so far */
+    /* Per material of the file: n of the TEXCOORD_n that it uses; NULL: 0 for all. */
+    const uint32_t *texcoord_sets;
 
     size_t without_color, without_texcoord; /* vertices and corners without a value in the file */
     size_t clear;                           /* vertices whose colour has an alpha below 1 */
@@ -42,6 +44,10 @@ fct_result fct_glb_choose_arrays(fct_glb_builder *builder, bool *unnamed);
 
 /* Reads the members of a primitive. An absent mode is 4. Errors: DATA. */
 fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_primitive *out);
+
+/* Sets `texcoord` to the accessor of the set that the primitive's material uses. Errors: DATA. */
+fct_result fct_glb_choose_texcoords(const fct_glb_builder *builder, json_t *object,
+                                    fct_glb_primitive *primitive);
 
 /* Appends the triangles of mesh `index` under a transform. Consecutive primitives that use the same accessors
  * share their vertices. Strips and fans become triangles; points become vertices; lines are left out. A

@@ -54,7 +54,7 @@ fct_result fct_read_glb(const fct_source *source, fct_soup *out) {
     if (result == FCT_OK) {
         fct_glb_end_soup(&r.builder);
         fct_glb_report_builder(&r.builder);
-        fct_glb_report_features(&r.glb);
+        fct_glb_report_features(&r.glb, false);
     }
     fct_glb_close(&r.glb);
     return result;

@@ -92,8 +92,8 @@ static void gather_spot(const checking *k, spot *p, fct_guide *guide, uint64_t s
 }
 
 static void check_point(const checking *k, size_t i, fct_guide *guide, uint64_t *rays) {
-    const fct_scene_view *view = &k->s->elements.view;
-    const fct_material *m = &view->materials[view->instances[k->instance].material];
+    const fct_elements *set = &k->s->elements;
+    const float *reflectance = set->items[set->roots[k->instance]].reflectance; /* of textures the mean */
     const uint64_t seed = fct_hash2(k->seed, i);
     const size_t faces = k->surface->mesh.face_count;
     const double whole = k->areas[faces - 1], area = (i + fct_uniform(seed)) / (double)k->count * whole;
@@ -108,8 +108,7 @@ static void check_point(const checking *k, size_t i, fct_guide *guide, uint64_t 
     for (uint64_t h = 0; h < 2; ++h) gather_spot(k, &p, guide, fct_hash3(k->seed, i, h + 1), truths[h], rays);
     fct_check *part = &k->parts[i];
     for (int c = 0; c < 3; ++c) {
-        const double rho = m->reflectance[c] / 3., a = p.light[c] - truths[0][c],
-                     b = p.light[c] - truths[1][c];
+        const double rho = reflectance[c] / 3., a = p.light[c] - truths[0][c], b = p.light[c] - truths[1][c];
         part->light += rho * (truths[0][c] + truths[1][c]) / 2;
         part->square += 3 * rho * rho * a * b;
         part->bias += rho * (a + b) / 2;

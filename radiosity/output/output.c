@@ -20,6 +20,7 @@
 #include "radiosity/output/keep.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/surface/cover.h"
+#include "radiosity/surface/paint.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/tessellate.h"
 
@@ -145,19 +146,40 @@ static void doubt_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
+/* The mean over an instance. */
+static void load_mean_reflectance(const fct_solution *s, uint32_t instance, float out[3]) {
+    const fct_elements *set = &s->elements;
+    const fct_element *root = set->items + set->roots[instance];
+    double sum[3] = {0, 0, 0}, area = 0;
+    memcpy(out, root->reflectance, sizeof root->reflectance);
+    if (set->root_counts[instance] == 1) return;
+    for (uint32_t k = 0; k < set->root_counts[instance]; ++k) {
+        for (size_t c = 0; c < 3; ++c) sum[c] += root[k].area * root[k].reflectance[c];
+        area += root[k].area;
+    }
+    for (size_t c = 0; c < 3 && area > 0; ++c) out[c] = (float)(sum[c] / area);
+}
+
 /* A vertex without a surface is black. */
-static void color_vertex(const lighting *l, size_t v, float color[3]) {
+static void color_vertex(const lighting *l, size_t v, const float reflectance[3], float color[3]) {
     double irradiance[3];
     color[0] = color[1] = color[2] = 0;
     if (!has_surface(l, v)) return;
     for (size_t c = 0; c < 3; ++c)
         irradiance[c] = (double)l->direct[3 * v + c] + (double)l->indirect[3 * v + c];
-    fct_solution_radiosity(l->s, l->instance, irradiance, color);
+    fct_solution_radiosity(l->s, l->instance, reflectance, irradiance, color);
 }
 
-static void color_vertices(const lighting *l) {
+/* `painted`: with the reflectance of each vertex; otherwise with the mean of the instance, so that the detail
+ * of a texture splits no edges. */
+static void color_vertices(const lighting *l, bool painted) {
     const fct_mesh *m = &l->surface->mesh;
-    for (size_t v = 0; v < m->vertex_count; ++v) color_vertex(l, v, m->colors + 3 * v);
+    float rho[3];
+    load_mean_reflectance(l->s, l->instance, rho);
+    for (size_t v = 0; v < m->vertex_count; ++v) {
+        if (painted) fct_surface_reflectance(l->s->scene, l->instance, l->surface, v, rho);
+        color_vertex(l, v, rho, m->colors + 3 * v);
+    }
 }
 
 typedef void run_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
@@ -241,7 +263,7 @@ static fct_result light_vertices(lighting *l, uint64_t *rays) {
         result = find_doubt(l, &count);
         if (result == FCT_OK && count > 0) result = run_vertices(l, "vertices", 0, doubt_chunk, rays);
     }
-    if (result == FCT_OK) color_vertices(l);
+    if (result == FCT_OK) color_vertices(l, false);
     l->first = l->surface->mesh.vertex_count;
     return result;
 }
@@ -304,7 +326,7 @@ static fct_result finish_colors(const lighting *l) {
     fct_result result = FCT_OK;
     if (l->s->def.final != FCT_FINAL_NONE)
         result = fct_light_smooth(env, l->surface, l->covered, l->indirect);
-    if (result == FCT_OK) color_vertices(l);
+    if (result == FCT_OK) color_vertices(l, true);
     return result;
 }
 

@@ -121,7 +121,10 @@ static void probe_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
         fct_probe *p = &b->out[i];
         *p = (fct_probe){.instance = site.instance, .face = site.face};
         for (int c = 0; c < 3; ++c) p->irradiance[c] = (float)irradiance[c];
-        if (site.instance != FCT_NONE) fct_solution_radiosity(s, site.instance, irradiance, p->radiosity);
+        if (site.instance == FCT_NONE) continue;
+        float rho[3];
+        fct_scene_reflectance(s->scene, site.instance, site.place, site.u, site.v, 0, rho);
+        fct_solution_radiosity(s, site.instance, rho, irradiance, p->radiosity);
     }
 }
 

@@ -27,11 +27,10 @@ fct_source fct_solution_source(const fct_solution *s) {
                         LONGEST_REACH * fct_surface_default_edge(s->scene)};
 }
 
-void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const double irradiance[3],
-                            float radiosity[3]) {
+void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const float reflectance[3],
+                            const double irradiance[3], float radiosity[3]) {
     const fct_scene_view *view = &s->elements.view;
     const fct_material *m = &view->materials[view->instances[instance].material];
     for (int c = 0; c < 3; ++c)
-        radiosity[c] =
-            (float)((s->def.indirect_only ? 0 : m->emission[c]) + m->reflectance[c] * irradiance[c]);
+        radiosity[c] = (float)((s->def.indirect_only ? 0 : m->emission[c]) + reflectance[c] * irradiance[c]);
 }

@@ -33,8 +33,8 @@ void fct_solution_direct(const fct_solution *s, const float point[3], const floa
 /* The stored solution for gathers. */
 fct_source fct_solution_source(const fct_solution *s);
 
-/* Radiosity b = e + rho E of an instance's material; rho E for def.indirect_only. */
-void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const double irradiance[3],
-                            float radiosity[3]);
+/* Radiosity b = e + rho E of a point of an instance; rho E for def.indirect_only. */
+void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const float reflectance[3],
+                            const double irradiance[3], float radiosity[3]);
 
 #endif

@@ -143,10 +143,10 @@ static void add_emitter(const tracer *t, const spot *at, const double through[3]
     for (int k = 0; k < 3; ++k) sum[k] += through[k] * e->emission[k] * kernel / (density + kernel);
 }
 
-/* Follows a ray to its hit: spot, material, emitter (or NULL), and kernel cos cos' / (pi r^2). False on a
+/* Follows a ray to its hit: spot, reflectance, emitter (or NULL), and kernel cos cos' / (pi r^2). False on a
  * miss and on a black back. */
-static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to,
-                       const fct_material **material, const emitter **source, double *kernel) {
+static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to, float reflectance[3],
+                       const emitter **source, double *kernel) {
     fct_ray ray = ray_from(from, direction, INFINITY);
     fct_scene_hit hit;
     if (!fct_scene_light_hit(t->scene, &ray, &hit, NULL)) return false;
@@ -156,10 +156,9 @@ static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to
     v3 origin = v3_load(ray.origin), p = v3_mad(origin, hit.t, direction);
     /* Project onto the plane, because t has a relative error. */
     p = v3_mad(p, -v3_dot(v3_sub(p, c[0]), n), n);
-    *material = t->view.materials + t->view.instances[hit.instance].material;
     double cosine = -v3_dot(n, direction);
     if (cosine < 0) {
-        if (!(*material)->two_sided) return false;
+        if (!t->view.materials[t->view.instances[hit.instance].material].two_sided) return false;
         n = v3_scale(n, -1), cosine = -cosine;
     }
     *source = t->emitter_of[hit.instance] == FCT_NONE ? NULL : t->emitters + t->emitter_of[hit.instance];
@@ -167,6 +166,7 @@ static bool follow_ray(const tracer *t, const spot *from, v3 direction, spot *to
     double r2 = v3_norm2(d);
     *kernel = r2 > 0 ? v3_dot(direction, from->n) * cosine / (FCT_PI * r2) : INFINITY;
     *to = (spot){p, n, choose_offset(p, largest_coordinate(c[0]))};
+    fct_scene_reflectance(t->scene, hit.instance, hit.place, hit.u, hit.v, 0, reflectance);
     return true;
 }
 
@@ -182,12 +182,12 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
         bool direct = bounce > 0 || !t->indirect_only;
         if (direct && t->emitter_count) add_emitter(t, &at, through, u[2], u[3], sum, rays);
         v3 direction = fct_cosine_direction(at.n, u[0], u[1]);
-        const fct_material *material;
+        float reflectance[3];
         const emitter *source;
         double kernel, survival = 0;
         spot next;
         ++*rays;
-        if (!follow_ray(t, &at, direction, &next, &material, &source, &kernel)) {
+        if (!follow_ray(t, &at, direction, &next, reflectance, &source, &kernel)) {
             sum[3] += bounce == 0;
             return;
         }
@@ -196,8 +196,8 @@ static void trace_path(const tracer *t, const spot *start, const double first[4]
             for (int k = 0; k < 3; ++k) sum[k] += through[k] * source->emission[k] * weight;
         }
         for (int k = 0; k < 3; ++k) {
-            through[k] *= material->reflectance[k];
-            survival = fct_max(survival, material->reflectance[k]);
+            through[k] *= reflectance[k];
+            survival = fct_max(survival, reflectance[k]);
         }
         if (bounce >= SAFE_BOUNCES) {
             if (fct_random_next(random) >= survival) return;

@@ -8,6 +8,7 @@
 
 #include <string.h>
 
+#include "base/math/barycentric.h"
 #include "cluster/tree/node.h"
 #include "scene/transform.h"
 
@@ -160,8 +161,8 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         set_cluster(set, in, c, sign, &e);
     }
+    fct_paints_node(&set->paints, instance, node, e.reflectance);
     for (int k = 0; k < 3; ++k) {
-        e.reflectance[k] = material->reflectance[k];
         e.emission[k] = material->emission[k];
         e.radiosity[k] = e.emission[k];
     }
@@ -207,8 +208,14 @@ static fct_result quarter_triangle(fct_elements *set, uint32_t id) {
     const v3 parts[4][3] = {{p[0], m[2], m[1]}, {m[2], p[1], m[0]}, {m[1], m[0], p[2]}, {m[0], m[1], m[2]}};
     const fct_instance *in = &set->view.instances[set->items[id].instance];
     double sign = (set->items[id].back ? -1 : 1) * (in->mirrored ? -1 : 1);
+    float reflectances[4][3];
+    v3 face[3];
+    load_face(set, in, set->ranges[id].first, face);
+    fct_paints_quarters(&set->paints, set->items[id].instance, set->ranges[id].first, face, parts,
+                        set->items[id].reflectance, reflectances);
     for (int k = 0; k < 4; ++k) {
         fct_element e = set->items[id];
+        memcpy(e.reflectance, reflectances[k], sizeof e.reflectance);
         e.parent = id;
         e.child = e.child_count = 0;
         set_triangle(&e, parts[k], sign);
@@ -294,6 +301,7 @@ fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, doubl
         if (!set->touched[m]) goto done;
         set->touched_sizes[m] = pages;
     }
+    if ((r = fct_paints_create(env, scene, &set->paints)) != FCT_OK) goto done;
     if ((r = reserve_elements(set, view->volume_count)) != FCT_OK) goto done;
     for (uint32_t i = 0; i < view->volume_count; ++i) {
         set->items[i] = (fct_element){.parent = FCT_NONE,
@@ -324,6 +332,7 @@ done:
 
 void fct_elements_release(fct_elements *set) {
     if (!set->env) return;
+    fct_paints_release(&set->paints);
     for (uint32_t m = 0; set->touched && m < set->view.model_count; ++m)
         fct_release(set->env, set->touched[m]);
     void *owned[] = {set->items, set->ranges,      set->points,  set->corners,
@@ -445,10 +454,9 @@ uint32_t fct_elements_locate_point(const fct_elements *set, uint32_t instance, b
         const size_t vertex = t.triangles[3 * (size_t)place + k];
         p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * vertex));
     }
-    const v3 e = v3_sub(p[1], p[0]), f = v3_sub(p[2], p[0]), d = v3_sub(point, p[0]), n = v3_cross(e, f);
-    const double scale = v3_norm2(n);
-    const double u = v3_dot(v3_cross(d, f), n) / scale, v = v3_dot(v3_cross(e, d), n) / scale;
-    return fct_elements_locate(set, instance, back, place, (float)u, (float)v);
+    double uv[2];
+    fct_barycentrics(p, point, uv);
+    return fct_elements_locate(set, instance, back, place, (float)uv[0], (float)uv[1]);
 }
 
 void fct_elements_pull(fct_elements *set) {

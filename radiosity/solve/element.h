@@ -18,6 +18,7 @@
 #include "base/parallel.h"
 #include "facetree/scene.h"
 #include "radiosity/sample.h"
+#include "radiosity/solve/paint.h"
 
 enum { FCT_ELEMENT_POINTS = 16 };
 /* Angle of a cone that no longer bounds the side that an element shows: a right angle. */
@@ -37,13 +38,13 @@ typedef struct fct_element {
     double moment[6]; /* M = sum A n n^T */
     double cone;      /* radians; every normal is within this angle of S; pi: unknown */
     uint32_t parent, child, child_count;
-    uint32_t instance, node; /* of the tree; FCT_NONE in a volume */
-    uint32_t triangle;       /* index of its corners; FCT_NONE unless kind is TRIANGLE */
-    uint8_t kind, back;      /* fct_element_kind; 1: back side of a two-sided material */
-    float reflectance[3], emission[3];
-    double irradiance[3]; /* leaf: mean E over the surface */
-    double radiosity[3];  /* leaf: b = e + rho E; inner element: area-weighted mean of its leaves */
-    v3 power[3];          /* P = sum b_k S_k over the leaves */
+    uint32_t instance, node;           /* of the tree; FCT_NONE in a volume */
+    uint32_t triangle;                 /* index of its corners; FCT_NONE unless kind is TRIANGLE */
+    uint8_t kind, back;                /* fct_element_kind; 1: back side of a two-sided material */
+    float reflectance[3], emission[3]; /* reflectance: the mean over the surface */
+    double irradiance[3];              /* leaf: mean E over the surface */
+    double radiosity[3]; /* leaf: b = e + rho E; inner element: area-weighted mean of its leaves */
+    v3 power[3];         /* P = sum b_k S_k over the leaves */
 } fct_element;
 
 /* A point of an element's surface, with the unit normal of its face on the element's side. */
@@ -72,6 +73,7 @@ typedef struct fct_elements {
     size_t pointed; /* elements that have their points */
     float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
+    fct_paints paints;
     uint32_t *roots;        /* instance -> its first root element; front roots, then back roots */
     uint32_t *root_counts;  /* instance -> roots per side */
     double min_edge;        /* a triangle whose longest edge is at most this is not quartered */

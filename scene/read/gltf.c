@@ -14,6 +14,7 @@
 
 #include "mesh/glb/features.h"
 #include "mesh/glb/primitive.h"
+#include "scene/read/gltf_paint.h"
 #include "scene/transform.h"
 
 typedef struct reader {
@@ -23,7 +24,8 @@ typedef struct reader {
     fct_glb_builder builder; /* of the mesh that is being read */
     fct_scene_parts *meshes; /* per mesh; count 0: not read yet */
     unsigned char *empty;    /* per mesh: it has been read and has no triangles */
-    size_t mesh_count, meshes_read, clamped, flat;
+    fct_gltf_paints paints;
+    size_t mesh_count, meshes_read, clamped, flat, bare;
     uint32_t material_count; /* of the file; the scene has one more, for primitives without a material */
 } reader;
 
@@ -44,11 +46,11 @@ static void name_item(json_t *object, const char *what, size_t index, char *out,
 
 /* ---- Materials: those of the file, then one for primitives without a material ---- */
 
-static fct_result read_material(reader *r, json_t *object, size_t index, fct_material *out) {
+static fct_result read_material(reader *r, json_t *object, size_t index, double color[4], fct_material *out) {
     json_t *surface = json_object_get(object, "pbrMetallicRoughness"),
            *strong = json_object_get(fct_glb_extension(object, "KHR_materials_emissive_strength"),
                                      "emissiveStrength");
-    double color[4] = {1, 1, 1, 1}, light[3] = {0, 0, 0}, strength = strong ? json_number_value(strong) : 1;
+    double light[3] = {0, 0, 0}, strength = strong ? json_number_value(strong) : 1;
     *out = (fct_material){.two_sided = json_is_true(json_object_get(object, "doubleSided"))};
     name_item(object, "material", index, out->name, sizeof out->name);
     fct_result result =
@@ -56,17 +58,21 @@ static fct_result read_material(reader *r, json_t *object, size_t index, fct_mat
     if (result == FCT_OK)
         result = fct_glb_numbers(&r->glb, object, "materials", (int64_t)index, "emissiveFactor", 3, light);
     if (result != FCT_OK) return result;
-    bool clamped = false;
     for (int c = 0; c < 3; ++c) {
         if (!(color[c] >= 0) || !(light[c] >= 0 && strength >= 0))
             return fct_glb_fail(&r->glb, "materials[%zu]: expected a base colour and an emission >= 0",
                                 index);
-        clamped |= color[c] > FCT_SCENE_MOST_REFLECTANCE;
         out->reflectance[c] = fminf((float)color[c], FCT_SCENE_MOST_REFLECTANCE);
         out->emission[c] = (float)(light[c] * strength);
     }
-    r->clamped += clamped;
     return FCT_OK;
+}
+
+/* Whether a factor, or a texel times it, reflects too much. */
+static bool is_clamped(const reader *r, const double color[3], uint32_t id) {
+    if (r->scene->paints[id].pyramid != FCT_NONE) return fct_textures_clamp(r->scene, id);
+    return color[0] > FCT_SCENE_MOST_REFLECTANCE || color[1] > FCT_SCENE_MOST_REFLECTANCE ||
+           color[2] > FCT_SCENE_MOST_REFLECTANCE;
 }
 
 static fct_result read_materials(reader *r) {
@@ -75,9 +81,16 @@ static fct_result read_materials(reader *r) {
     fct_result result = FCT_OK;
     for (size_t k = 0; k <= r->material_count && result == FCT_OK; ++k) {
         fct_material material = {.name = "(none)", .reflectance = {.7f, .7f, .7f}};
+        json_t *object = json_array_get(materials, k);
+        const bool real = k < r->material_count;
+        double color[4] = {1, 1, 1, 1};
         uint32_t id;
-        if (k < r->material_count) result = read_material(r, json_array_get(materials, k), k, &material);
+        if (!real) color[0] = color[1] = color[2] = .7;
+        if (real) result = read_material(r, object, k, color, &material);
         if (result == FCT_OK) result = fct_scene_add_material(r->scene, &material, &id);
+        if (result == FCT_OK && !r->env->no_textures)
+            result = fct_gltf_paint(&r->paints, object, k, color, id);
+        if (result == FCT_OK) r->clamped += is_clamped(r, color, id);
     }
     if (result == FCT_OK && r->clamped)
         fct_glb_warn(&r->glb, "%zu materials reflect more than %g; their reflectance is reduced to %g",
@@ -104,6 +117,29 @@ static fct_result add_models(reader *r, json_t *mesh, int64_t index, fct_soup *s
     return result;
 }
 
+/* The vertex data that the models of a mesh keep. Colours of a mesh that stores light are not those of its
+ * surface. */
+static fct_result choose_arrays(reader *r, json_t *mesh) {
+    json_t *object;
+    size_t i, count = 0, with_normals = 0, with_light = 0;
+    json_array_foreach(json_object_get(mesh, "primitives"), i, object) {
+        fct_glb_primitive p;
+        fct_result result = fct_glb_read_primitive(&r->glb, object, &p);
+        if (result == FCT_OK) result = fct_glb_choose_texcoords(&r->builder, object, &p);
+        if (result != FCT_OK) return result;
+        if (p.position == FCT_GLB_ABSENT || (p.mode > 0 && p.mode < 4)) continue;
+        const bool textured = p.material >= 0 && p.material < r->material_count &&
+                              r->scene->paints[p.material].pyramid != FCT_NONE;
+        r->bare += textured && p.texcoord < 0;
+        ++count, with_normals += p.normal >= 0, with_light += p.light >= 0;
+        r->builder.has_texcoords |= textured || p.texcoord >= 0;
+        r->builder.has_colors |= p.color >= 0;
+    }
+    r->builder.has_normals = with_normals && with_normals == count;
+    r->builder.has_colors &= !with_light;
+    return FCT_OK;
+}
+
 /* Adds the models of a mesh to the scene, unless they are there already. */
 static fct_result need_mesh(reader *r, int64_t index) {
     static const fct_glb_transform identity = {.m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, .identity = true};
@@ -111,13 +147,18 @@ static fct_result need_mesh(reader *r, int64_t index) {
     fct_result result = fct_glb_item(&r->glb, "meshes", index, &mesh);
     if (result != FCT_OK || r->meshes[index].count || r->empty[index]) return result;
     fct_soup soup = {0};
-    size_t incomplete = r->builder.incomplete;
+    size_t incomplete = r->builder.incomplete, clear = r->builder.clear;
     r->builder = (fct_glb_builder){.glb = &r->glb,
                                    .soup = &soup,
                                    .has_materials = true,
                                    .unnamed = r->material_count,
+                                   .texcoord_sets = r->paints.sets,
+                                   .clear = clear,
                                    .incomplete = incomplete};
-    result = fct_glb_append_mesh(&r->builder, index, &identity);
+    result = choose_arrays(r, mesh);
+    if (result == FCT_OK) result = fct_glb_append_mesh(&r->builder, index, &identity);
+    r->builder.without_texcoord = r->builder.without_color =
+        0; /* primitives need not have what others have */
     fct_glb_end_soup(&r->builder);
     if (result == FCT_OK && soup.polygon_count) {
         result = add_models(r, mesh, index, &soup);
@@ -202,6 +243,9 @@ static fct_result read_nodes(reader *r) {
     fct_release_all(r->env, arrays, FCT_LENGTH(arrays));
     if (r->flat)
         fct_glb_warn(&r->glb, "%zu nodes have a singular transform; their meshes are left out", r->flat);
+    if (r->bare)
+        fct_glb_warn(&r->glb, "%zu primitives have a texture but no texture coordinates; these are 0 0",
+                     r->bare);
     if (result == FCT_OK && r->scene->instance_count == 0)
         return fct_glb_fail(&r->glb, "a scene needs at least one face, found none");
     return result;
@@ -212,12 +256,15 @@ fct_result fct_scene_read_gltf(fct_scene *scene, const char *name, const unsigne
     fct_source source = {scene->env, name, data, size, base};
     reader r = {.scene = scene, .env = scene->env};
     fct_result result = fct_glb_open(&source, &r.glb);
+    if (result == FCT_OK) result = fct_gltf_paints_create(scene, &r.glb, &r.paints);
     if (result == FCT_OK) result = read_materials(&r);
     if (result == FCT_OK) result = read_nodes(&r);
     if (result == FCT_OK) {
         fct_glb_report_builder(&r.builder);
-        fct_glb_report_features(&r.glb);
+        fct_glb_report_features(&r.glb, true);
+        fct_textures_report(r.env, name, &r.paints.loss);
     }
+    fct_gltf_paints_release(&r.paints);
     fct_glb_close(&r.glb);
     return result;
 }

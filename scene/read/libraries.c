@@ -186,6 +186,12 @@ fct_result fct_libraries_add(const fct_env *env, const char *base, const char *n
     return result;
 }
 
+fct_result fct_libraries_find(const fct_env *env, const char *base, const char *name, size_t length,
+                              char **path) {
+    fct_result result = find_file(env, base, name, length, path);
+    return result == FCT_OK && !*path ? find_beside(env, base, name, length, path) : result;
+}
+
 void fct_libraries_release(const fct_env *env, fct_libraries *l) {
     for (size_t k = 0; k < l->count; ++k) fct_release(env, l->paths[k]);
     fct_release(env, l->paths);

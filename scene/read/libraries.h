@@ -23,6 +23,10 @@ typedef struct fct_libraries {
 fct_result fct_libraries_add(const fct_env *env, const char *base, const char *names, size_t length,
                              fct_libraries *libraries);
 void fct_libraries_add_missing(fct_libraries *libraries, const char *name, size_t length);
+/* *path: a regular file of that name, relative to `base`, found as libraries are; or NULL. The caller
+ * releases it. Errors: MEMORY. */
+fct_result fct_libraries_find(const fct_env *env, const char *base, const char *name, size_t length,
+                              char **path);
 void fct_libraries_release(const fct_env *env, fct_libraries *libraries);
 
 #endif

@@ -17,7 +17,7 @@ static fct_result add_plain_model(fct_scene *scene, const char *path) {
     fct_material grey = {.name = "grey", .reflectance = {.7f, .7f, .7f}, .two_sided = true};
     fct_model_file file;
     uint32_t material;
-    fct_result result = fct_model_open(env, path, false, &file);
+    fct_result result = fct_model_open(env, path, false, false, &file);
     if (result != FCT_OK) return result;
     result = fct_scene_add_material(scene, &grey, &material);
     if (result == FCT_OK) {

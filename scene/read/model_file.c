@@ -3,9 +3,12 @@
 
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/io/file.h"
+#include "mesh/ply/header.h"
+#include "scene/attributes.h"
 #include "scene/read/path.h"
 
 /* Opens NAME.fct beside a mesh file if it records the hash of that file. *out is NULL if there is none, if
@@ -36,16 +39,42 @@ static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fc
     return result;
 }
 
-fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, fct_model_file *out) {
+static fct_result load_mesh(const fct_env *env, const char *path, fct_mesh *out) {
+    const char *format = fct_file_format(env, path);
+    fct_result result = fct_mesh_load(env, path, out);
+    if (result == FCT_OK && strcasecmp(format, "glb") && strcasecmp(format, "gltf"))
+        fct_attributes_count_from_top(out);
+    return result;
+}
+
+/* Whether the colours of a mesh file are radiosity. */
+static fct_result find_light(const fct_env *env, const char *path, bool *out) {
+    fct_file file;
+    struct stat status;
+    *out = false;
+    if (strcasecmp(fct_file_format(env, path), "ply")) return fct_mesh_file_holds_light(env, path, out);
+    if (stat(path, &status) || !S_ISREG(status.st_mode)) return FCT_OK; /* a pipe is read once */
+    fct_result result = fct_file_open(env, path, &file);
+    if (result != FCT_OK) return result;
+    const char *text = (const char *)file.data, *end = fct_ply_find_body(text, file.size);
+    for (const char *p = text; end && p + 12 <= end && !*out; ++p) *out = !memcmp(p, " radiosity_r", 12);
+    fct_file_close(env, &file);
+    return FCT_OK;
+}
+
+fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, bool want_paint,
+                          fct_model_file *out) {
     *out = (fct_model_file){0};
+    out->light = true;
     if (!strcasecmp(fct_file_format(env, path), "fct")) return fct_tree_open(env, path, &out->tree);
     fct_result result = want_mesh || env->flip_inward ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
-    if (result != FCT_OK || out->tree) return result;
-    result = fct_mesh_load(env, path, &out->mesh);
+    if (result == FCT_OK && want_paint) result = find_light(env, path, &out->light);
+    if (result != FCT_OK || (out->tree && !want_paint)) return result;
+    result = load_mesh(env, path, &out->mesh);
     if (result == FCT_OK && out->mesh.face_count == 0) {
-        fct_mesh_release(env, &out->mesh);
         result = fct_fail(env, FCT_ERROR_DATA, "%s: a model needs at least one face, found none", path);
     }
+    if (result != FCT_OK) fct_model_close(env, out);
     return result;
 }
 

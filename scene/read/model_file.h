@@ -5,16 +5,18 @@
 #include "base/env.h"
 #include "facetree/cluster.h"
 
-/* Either a hierarchy, or a mesh and tree == NULL. */
+/* A hierarchy, a mesh, or a hierarchy and the mesh beside it. */
 typedef struct fct_model_file {
-    fct_tree *tree;
-    fct_mesh mesh;
+    fct_tree *tree; /* NULL: only a mesh */
+    fct_mesh mesh;  /* empty: only a hierarchy */
+    bool light;     /* its colours are radiosity, or may be: a hierarchy does not tell */
 } fct_model_file;
 
 /* Opens NAME.fct, or a mesh file. Instead of mesh file NAME.ply it opens NAME.fct beside it if that file
- * records the hash of NAME.ply; want_mesh switches this off. A file without faces is an error.
- * fct_model_close frees *out. Errors: INPUT, DATA, MEMORY, CANCELLED. */
-fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, fct_model_file *out);
+ * records the hash of NAME.ply; want_mesh switches this off, and want_paint opens the mesh too. A file
+ * without faces is an error. fct_model_close frees *out. Errors: INPUT, DATA, MEMORY, CANCELLED. */
+fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, bool want_paint,
+                          fct_model_file *out);
 void fct_model_close(const fct_env *env, fct_model_file *file);
 
 #endif

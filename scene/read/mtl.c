@@ -1,15 +1,20 @@
 /* scene/read/mtl.c: see mtl.h. */
 #include "scene/read/mtl.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "mesh/mesh.h"
+#include "scene/read/libraries.h"
 
 /* A material that is being read. */
 typedef struct reading {
     char *name; /* NULL before the first newmtl */
     fct_material material;
+    fct_paint paint; /* its factor: Kd as it is written */
+    bool has_factor; /* Kd is there */
+    char *texture;   /* path of map_Kd, or NULL */
     bool repeated, clamped, grey, dark, textured, transparent;
 } reading;
 
@@ -50,11 +55,13 @@ uint32_t fct_mtl_find(const fct_mtl *mtl, const char *name) {
 }
 
 /* Adds the material to the scene under a name that the scene can hold. */
-static fct_result add_material(fct_mtl *mtl, const char *name, fct_material *material, uint32_t *id) {
+static fct_result add_material(fct_mtl *mtl, const char *name, fct_material *material, const fct_paint *paint,
+                               uint32_t *id) {
     const fct_env *env = mtl->scene->env;
     fct_result result = fct_mtl_choose_name(env, mtl->used_names, name[0] ? name : "(none)", material->name,
                                             sizeof material->name);
     if (result == FCT_OK) result = fct_scene_add_material(mtl->scene, material, id);
+    if (result == FCT_OK && !env->no_textures) result = fct_scene_paint_material(mtl->scene, *id, paint);
     if (result == FCT_OK && json_object_set_new_nocheck(mtl->ids, name, json_integer(*id)))
         result = fct_fail_memory(env, "names");
     return result;
@@ -62,7 +69,10 @@ static fct_result add_material(fct_mtl *mtl, const char *name, fct_material *mat
 
 fct_result fct_mtl_add_grey(fct_mtl *mtl, const char *name, uint32_t *id) {
     fct_material grey = standard;
-    return add_material(mtl, name, &grey, id);
+    fct_paint paint = fct_paint_default();
+    memcpy(paint.factor, grey.reflectance, sizeof paint.factor);
+    paint.vertex_colors = true;
+    return add_material(mtl, name, &grey, &paint, id);
 }
 
 static bool at_line_end(fct_text *t) {
@@ -112,18 +122,15 @@ static fct_result read_color(reading *m, fct_text *t, const char *what, float co
 }
 
 static fct_result read_reflectance(reading *m, fct_text *t) {
-    float *color = m->material.reflectance;
+    float *color = m->paint.factor;
     bool spectral;
     fct_result result = read_color(m, t, "a reflectance", color, &spectral);
     if (result != FCT_OK) return result;
     m->grey = spectral;
     if (spectral) memcpy(color, standard.reflectance, 3 * sizeof(float));
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < 3; ++c)
         if (color[c] < 0) return fct_text_fail(t, "expected Kd >= 0, found %g", (double)color[c]);
-        if (color[c] <= FCT_SCENE_MOST_REFLECTANCE) continue;
-        color[c] = FCT_SCENE_MOST_REFLECTANCE;
-        m->clamped = true;
-    }
+    m->has_factor = color[0] > 0 || color[1] > 0 || color[2] > 0;
     return FCT_OK;
 }
 
@@ -137,12 +144,70 @@ static fct_result read_emission(reading *m, fct_text *t) {
     return FCT_OK;
 }
 
-/* Notes what the solver does not know: textures of Kd and Ke, and transparency. */
+/* Takes up to three numbers after an option of a texture. */
+static void take_numbers(fct_text *t, float out[3]) {
+    for (int c = 0; c < 3; ++c) {
+        fct_text ahead = *t;
+        double value;
+        if (!fct_text_double(&ahead, &value) || !isfinite((float)value)) return;
+        out[c] = (float)value;
+        *t = ahead;
+    }
+}
+
+/* Reads an option of a texture. Options that change no colour or are rare are left out with their values. */
+static void read_option(fct_text *t, const char *option, size_t length, fct_paint *paint, float scale[3],
+                        float offset[3]) {
+    static const char *const words[] = {"-blendu", "-blendv", "-cc", "-imfchan", "-type"};
+    float unused[3];
+    if (fct_text_word_is(option, length, "-s")) {
+        take_numbers(t, scale);
+    } else if (fct_text_word_is(option, length, "-o")) {
+        take_numbers(t, offset);
+    } else if (fct_text_word_is(option, length, "-clamp")) {
+        const char *value = fct_text_word(t, &length);
+        if (fct_text_word_is(value, length, "on")) paint->wrap[0] = paint->wrap[1] = FCT_WRAP_CLAMP;
+    } else {
+        bool word = false;
+        for (size_t k = 0; k < FCT_LENGTH(words); ++k) word |= fct_text_word_is(option, length, words[k]);
+        if (word)
+            fct_text_word(t, &length);
+        else
+            take_numbers(t, unused);
+    }
+}
+
+/* Reads map_Kd: options, then the name of a file, which may contain blanks. */
+static fct_result read_texture(fct_mtl *mtl, reading *m, const char *base, fct_text *t) {
+    const fct_env *env = mtl->scene->env;
+    float scale[3] = {1, 1, 1}, offset[3] = {0, 0, 0};
+    size_t length;
+    for (;;) {
+        fct_text ahead = *t;
+        const char *word = fct_text_word(&ahead, &length);
+        if (length < 2 || *word != '-') break;
+        *t = ahead;
+        read_option(t, word, length, &m->paint, scale, offset);
+    }
+    const char *name = fct_text_rest(t, &length);
+    if (!length || m->texture || env->no_textures || m->repeated) return FCT_OK;
+    /* Texture coordinates of models count v from the top, these numbers from the bottom. */
+    const float transform[6] = {scale[0], 0, offset[0], 0, scale[1], 1 - scale[1] - offset[1]};
+    memcpy(m->paint.transform, transform, sizeof transform);
+    fct_result result = fct_libraries_find(env, base, name, length, &m->texture);
+    if (result != FCT_OK || m->texture) return result;
+    char shown[FCT_TEXT_SHOWN], reason[FCT_TEXT_SHOWN + 16];
+    fct_text_show(name, length, shown);
+    snprintf(reason, sizeof reason, "no file \"%s\"", shown);
+    fct_textures_lose(&mtl->loss, reason);
+    return FCT_OK;
+}
+
+/* Notes what the solver does not know: textures of Ke, and transparency. */
 static void note_other(reading *m, fct_text *t, const char *word, size_t length) {
     double value;
     bool map = length > 4 && fct_text_begins_any_case(word, length, "map_");
-    m->textured |= map && (fct_text_word_is_any_case(word + 4, length - 4, "kd") ||
-                           fct_text_word_is_any_case(word + 4, length - 4, "ke"));
+    m->textured |= map && fct_text_word_is_any_case(word + 4, length - 4, "ke");
     m->transparent |= map && fct_text_word_is_any_case(word + 4, length - 4, "d");
     if (fct_text_word_is(word, length, "d")) m->transparent |= fct_text_double(t, &value) && value < 1;
     if (fct_text_word_is(word, length, "Tr")) m->transparent |= fct_text_double(t, &value) && value > 0;
@@ -152,18 +217,35 @@ static void count_material(fct_mtl_tally *tally, bool present, const char *name)
     if (present && !tally->count++) fct_text_show(name, strlen(name), tally->first);
 }
 
+/* Sets the paint's texture and factor, and the reflectance. */
+static fct_result finish_paint(fct_mtl *mtl, reading *m) {
+    fct_result result = FCT_OK;
+    if (m->texture) result = fct_textures_open(mtl->scene, m->texture, &mtl->loss, &m->paint.texture);
+    const bool textured = m->paint.texture != FCT_NONE;
+    for (int c = 0; c < 3; ++c) {
+        if (textured && !m->has_factor) m->paint.factor[c] = 1;
+        if (!textured) m->clamped |= m->paint.factor[c] > FCT_SCENE_MOST_REFLECTANCE;
+        m->material.reflectance[c] = fminf(m->paint.factor[c], FCT_SCENE_MOST_REFLECTANCE);
+    }
+    return result;
+}
+
 /* Adds the material that ends here, if there is one. */
 static fct_result end_material(fct_mtl *mtl, reading *m) {
     uint32_t id;
     if (!m->name) return FCT_OK;
     count_material(&mtl->repeated, m->repeated, m->name);
     if (m->repeated) return FCT_OK;
+    fct_result result = finish_paint(mtl, m);
+    if (result == FCT_OK) result = add_material(mtl, m->name, &m->material, &m->paint, &id);
+    if (result != FCT_OK) return result;
+    m->clamped |= fct_textures_clamp(mtl->scene, id);
     count_material(&mtl->clamped, m->clamped, m->name);
     count_material(&mtl->grey, m->grey, m->name);
     count_material(&mtl->dark, m->dark, m->name);
     count_material(&mtl->textured, m->textured, m->name);
     count_material(&mtl->transparent, m->transparent, m->name);
-    return add_material(mtl, m->name, &m->material, &id);
+    return FCT_OK;
 }
 
 static fct_result begin_material(fct_mtl *mtl, reading *m, fct_text *t) {
@@ -172,13 +254,17 @@ static fct_result begin_material(fct_mtl *mtl, reading *m, fct_text *t) {
     const char *name = fct_text_rest(t, &length);
     if (memchr(name, 0, length)) return fct_text_fail(t, "a material's name has a zero byte");
     fct_release(env, m->name);
-    *m = (reading){.name = fct_copy_text(env, name, length), .material = standard};
+    fct_release(env, m->texture);
+    *m = (reading){
+        .name = fct_copy_text(env, name, length), .material = standard, .paint = fct_paint_default()};
+    memcpy(m->paint.factor, standard.reflectance, sizeof m->paint.factor);
+    m->paint.vertex_colors = true;
     if (!m->name) return fct_fail_memory(env, "names");
     m->repeated = fct_mtl_find(mtl, m->name) != FCT_NONE;
     return FCT_OK;
 }
 
-static fct_result read_statement(fct_mtl *mtl, reading *m, fct_text *t) {
+static fct_result read_statement(fct_mtl *mtl, reading *m, const char *base, fct_text *t) {
     size_t length;
     const char *word = fct_text_word(t, &length);
     bool reflectance = fct_text_word_is(word, length, "Kd"), emission = fct_text_word_is(word, length, "Ke");
@@ -189,19 +275,21 @@ static fct_result read_statement(fct_mtl *mtl, reading *m, fct_text *t) {
     if ((reflectance || emission) && !m->name) return fct_text_fail(t, "expected newmtl before %.2s", word);
     if (reflectance) return read_reflectance(m, t);
     if (emission) return read_emission(m, t);
+    if (m->name && fct_text_word_is_any_case(word, length, "map_kd")) return read_texture(mtl, m, base, t);
     note_other(m, t, word, length);
     return FCT_OK;
 }
 
-fct_result fct_mtl_read(fct_mtl *mtl, fct_text *t) {
+fct_result fct_mtl_read(fct_mtl *mtl, const char *base, fct_text *t) {
     reading m = {0};
     fct_result result = FCT_OK;
     while (result == FCT_OK && fct_text_skip_lines(t, '#')) {
-        result = read_statement(mtl, &m, t);
+        result = read_statement(mtl, &m, base, t);
         if (result == FCT_OK) fct_text_next_line(t);
     }
     if (result == FCT_OK) result = end_material(mtl, &m);
     fct_release(mtl->scene->env, m.name);
+    fct_release(mtl->scene->env, m.texture);
     return result;
 }
 
@@ -216,7 +304,7 @@ void fct_mtl_send_notes(const fct_mtl *mtl, const char *name) {
          "have colours out of range, which are clamped: Kd to 0 to .9, Ke to >= 0"},
         {&mtl->grey, FCT_MESSAGE_WARNING, "have a spectral Kd and become grey"},
         {&mtl->dark, FCT_MESSAGE_WARNING, "have a spectral Ke and emit no light"},
-        {&mtl->textured, FCT_MESSAGE_WARNING, "have textures, which are left out"},
+        {&mtl->textured, FCT_MESSAGE_WARNING, "have a texture of their emission, which is left out"},
         {&mtl->transparent, FCT_MESSAGE_WARNING, "are transparent and become opaque"},
     };
     for (size_t k = 0; k < FCT_LENGTH(kinds); ++k)

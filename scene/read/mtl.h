@@ -1,6 +1,7 @@
 /* scene/read/mtl.h: the materials of MTL libraries, by name.
  *
- * Kd is the reflectance, at most FCT_SCENE_MOST_REFLECTANCE, and Ke the emission. `xyz` colours become linear
+ * Kd is the reflectance, at most FCT_SCENE_MOST_REFLECTANCE, and Ke the emission. map_Kd is a texture of the
+ * reflectance, times Kd; a Kd of 0, or none, counts as 1 then. `xyz` colours become linear
  * RGB. A `spectral` reflectance becomes grey (.7), a `spectral` emission 0. A material without emission is
  * two-sided, because the winding of such files is often wrong. A material with emission is one-sided, by the
  * winding.
@@ -11,7 +12,7 @@
 #include <jansson.h>
 
 #include "mesh/text/text.h"
-#include "scene/scene.h"
+#include "scene/read/textures.h"
 
 /* How many materials have something, and the first of them. */
 typedef struct fct_mtl_tally {
@@ -23,6 +24,7 @@ typedef struct fct_mtl {
     fct_scene *scene;
     json_t *ids;        /* scene ids by the names of the file */
     json_t *used_names; /* in the scene, which has shorter names */
+    fct_texture_loss loss;
     fct_mtl_tally repeated, clamped, grey, dark, textured, transparent;
 } fct_mtl;
 
@@ -30,9 +32,9 @@ typedef struct fct_mtl {
 fct_result fct_mtl_create(fct_scene *scene, fct_mtl *out);
 void fct_mtl_release(fct_mtl *mtl);
 
-/* Reads a library. If a material has the name of an earlier one, the earlier one stays. Errors: DATA, MEMORY.
- */
-fct_result fct_mtl_read(fct_mtl *mtl, fct_text *t);
+/* Reads a library in the folder `base` ("" or ending in '/'). If a material has the name of an earlier one,
+ * the earlier one stays. Errors: DATA, MEMORY. */
+fct_result fct_mtl_read(fct_mtl *mtl, const char *base, fct_text *t);
 /* Sends one message for each thing that the materials ask for and do not get. */
 void fct_mtl_send_notes(const fct_mtl *mtl, const char *name);
 

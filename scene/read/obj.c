@@ -13,6 +13,7 @@
 #include "mesh/load.h"
 #include "mesh/mesh.h"
 #include "mesh/obj/text.h"
+#include "scene/attributes.h"
 #include "scene/read/libraries.h"
 #include "scene/read/mtl.h"
 #include "scene/read/path.h"
@@ -49,7 +50,9 @@ static fct_result read_library(reader *r, const char *path) {
     fct_result result = fct_file_open(&quiet, path, &file);
     if (result == FCT_OK) {
         fct_text t = fct_text_begin(r->env, path, file.data, file.size);
-        result = fct_mtl_read(&r->mtl, &t);
+        char *base = fct_file_folder(r->env, path);
+        result = base ? fct_mtl_read(&r->mtl, base, &t) : FCT_ERROR_MEMORY;
+        fct_release(r->env, base);
     } else if (result == FCT_ERROR_INPUT) {
         fct_libraries_add_missing(&r->libraries, path, strlen(path));
         result = FCT_OK;
@@ -119,6 +122,7 @@ static void send_notes(const reader *r) {
         fct_note(r->env, FCT_MESSAGE_NOTE, "%s: material libraries are named again %zu times and read once",
                  r->name, l->repeated);
     fct_mtl_send_notes(&r->mtl, r->name);
+    fct_textures_report(r->env, r->name, &r->mtl.loss);
     if (r->undefined.count)
         fct_note(r->env, FCT_MESSAGE_WARNING,
                  "%s: %zu materials are in no library and become grey (\"%s\" first)", r->name,
@@ -282,6 +286,7 @@ fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *te
     reader r = {.scene = scene, .env = scene->env, .name = name, .base = base};
     fct_result result = fct_mesh_parse(r.env, name, text, size, "obj", &r.mesh);
     if (result != FCT_OK) return result;
+    fct_attributes_count_from_top(&r.mesh);
     r.object_ids = json_object();
     r.used_names = json_object();
     if (!r.object_ids || !r.used_names) result = fct_fail_memory(r.env, "names");

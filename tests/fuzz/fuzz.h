@@ -19,6 +19,9 @@ typedef struct fuzz_limit {
     size_t largest; /* bytes one request may ask for */
 } fuzz_limit;
 
+/* What an image may ask for beside that: blank images compress well. */
+enum { FUZZ_IMAGE = 64 << 20 };
+
 /* Each block follows its size in a gap of FUZZ_GAP bytes. */
 enum { FUZZ_ARENA = 64 << 20, FUZZ_GAP = 64, FUZZ_FILL = 4096 };
 static _Alignas(FUZZ_GAP) uint8_t fuzz_arena[FUZZ_ARENA];

@@ -5,6 +5,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_limit limit;
     fct_env env = fuzz_env(&limit, size);
+    limit.largest += FUZZ_IMAGE + 1100 * size;
     fct_scene *scene;
     fct_result result = fct_scene_parse_json(&env, "scene.json", (const char *)data, size, FUZZ_MODELS "/",
                                              FCT_BACKEND_OBB, &scene);

@@ -5,6 +5,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_limit limit;
     fct_env env = fuzz_env(&limit, size);
+    limit.largest += FUZZ_IMAGE + 1100 * size;
     fct_scene *scene;
     fuzz_require(fct_scene_create(&env, FCT_BACKEND_OBB, &scene) == FCT_OK, "an empty scene");
     if (fct_scene_read_gltf(scene, "scene", data, size, NULL) == FCT_OK && fct_scene_commit(scene) == FCT_OK)

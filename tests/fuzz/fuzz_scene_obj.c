@@ -12,7 +12,7 @@ static void read_library(const fct_env *env, const char *text, size_t size) {
     fuzz_require(fct_scene_create(env, FCT_BACKEND_OBB, &scene) == FCT_OK, "an empty scene");
     fuzz_require(fct_mtl_create(scene, &mtl) == FCT_OK, "a table of materials");
     fct_text t = fct_text_begin(env, "library", text, size);
-    fct_mtl_read(&mtl, &t);
+    fct_mtl_read(&mtl, FUZZ_MODELS "/", &t);
     fct_scene_view view = fct_scene_get(scene);
     for (uint32_t k = 0; k < view.material_count; ++k)
         for (int c = 0; c < 3; ++c) {
@@ -27,6 +27,7 @@ static void read_library(const fct_env *env, const char *text, size_t size) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_limit limit;
     fct_env env = fuzz_env(&limit, size);
+    limit.largest += FUZZ_IMAGE + 1100 * size;
     const char *text = (const char *)data, *zero = size ? memchr(text, 0, size) : NULL;
     size_t head = zero ? (size_t)(zero - text) : 0, skip = zero ? head + 1 : 0;
     fct_scene *scene;

@@ -36,6 +36,31 @@ static fct_result add_materials(const fct_env *env) {
     return finish_scene(scene, result);
 }
 
+static const fct_texture dots = {"a name of more than thirty-two bytes", 2, 1,
+                                 (const uint8_t[6]){9, 8, 7, 6, 5, 4}};
+
+static fct_result add_textures(const fct_env *env) {
+    fct_scene *scene = create_plain(env);
+    uint32_t id;
+    fct_result result = FCT_OK;
+    for (int i = 0; i < 40 && result == FCT_OK; ++i)
+        result = STARVE(fct_scene_add_texture(scene, &dots, &id));
+    return finish_scene(scene, result);
+}
+
+static fct_result read_texture(const fct_env *env) {
+    fct_scene *scene = create_plain(env);
+    uint32_t id;
+    return finish_scene(scene, STARVE(fct_scene_read_texture(scene, IN "picture.png", &id)));
+}
+
+static fct_result paint_material(const fct_env *env) {
+    fct_scene *scene = create_plain(env);
+    fct_paint paint = fct_paint_default();
+    assert_int_equal(fct_scene_add_texture(scene, &dots, &paint.texture), FCT_OK);
+    return finish_scene(scene, STARVE(fct_scene_paint_material(scene, 0, &paint)));
+}
+
 /* After a failure, the scene is as it was: the same object can be added. */
 static fct_result add_object_with(const fct_env *env, const uint32_t *face_materials) {
     fct_scene *scene = create_plain(env);
@@ -291,6 +316,9 @@ static fct_result bake_probe_reference(const fct_env *env) {
 
 const memory_call scene_calls[] = {{"fct_scene_create", "", create_scene, false},
                                    {"fct_scene_add_material", "", add_materials, false},
+                                   {"fct_scene_add_texture", "", add_textures, false},
+                                   {"fct_scene_read_texture", "", read_texture, false},
+                                   {"fct_scene_paint_material", "", paint_material, false},
                                    {"fct_scene_add_object", "one material", add_object, false},
                                    {"fct_scene_add_object", "two materials", add_object_of_materials, false},
                                    {"fct_scene_add_object", "tree", add_tree, false},

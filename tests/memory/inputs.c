@@ -44,8 +44,15 @@ static void make_scene(void) {
     assert_int_equal(fct_scene_create(&inputs.env, FCT_BACKEND_OBB, &scene), FCT_OK);
     assert_int_equal(fct_scene_add_material(scene, &white, &ids[0]), FCT_OK);
     assert_int_equal(fct_scene_add_material(scene, &light, &ids[1]), FCT_OK);
+    static const uint8_t pixels[12] = {200, 100, 50, 20, 30, 40, 250, 250, 250};
+    const fct_texture texture = {"a texture", 2, 2, pixels};
+    fct_paint paint = fct_paint_default();
+    assert_int_equal(fct_scene_add_texture(scene, &texture, &paint.texture), FCT_OK);
+    assert_int_equal(fct_scene_paint_material(scene, ids[0], &paint), FCT_OK);
     for (int i = 0; i < 2; ++i) {
         fct_mesh square = make_grid(&inputs.env, 1);
+        square.texcoords = fct_allocate_zero(&inputs.env, square.face_count, 6 * sizeof *square.texcoords);
+        square.texcoords[2] = square.texcoords[5] = 1;
         assert_int_equal(fct_scene_add_object(scene, "square", &square, NULL, places[i], ids[i], NULL),
                          FCT_OK);
         fct_mesh_release(&inputs.env, &square);
@@ -72,20 +79,35 @@ static void write_inputs(void) {
     fwrite(corners + 4, 1, 4, file), fwrite(corners, 1, 4, file), fwrite(corners, 1, 4, file);
     fwrite(corners + 4, 1, 4, file), fwrite(corners + 8, 1, 4, file), fwrite(corners, 1, 4, file);
     assert_int_equal(fclose(file), 0);
-    write_text(IN "corner.gltf",
-               "{\"asset\": {\"version\": \"2.0\", \"generator\": \"a name of more than thirty-two bytes\"},"
-               "\"buffers\": [{\"byteLength\": 36, \"uri\": \"corner%20coordinates.bin\"}],"
-               "\"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}],"
-               "\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, "
-               "\"type\": \"VEC3\"}], \"materials\": [{\"name\": \"red\", \"emissiveFactor\": [1, 0, 0]}],"
-               "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}, \"material\": 0}]}],"
-               "\"nodes\": [{\"mesh\": 0}], \"scenes\": [{\"nodes\": [0]}], \"scene\": 0}");
-    write_text(IN "lit.mtl", "newmtl lamp\nKe 1 1 1\nnewmtl floor\nKd .5 .5 .5\n");
+    write_text(
+        IN "corner.gltf",
+        "{\"asset\": {\"version\": \"2.0\", \"generator\": \"a name of more than thirty-two bytes\"},"
+        "\"buffers\": [{\"byteLength\": 36, \"uri\": \"corner%20coordinates.bin\"}],"
+        "\"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}],"
+        "\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, "
+        "\"type\": \"VEC3\"}], \"materials\": [{\"name\": \"red\", \"emissiveFactor\": [1, 0, 0], "
+        "\"pbrMetallicRoughness\": {\"baseColorTexture\": {\"index\": 0}}}], \"textures\": [{\"source\": 0}],"
+        "\"images\": [{\"uri\": \"picture.png\"}],"
+        "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}, \"material\": 0}]}],"
+        "\"nodes\": [{\"mesh\": 0}], \"scenes\": [{\"nodes\": [0]}], \"scene\": 0}");
+    /* 3 x 2 pixels */
+    static const unsigned char picture[] = {
+        137, 80, 78,  71, 13,  10, 26,  10,  0,   0,   0,   13,  73, 72,  68, 82, 0,   0,   0,   3,   0,
+        0,   0,  2,   8,  2,   0,  0,   0,   18,  22,  241, 77,  0,  0,   0,  27, 73,  68,  65,  84,  120,
+        218, 99, 224, 18, 145, 59, 113, 233, 206, 255, 255, 255, 25, 128, 32, 42, 192, 141, 145, 137, 25,
+        0,   81, 184, 6,  166, 40, 124, 51,  151, 0,   0,   0,   0,  73,  69, 78, 68,  174, 66,  96,  130};
+    file = fopen(IN "picture.png", "wb");
+    assert_non_null(file);
+    fwrite(picture, 1, sizeof picture, file);
+    assert_int_equal(fclose(file), 0);
+    write_text(IN "lit.mtl", "newmtl lamp\nKe 1 1 1\nnewmtl floor\nKd .5 .5 .5\nmap_Kd -s 2 2 picture.png\n");
     write_text(IN "lit.obj", "mtllib lit.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no one\nusemtl lamp\n"
                              "f 1 2 3\no two\nusemtl floor\nf 1 2 4\nusemtl lamp\nf 1 3 4\n");
     write_text(IN "lit.json",
                "{\"light_groups\": [\"day\", \"the second group of lamps\"],"
-               "\"materials\": [{\"name\": \"lamp\", \"emission\": [1, 1, 1]}, {\"name\": \"a long name\"}],"
+               "\"materials\": [{\"name\": \"lamp\", \"emission\": [1, 1, 1]}, {\"name\": \"a long name\", "
+               "\"texture\": \"picture.png\", "
+               "\"vertex_colors\": true}],"
                "\"models\": [{\"name\": \"sheet\", \"file\": \"sheet.fct\"}, "
                "{\"name\": \"ball\", \"file\": \"ball.ply\"}, {\"name\": \"lit\", \"file\": \"lit.obj\"}],"
                "\"instances\": [{\"model\": \"ball\", \"material\": \"lamp\", \"translate\": [0, 0, 3]},"

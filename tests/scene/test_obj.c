@@ -213,7 +213,9 @@ static void clamps_colors(void **unused) {
     expect_one("newmtl a\nKd .2\nnewmtl b\nnewmtl a\nKd 1\nnewmtl b\n", .2, 0,
                "2 materials are defined again; the first definition stays (\"a\" first)");
     expect_one("newmtl a\nKd .5\nmap_Kd wood.png\n", .5, 0,
-               "1 materials have textures, which are left out (\"a\" first)");
+               "1 textures cannot be read and are left out (no file \"wood.png\")");
+    expect_one("newmtl a\nKd .5\nmap_Ke wood.png\n", .5, 0,
+               "1 materials have a texture of their emission, which is left out (\"a\" first)");
     expect_one("newmtl a\nKd .5\nd 1\nTr 0\n", .5, 0, "");
     expect_one("newmtl a\nd 1\nTr 0\nKd .5\nd .5\n", .5, 0,
                "1 materials are transparent and become opaque (\"a\" first)");

@@ -24,6 +24,23 @@ holds "$(value faces) == 528 && $(value instances) == 1 && $(value emitting_inst
 expect 0 info marked.json --json
 check "a byte order mark" test "$(value faces)" = 528
 
+# A texture: its picture is a render. The cube has no texture coordinates, the square has.
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n' >square.obj
+expect 0 render cube.off -o cube.png --size 64x48
+scene '{"texture": "cube.png", "emission": 1}' '}, {"name": "lid", "model": "room", "material": "wall",
+    "translate": [0, 1, 1], "rotate": {"axis": [1, 0, 0], "degrees": 180}' square.obj >painted.json
+expect 0 info painted.json
+check "info lists textures" grep -q '^textures cube.png  *64 48$' out
+expect 0 bake painted.json -o painted.ply --max-edge .2 --json
+check "bake counts textures" test "$(value textures)" = 1
+expect 0 bake painted.json -o plain.ply --max-edge .2 --no-textures --json
+check "--no-textures uses none" test "$(value textures)" = 0
+check "and gives another result" sh -c '! cmp -s painted.ply plain.ply'
+expect 0 render painted.json -o painted.png --size 32x32
+scene '{"texture": "cube.png", "emission": 1}' >bare.json
+expect 0 bake bare.json -o bare.ply --max-edge 1
+check "a texture without coordinates is reported" grep -q 'a texture but no texture coordinates' err
+
 # A closed furnace: radiosity 1 / (1 - rho) = 2 everywhere.
 printf '# position, normal\n0 0 -1  0 0 1\n0 0 0  1 0 0\n' >probes.txt
 expect 0 bake furnace.json -o lit.ply --probe probes.txt --json

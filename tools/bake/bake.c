@@ -25,7 +25,7 @@ typedef struct bake_options {
     fct_mesh_save_def save;
     bake_outputs outputs;
     const char *also;
-    bool two_sided, merge;
+    bool two_sided, merge, no_textures;
     int quality; /* of qualities */
     bool error_given, final_given;
 } bake_options;
@@ -52,7 +52,8 @@ enum {
     KEY_LIGHT,
     KEY_KEEP,
     KEY_MERGE,
-    KEY_SOURCE
+    KEY_SOURCE,
+    KEY_NO_TEXTURES
 };
 
 static const struct argp_option bake_options_table[] = {
@@ -104,6 +105,8 @@ static const struct argp_option bake_options_table[] = {
      0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
      "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
+    {"no-textures", KEY_NO_TEXTURES, NULL, 0,
+     "Leave out textures and vertex colours: materials reflect their factors alone", 0},
     {"merge", KEY_MERGE, NULL, 0,
      "Write a .glb as one unlit mesh in world space, without the nodes and materials of the scene", 0},
     {"also", KEY_ALSO, "FILE", 0,
@@ -175,6 +178,9 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_TWO_SIDED:
         o->two_sided = true;
         return 0;
+    case KEY_NO_TEXTURES:
+        o->no_textures = true;
+        return 0;
     case KEY_MAX_EDGE:
         return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
     default:
@@ -217,8 +223,8 @@ static int check_bake_output(tool *t, const bake_options *o) {
 
 /* --- The bake --- */
 
-static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, double load, json_t *probes,
-                       json_t *files) {
+static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, uint32_t textures,
+                       double load, json_t *probes, json_t *files) {
     double total = tool_seconds() - t->start;
     tool_say(t, "%llu elements, %llu links, %llu rays in %u passes%s; output %llu vertices, %llu rays",
              (unsigned long long)s->elements, (unsigned long long)s->links, (unsigned long long)s->rays,
@@ -240,6 +246,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
         s->power_emitted, "absorbed", s->power_absorbed, "escaped", s->power_escaped, "error_estimate",
         s->error_estimate);
     if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
+    if (object) json_object_set_new(object, "textures", json_integer(textures));
     if (probes && object) json_object_set(object, "probes", probes);
     if (files && object) json_object_set(object, "files", files);
     int code = tool_json(t, object);
@@ -292,7 +299,7 @@ static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, f
     if (code == TOOL_DONE) {
         fct_bake_stats stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
-        code = report_bake(t, o, &stats, load, answers->probes, answers->files);
+        code = report_bake(t, o, &stats, view.texture_count, load, answers->probes, answers->files);
     }
     bake_release_objects(t, &objects);
     fct_bake_destroy(bake);
@@ -342,6 +349,7 @@ static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
     fct_scene *scene;
     bake_answers answers = {0};
     double start = tool_seconds();
+    t->env.no_textures = o->no_textures;
     int code = tool_result(t, fct_scene_load(&t->env, t->inputs[0], o->backend, &scene));
     if (code == TOOL_DONE && o->two_sided) fct_scene_make_two_sided(scene);
     if (code == TOOL_DONE) warn_inward(t, scene);
@@ -368,7 +376,7 @@ static int run_bake(tool *t, void *options) {
 int tool_bake(int argc, char **argv) {
     static const tool_stage stages[] = {
         {"models|read|dual graph|clusters|order|boxes|boxes of large clusters|ray structure", 2},
-        {"links", 7},
+        {"links|textures", 7},
         {"direct light", 8},
         {"gathering", 8},
         {"iteration", 1},
@@ -409,7 +417,8 @@ int tool_bake(int argc, char **argv) {
             "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
             "seconds{load, open, "
             "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
-            "error_estimate, outputs[] (the quantities of --light), "
+            "error_estimate, outputs[] (the quantities of --light), textures (how many images the "
+            "materials have), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
             "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
             "name of its model. Powers are sums over "

@@ -133,7 +133,20 @@ static int lay_out(tool *t, loader *l, drawing *out) {
     return code;
 }
 
-static int paint_materials(tool *t, const loader *l, drawing *out) {
+/* Keeps a scene with painted materials for drawing_shade. */
+static int keep_painted_scene(tool *t, loader *l, drawing *out) {
+    bool painted = false;
+    for (uint32_t i = 0; i < l->part_count; ++i) painted = painted || fct_scene_is_painted(l->scene, i);
+    if (!painted) return TOOL_DONE;
+    out->starts = tool_allocate(t, (size_t)l->part_count + 1, sizeof *out->starts);
+    if (!out->starts) return TOOL_MEMORY;
+    for (uint32_t i = 0; i < l->part_count; ++i) out->starts[i] = l->parts[i].first_face;
+    out->starts[l->part_count] = out->mesh.face_count;
+    out->scene = l->scene;
+    return TOOL_DONE;
+}
+
+static int paint_materials(tool *t, loader *l, drawing *out) {
     if (!l->scene) return TOOL_DONE;
     out->paint = tool_allocate(t, out->mesh.face_count, 3 * sizeof *out->paint);
     out->glow = tool_allocate(t, out->mesh.face_count, 3 * sizeof *out->glow);
@@ -146,7 +159,7 @@ static int paint_materials(tool *t, const loader *l, drawing *out) {
             memcpy(out->glow + 3 * f, p->material->emission, 3 * sizeof(float));
         }
     }
-    return TOOL_DONE;
+    return keep_painted_scene(t, l, out);
 }
 
 /* --- Clusters --- */
@@ -329,7 +342,7 @@ int drawing_load(tool *t, const drawing_source *source, drawing *out) {
     if (code == TOOL_DONE && l.tree) copy_origin(fct_tree_get(l.tree).origin, out);
     tool_release(t, l.cuts);
     tool_release(t, l.parts);
-    fct_scene_destroy(l.scene);
+    if (!out->scene) fct_scene_destroy(l.scene);
     fct_tree_destroy(l.tree);
     return code;
 }
@@ -341,4 +354,6 @@ void drawing_release(tool *t, drawing *d) {
     tool_release(t, d->labels);
     tool_release(t, d->lines);
     tool_release(t, d->normals);
+    tool_release(t, d->starts);
+    fct_scene_destroy(d->scene);
 }

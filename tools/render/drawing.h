@@ -23,6 +23,8 @@ typedef struct drawing {
     float *normals;   /* face_count x 3 x 3: a unit normal per corner; NULL: flat shading */
     drawing_shading shading;
     fct_camera camera; /* of the scene, if the input is one */
+    fct_scene *scene;  /* of painted materials, or NULL: `paint` holds the whole reflectance */
+    uint32_t *starts;  /* of the scene: the first face of each instance, then face_count */
 
     /* Set by the command and read by drawing_shade. */
     picture_tone tone;

@@ -212,13 +212,31 @@ static void find_normal(const drawing *d, const raster_point *point, float n[3])
     for (int k = 0; k < 3 && point->back; ++k) n[k] = -n[k];
 }
 
+/* The reflectance of a point of a painted scene. */
+static void find_scene_paint(const drawing *d, const raster_point *point, float rgb[3]) {
+    const fct_scene_view view = fct_scene_get(d->scene);
+    uint32_t low = 0, high = view.instance_count - 1;
+    while (low < high) {
+        uint32_t middle = low + (high - low + 1) / 2;
+        if (d->starts[middle] <= point->face)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    /* The corners of mirrored instances are in reverse order. */
+    const float v = point->weight[view.instances[low].mirrored ? 0 : 2];
+    fct_scene_reflectance(d->scene, low, point->face - d->starts[low], (float)point->weight[1], v, 0, rgb);
+}
+
 static void find_paint(const drawing *d, const raster_point *point, float rgb[3]) {
     const uint32_t *v = d->mesh.triangles + 3 * (size_t)point->face;
     static const float plaster[3] = {.62F, .59F, .55F};
     const float *face = d->paint              ? d->paint + 3 * (size_t)point->face
                         : d->mesh.face_colors ? d->mesh.face_colors + 3 * (size_t)point->face
                                               : plaster;
-    if (d->mesh.colors && !d->paint)
+    if (d->scene)
+        find_scene_paint(d, point, rgb);
+    else if (d->mesh.colors && !d->paint)
         blend_corners(d->mesh.colors + 3 * (size_t)v[0], d->mesh.colors + 3 * (size_t)v[1],
                       d->mesh.colors + 3 * (size_t)v[2], point->weight, rgb);
     else

@@ -70,7 +70,7 @@ static fct_result check_version(const fct_glb *glb) {
 
 bool fct_glb_supports(const char *extension) {
     static const char *const names[] = {"KHR_mesh_quantization", "KHR_materials_emissive_strength",
-                                        "KHR_materials_unlit",
+                                        "KHR_materials_unlit", "KHR_texture_transform",
 #ifdef FCT_HAS_MESHOPT
                                         "EXT_meshopt_compression"
 #endif

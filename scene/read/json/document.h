@@ -28,6 +28,8 @@ typedef struct fct_document {
     json_t *material_ids, *group_ids, *model_ids, *instance_names; /* name -> id */
     fct_document_model *models;
     size_t model_count;
+    bool textured, colored; /* a material has a texture, or takes the vertex colours of its models */
+    size_t clamped;         /* materials with texels that reflect too much */
 } fct_document;
 
 /* Records the id of a name. Errors: MEMORY. */

@@ -197,6 +197,7 @@ static fct_result place_by_face(fct_document *d, const fct_document_model *model
     fct_json_leave(&d->json, before);
     result =
         fct_scene_split(d->scene, model->name, &file.mesh, NULL, labels, d->scene->material_count, &parts);
+    fct_document_mark_light(d, &file, &parts);
     if (result == FCT_OK)
         result = fct_scene_place(d->scene, name, parts.first, parts.count, parts.labels, transform);
 done:

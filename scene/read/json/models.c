@@ -33,7 +33,7 @@ static fct_result read_model(fct_document *d, const char *name, json_t *value) {
 
 fct_result fct_document_open_model(fct_document *d, const fct_document_model *model, bool want_mesh,
                                    fct_model_file *file) {
-    fct_result result = fct_model_open(d->json.env, model->path, want_mesh, file);
+    fct_result result = fct_model_open(d->json.env, model->path, want_mesh, d->textured || d->colored, file);
     if (result == FCT_ERROR_INPUT)
         fct_fail(d->json.env, result, "%s: %s: model \"%s\": cannot read \"%s\"", d->json.file, d->json.path,
                  model->name, model->path);
@@ -48,7 +48,9 @@ fct_result fct_document_need_whole(fct_document *d, fct_document_model *model) {
     if (result != FCT_OK) return result;
     fct_tree *tree = file.tree;
     file.tree = NULL;
-    result = fct_scene_split(d->scene, model->name, tree ? NULL : &file.mesh, tree, NULL, 1, &parts);
+    const bool meshed = file.mesh.face_count > 0;
+    result = fct_scene_split(d->scene, model->name, meshed ? &file.mesh : NULL, tree, NULL, 1, &parts);
+    fct_document_mark_light(d, &file, &parts);
     model->whole = parts.first;
     model->whole_there = result == FCT_OK;
     fct_release(d->json.env, parts.labels);
@@ -75,7 +77,12 @@ static fct_result name_model_parts(fct_document *d, fct_document_model *model, c
 }
 
 fct_result fct_document_need_mesh(fct_document *d, fct_model_file *file) {
-    return file->tree ? fct_tree_mesh(d->json.env, file->tree, &file->mesh) : FCT_OK;
+    return file->mesh.face_count ? FCT_OK : fct_tree_mesh(d->json.env, file->tree, &file->mesh);
+}
+
+void fct_document_mark_light(fct_document *d, const fct_model_file *file, const fct_scene_parts *parts) {
+    for (uint32_t k = 0; k < parts->count; ++k)
+        d->scene->own[parts->first + k].colors_are_light = file->light;
 }
 
 fct_result fct_document_need_split(fct_document *d, fct_document_model *model) {
@@ -96,6 +103,7 @@ fct_result fct_document_need_split(fct_document *d, fct_document_model *model) {
     if (result == FCT_OK)
         result = fct_scene_split(d->scene, model->name, &file.mesh, NULL, file.mesh.materials, label_count,
                                  &model->split);
+    fct_document_mark_light(d, &file, &model->split);
     model->split_there = result == FCT_OK;
     if (result == FCT_OK) result = name_model_parts(d, model, &file.mesh);
     fct_model_close(d->json.env, &file);

@@ -14,6 +14,8 @@ fct_result fct_document_open_model(fct_document *d, const fct_document_model *mo
                                    fct_model_file *file);
 /* Fills file->mesh in input order if the file holds a hierarchy. Errors: MEMORY. */
 fct_result fct_document_need_mesh(fct_document *d, fct_model_file *file);
+/* Notes which models have colours that are light. */
+void fct_document_mark_light(fct_document *d, const fct_model_file *file, const fct_scene_parts *parts);
 /* Adds the model to the scene, as one model or as one per material of its mesh, unless it is there already.
  * Errors: INPUT, DATA, MEMORY, CANCELLED. */
 fct_result fct_document_need_whole(fct_document *d, fct_document_model *model);

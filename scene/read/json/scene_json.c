@@ -38,6 +38,26 @@ static fct_result read_camera(fct_document *d) {
     return FCT_OK;
 }
 
+/* A material that asks for the vertex colours of a model without colours of its surface gets none. */
+static void note_colorless(const fct_document *d) {
+    const fct_scene *scene = d->scene;
+    size_t count = 0;
+    const char *first = "";
+    for (uint32_t i = 0; i < scene->instance_count; ++i) {
+        const fct_instance *in = &scene->instances[i];
+        const fct_scene_model *own = &scene->own[in->model];
+        if (!scene->paints[in->material].def.vertex_colors) continue;
+        if (fct_tree_get(own->tree).colors && !own->colors_are_light) continue;
+        if (!count++) first = in->name;
+    }
+    if (count)
+        fct_note(
+            d->json.env, FCT_MESSAGE_WARNING,
+            "%s: %zu instances have vertex_colors, but their model has no colours of its surface (\"%s\" "
+            "first); radiosity, and the colours of hierarchy files, are none",
+            d->json.file, count, first);
+}
+
 static fct_result read_scene_members(fct_document *d) {
     static const char *const keys[] = {"description", "models",       "materials", "instances",
                                        "camera",      "light_groups", NULL};
@@ -46,7 +66,9 @@ static fct_result read_scene_members(fct_document *d) {
     result = fct_document_read_materials(d);
     if (result == FCT_OK) result = fct_document_read_models(d);
     if (result == FCT_OK) result = read_camera(d);
-    return result == FCT_OK ? fct_document_read_instances(d) : result;
+    if (result == FCT_OK) result = fct_document_read_instances(d);
+    if (result == FCT_OK) note_colorless(d);
+    return result;
 }
 
 static void release_document(fct_document *d) {

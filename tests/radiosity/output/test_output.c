@@ -128,12 +128,13 @@ static void radiosity_is_emission_plus_reflection(void **state) {
     fct_solution s = {.env = &plain, .scene = scene};
     s.elements.view = fct_scene_get(scene);
     const double irradiance[3] = {1, 2, 4};
+    const float rho[3] = {.25F, .25F, .125F};
     float b[3];
-    fct_solution_radiosity(&s, 0, irradiance, b);
-    assert_near(b[0], 3.25, 1e-6), assert_near(b[1], 3.5, 1e-6), assert_near(b[2], 4, 1e-6);
+    fct_solution_radiosity(&s, 0, rho, irradiance, b);
+    assert_near(b[0], 3.25, 1e-6), assert_near(b[1], 3.5, 1e-6), assert_near(b[2], 3.5, 1e-6);
     s.def.indirect_only = true;
-    fct_solution_radiosity(&s, 0, irradiance, b);
-    assert_near(b[0], .25, 1e-6), assert_near(b[2], 1, 1e-6);
+    fct_solution_radiosity(&s, 0, rho, irradiance, b);
+    assert_near(b[0], .25, 1e-6), assert_near(b[2], .5, 1e-6);
     fct_scene_destroy(scene);
 }
 

@@ -1,0 +1,16 @@
+/* scene/attributes.h: the data of a mesh that its tree does not hold, in the order of the tree. */
+#ifndef FCT_SCENE_ATTRIBUTES_H
+#define FCT_SCENE_ATTRIBUTES_H
+
+#include "base/env.h"
+#include "facetree/cluster.h"
+
+/* Copies texture coordinates and normals of the mesh from which the tree was built. *texcoords has 3 x 2
+ * numbers per place, *normals 3 per tree vertex; NULL where the mesh has none. The caller releases them, also
+ * after an error. Errors: DATA (a damaged tree, or one of another mesh), MEMORY. */
+fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const fct_tree *tree,
+                               float **texcoords, float **normals);
+/* Replaces v by 1 - v. Files other than glTF count v from the bottom of the image, models from the top. */
+void fct_attributes_count_from_top(fct_mesh *mesh);
+
+#endif
