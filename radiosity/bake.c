@@ -237,6 +237,7 @@ fct_bake_stats fct_bake_get_stats(const fct_bake *bake) {
     fct_bake_stats stats = bake->stats;
     if (bake->solution.elements.env) stats.touched_bytes = fct_elements_touched(&bake->solution.elements);
     stats.seconds_total += stats.seconds_push;
+    stats.max_edge = bake->solution.max_edge;
     estimate_error(bake, &stats.error_estimate);
     return stats;
 }

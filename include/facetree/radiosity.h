@@ -70,6 +70,7 @@ typedef struct fct_bake_stats {
      * for the output so far (see fct_bake_error). Before any output: the noise of the stored solution. */
     double error_estimate;
     uint64_t check_rays; /* of the error estimate, not in output_rays */
+    double max_edge;     /* def.max_edge, or the default for this scene */
 } fct_bake_stats;
 
 typedef struct fct_bake fct_bake;

@@ -45,6 +45,7 @@ check "a texture without coordinates is reported" grep -q 'a texture but no text
 printf '# position, normal\n0 0 -1  0 0 1\n0 0 0  1 0 0\n' >probes.txt
 expect 0 bake furnace.json -o lit.ply --probe probes.txt --json
 keys method converged passes elements links rays seconds open solve push total peak_bytes touched_bytes power emitted absorbed escaped error_estimate probes radiosity irradiance
+keys objects check_rays error outputs
 check "it converged" test "$(value converged)" = true
 tr -d ' \n' <out >flat
 radiosity=$(sed 's/.*"probes":\[{"position":\[[^]]*\],"radiosity":\[\([^],]*\),.*/\1/' flat)
@@ -59,6 +60,16 @@ expect 0 bake furnace.json -o lit.glb --visibility embree --final direct --error
 expect 0 bake furnace.json -o lit.glb --final none --json
 expect 0 bake furnace.json --method reference --samples 64 --probe probes.txt --json
 check "the method is named" test "$(value method)" = reference
+
+# A target for the error: bakes until the estimate is there, with more rays each time.
+expect 0 make cornell -o cornell --triangles 100 --quiet
+expect 0 bake cornell/scene.json -o lit.ply --max-edge .06 --error 1.5% --json
+holds "$(value error_estimate) > 0 && $(value error_estimate) <= .015"
+holds "$(value error) < 2e-5 && $(value check_rays) > 1000"
+check "objects have errors" grep -q '"object": "tall_block"' out
+expect 64 bake cornell/scene.json --probe probes.txt --error 2%
+expect 64 bake cornell/scene.json -o lit.ply --method reference --error 2%
+expect 64 bake cornell/scene.json -o lit.ply --error 0%
 expect 0 bake furnace.json -o - --quiet
 check "a PLY on standard output" test "$(head -c 3 out)" = ply
 for bad in '0 0 0 1 0' '0 0 0 0 0 x' '0 0 0 0 0 0' '0 0 nan 0 0 1'; do

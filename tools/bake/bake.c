@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/bake/errors.h"
 #include "tools/bake/objects.h"
 #include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
@@ -28,6 +29,7 @@ typedef struct bake_options {
     bool two_sided, merge, no_textures;
     int quality; /* of qualities */
     bool error_given, final_given;
+    bake_target target;
 } bake_options;
 
 /* What --quality sets. */
@@ -65,8 +67,9 @@ static const struct argp_option bake_options_table[] = {
      0},
     {"error", KEY_ERROR, "E", 0,
      "Split links until the uncertainty of each is at most this share of the absorbed power (default 2e-5, "
-     "from "
-     "1e-9 to 1). A smaller E also means more rays and anchors",
+     "from 1e-9 to 1). A smaller E also means more rays and anchors. With a percentage, such as 2%, bake "
+     "again with more rays and shorter edges until the estimated RMS error of the light is at most that "
+     "(0.01% to 100%), at most six times",
      0},
     {"samples", KEY_SAMPLES, "N", 0,
      "reference: paths per vertex (default 256); face: gather rays per anchor (default: from --error)", 0},
@@ -133,7 +136,7 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_QUALITY:
         return tool_parse_choice(state, "--quality", text, names, &o->quality);
     case ARGP_KEY_END:
-        if (!o->error_given) o->def.error = qualities[o->quality].error;
+        if (!o->error_given || o->target.share > 0) o->def.error = qualities[o->quality].error;
         if (!o->final_given) o->def.final = qualities[o->quality].final;
         o->def.outputs = o->outputs.lights & ~(unsigned)FCT_MESH_COLORS;
         bake_set_save(&o->outputs, &o->save);
@@ -154,7 +157,7 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         return error;
     case KEY_ERROR:
         o->error_given = true;
-        return tool_parse_real(state, "--error", text, 1e-9, 1, &o->def.error);
+        return bake_parse_error(state, text, &o->def.error, &o->target);
     case KEY_SAMPLES:
         return tool_parse_count32(state, "--samples", text, 1, 100000000, &o->def.samples);
     case KEY_VISIBILITY:
@@ -223,8 +226,13 @@ static int check_bake_output(tool *t, const bake_options *o) {
 
 /* --- The bake --- */
 
+/* What a bake writes beside its mesh or meshes. */
+typedef struct bake_answers {
+    json_t *probes, *files, *objects; /* NULL: none */
+} bake_answers;
+
 static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, uint32_t textures,
-                       double load, json_t *probes, json_t *files) {
+                       double load, const bake_answers *answers) {
     double total = tool_seconds() - t->start;
     tool_say(t, "%llu elements, %llu links, %llu rays in %u passes%s; output %llu vertices, %llu rays",
              (unsigned long long)s->elements, (unsigned long long)s->links, (unsigned long long)s->rays,
@@ -247,16 +255,19 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
         s->error_estimate);
     if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (object) json_object_set_new(object, "textures", json_integer(textures));
-    if (probes && object) json_object_set(object, "probes", probes);
-    if (files && object) json_object_set(object, "files", files);
+    if (object) json_object_set_new(object, "error", json_real(o->def.error));
+    if (object) json_object_set_new(object, "check_rays", json_integer((json_int_t)s->check_rays));
+    if (answers->objects && object) json_object_set(object, "objects", answers->objects);
+    if (answers->probes && object) json_object_set(object, "probes", answers->probes);
+    if (answers->files && object) json_object_set(object, "files", answers->files);
     int code = tool_json(t, object);
-    return code != TOOL_DONE ? code : s->converged ? TOOL_DONE : TOOL_NO;
+    if (code != TOOL_DONE) return code;
+    const bool reached = !(o->target.share > 0) || s->error_estimate <= o->target.share;
+    if (!reached)
+        tool_warn(t, "the estimated error is %.2g %%, wanted %.2g %%", 100 * s->error_estimate,
+                  100 * o->target.share);
+    return s->converged && reached ? TOOL_DONE : TOOL_NO;
 }
-
-/* What a bake writes beside its mesh or meshes. */
-typedef struct bake_answers {
-    json_t *probes, *files; /* NULL: none */
-} bake_answers;
 
 /* Refuses a scene in which nothing emits light, because all colours would be black. */
 static int check_light(tool *t, const fct_scene_view *scene) {
@@ -280,26 +291,40 @@ static void warn_sides(tool *t, const fct_bake_stats *s) {
                   s->sides_left_out, one ? " is" : "s are");
 }
 
-static int solve_scene(tool *t, const bake_options *o, const bake_probes *set, fct_scene *scene, double load,
+/* One bake. *bake: the caller destroys it, also after a failure. */
+static int bake_once(tool *t, const bake_options *o, const fct_scene *scene, bake_objects *objects,
+                     fct_bake **bake, json_t **files) {
+    const fct_scene_view view = fct_scene_get(scene);
+    int code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, bake));
+    if (code != TOOL_DONE || !t->output) return code;
+    if (!is_folder_output(t->output)) return write_file(t, o, *bake);
+    json_decref(*files);
+    *files = json_array();
+    return bake_write_objects(t, *bake, &view, objects, &o->save, *files);
+}
+
+static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_scene *scene, double load,
                        bake_answers *answers) {
     fct_bake *bake = NULL;
     bake_objects objects = {0};
-    fct_scene_view view = fct_scene_get(scene);
-    bool folder = t->output && is_folder_output(t->output);
+    const fct_scene_view view = fct_scene_get(scene);
+    fct_bake_stats stats = {0};
     int code = check_light(t, &view);
-    if (code == TOOL_DONE && folder) code = bake_plan_objects(t, &view, &objects);
-    if (code == TOOL_DONE) code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, &bake));
-    if (code == TOOL_DONE && folder) {
-        answers->files = json_array();
-        code = bake_write_objects(t, bake, &view, &objects, &o->save, answers->files);
-    } else if (code == TOOL_DONE && t->output) {
-        code = write_file(t, o, bake);
-    }
+    if (code == TOOL_DONE && t->output && is_folder_output(t->output))
+        code = bake_plan_objects(t, &view, &objects);
+    do {
+        fct_bake_destroy(bake);
+        bake = NULL;
+        if (code == TOOL_DONE) code = bake_once(t, o, scene, &objects, &bake, &answers->files);
+        if (code == TOOL_DONE) stats = fct_bake_get_stats(bake);
+    } while (code == TOOL_DONE && bake_try_again(t, &o->target, &stats, &o->def));
     if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
     if (code == TOOL_DONE) {
-        fct_bake_stats stats = fct_bake_get_stats(bake);
+        stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
-        code = report_bake(t, o, &stats, view.texture_count, load, answers->probes, answers->files);
+        answers->objects = bake_describe_errors(bake, &view);
+        code = bake_print_errors(t, bake, &view);
+        if (code == TOOL_DONE) code = report_bake(t, o, &stats, view.texture_count, load, answers);
     }
     bake_release_objects(t, &objects);
     fct_bake_destroy(bake);
@@ -345,7 +370,7 @@ static void warn_inward(tool *t, const fct_scene *scene) {
             count, count == 1 ? " is" : "s are", first, count == 1 ? "it" : "them");
 }
 
-static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
+static int bake_scene(tool *t, bake_options *o, const bake_probes *set) {
     fct_scene *scene;
     bake_answers answers = {0};
     double start = tool_seconds();
@@ -357,8 +382,22 @@ static int bake_scene(tool *t, const bake_options *o, const bake_probes *set) {
     if (code == TOOL_DONE) code = solve_scene(t, o, set, scene, tool_seconds() - start, &answers);
     json_decref(answers.probes);
     json_decref(answers.files);
+    json_decref(answers.objects);
     fct_scene_destroy(scene);
     return code;
+}
+
+/* A target needs an estimate, and an output that can be written again. */
+static int check_target(tool *t, const bake_options *o) {
+    if (!(o->target.share > 0)) return TOOL_DONE;
+    if (o->def.method == FCT_BAKE_REFERENCE)
+        return tool_fail(t, TOOL_USAGE, "--error with %% needs --method face: the reference takes --samples");
+    if (!t->output || !strcmp(t->output, "-") || (o->also && !strcmp(o->also, "-")))
+        return tool_fail(
+            t, TOOL_USAGE,
+            "--error with %% needs -o with a file or a folder, which is written until the error is "
+            "reached");
+    return TOOL_DONE;
 }
 
 static int run_bake(tool *t, void *options) {
@@ -366,7 +405,8 @@ static int run_bake(tool *t, void *options) {
     bake_probes set = {0};
     if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
     o->def.seed = t->seed;
-    int code = check_bake_output(t, o);
+    int code = check_target(t, o);
+    if (code == TOOL_DONE) code = check_bake_output(t, o);
     if (code == TOOL_DONE && o->probes) code = bake_read_probes(t, o->probes, &set);
     if (code == TOOL_DONE) code = bake_scene(t, o, &set);
     bake_release_probes(t, &set);
@@ -380,7 +420,7 @@ int tool_bake(int argc, char **argv) {
         {"direct light", 8},
         {"gathering", 8},
         {"iteration", 1},
-        {"objects|surface|covers|anchors|vertices|reference", 72},
+        {"objects|surface|covers|anchors|vertices|check|reference", 72},
         {"write", 1},
         {"probes", 1},
         {0}};
@@ -406,7 +446,7 @@ int tool_bake(int argc, char **argv) {
             "Large flat triangles are divided, so "
             "that they can carry shadows; --keep-mesh keeps the faces of the input instead. A scene in which "
             "nothing emits light is an error. The exit code is "
-            "1 if the solution has not converged.\n\n"
+            "1 if the solution has not converged or the error of --error N% is not reached.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
             "that is lit on both sides is written twice: its brighter side, then the other one, each with "
@@ -417,7 +457,11 @@ int tool_bake(int argc, char **argv) {
             "JSON keys: method, converged, passes, elements, links, rays, output_rays, vertices, faces, "
             "seconds{load, open, "
             "solve, push, total}, peak_bytes, touched_bytes, power{emitted, absorbed, escaped}, "
-            "error_estimate, outputs[] (the quantities of --light), textures (how many images the "
+            "error_estimate (RMS error over the mean of the light that surfaces without emission show, from "
+            "a "
+            "check at random points; of probes alone the noise of the solution), objects[]{object, "
+            "error_estimate, bias, area}, error (--error of the last bake), check_rays, outputs[] (the "
+            "quantities of --light), textures (how many images the "
             "materials have), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
             "files[]{object, file, faces, source}: the name of the object in the scene, its file, and the "
@@ -426,6 +470,7 @@ int tool_bake(int argc, char **argv) {
         .examples = "  facetree bake scene.json -o lit.glb\n"
                     "  facetree bake room.obj -o lit.glb --quality draft\n"
                     "  facetree bake scene.json -o lit/ --json\n"
+                    "  facetree bake scene.json -o lit.glb --error 1%\n"
                     "  facetree bake scene.json -o lit.glb --light irradiance,direct\n"
                     "  facetree bake model.obj -o lit/ --keep-mesh vertex\n"
                     "  facetree bake scene.json --probe points.txt",
