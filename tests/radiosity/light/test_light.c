@@ -46,7 +46,7 @@ static hall make_hall(uint64_t seed) {
                     v3_make(8 * pick(seed, k, 0) - 4, 8 * pick(seed, k, 1) - 4, 2 * pick(seed, k, 2) - 1),
                     v3_make(1, 0, pick(seed, k, 3)), v3_make(0, 1, pick(seed, k, 4)));
     fct_mesh ball = make_bumpy(&plain, 4, .2);
-    for (uint64_t k = 0; k < 30; ++k) {
+    for (uint64_t k = 0; k < 38; ++k) {
         double e = k % 5 ? .05 : 2;
         fct_material m = {.two_sided = k % 4 == 1};
         /* few lamps send the channel seed % 3, so that some receivers send no ray to any of them */

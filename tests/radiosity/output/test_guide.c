@@ -3,6 +3,7 @@
 #include "radiosity/output/anchor.h"
 #include "radiosity/solve/oracle.h"
 #include "radiosity/solve/refine.h"
+#include "radiosity/surface/tessellate.h"
 #include "room.h"
 
 /* The room with links, for which every leaf shines by itself. `hot`: one leaf is much brighter. */
@@ -257,9 +258,52 @@ static void guided_gathers_are_unbiased(void **state) {
     end_linked(&x);
 }
 
+/* Anchors on the back of a two-sided ball aim with the links of that side. An anchor of a group of 2^k
+ * vertices or more sends rays (1 + k / 4) rays. */
+static void anchors_aim_from_their_side(void **state) {
+    (void)state;
+    linked x;
+    fct_guide guide;
+    fct_surface f;
+    fct_anchors anchors;
+    uint32_t found = 0, aimed = 0;
+    make_linked(2, true, &x);
+    const fct_elements *set = &x.r.set;
+    assert_int_equal(fct_guide_create(&x.guides, &guide), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, x.r.scene, x.r.ball, 10, &f), FCT_OK);
+    const fct_source source = {set, &x.guides, x.r.stored, 1};
+    const fct_anchors_def def = {.rays = 24, .tolerance = .4, .side = -1, .instance = x.r.ball, .seed = 7};
+    assert_int_equal(fct_anchors_create(&plain, &source, &f, &def, &anchors), FCT_OK);
+    for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
+        for (uint32_t i = 0; i < anchors.count; ++i) {
+            const fct_anchor *a = &anchors.items[i];
+            if (memcmp(a->position, f.sample_points + 3 * (size_t)v, sizeof a->position)) continue;
+            bool same = false;
+            const v3 p = v3_load(a->position), n = v3_load(a->normal);
+            assert_near(v3_dot(n, v3_load(f.normals + 3 * (size_t)v)), -1, 1e-5);
+            const uint32_t leaf = fct_elements_locate_point(set, x.r.ball, true, f.places[v], p);
+            assert_true(set->items[leaf].back);
+            const bool lit = fct_guide_aim(&guide, leaf, p, n);
+            for (uint32_t k = 0; k <= 8 && !same; ++k) {
+                fct_anchor b = *a;
+                fct_anchor_gather(&source, lit ? &guide : NULL, 24 + 24 * k / 4,
+                                  fct_hash3(7, v, f.mesh.vertex_count), &b);
+                same = fabs((double)b.irradiance[0] - (double)a->irradiance[0]) < 1e-6 &&
+                       fabs((double)b.irradiance[2] - (double)a->irradiance[2]) < 1e-6;
+            }
+            assert_true(same);
+            ++found, aimed += lit;
+        }
+    assert_true(found >= anchors.count && aimed > 20);
+    fct_anchors_release(&plain, &anchors);
+    fct_surface_release(&plain, &f);
+    fct_guide_release(&plain, &guide);
+    end_linked(&x);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(guides_follow_the_links),
-                                       cmocka_unit_test(guided_gathers_equal_their_rays),
-                                       cmocka_unit_test(guided_gathers_are_unbiased)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(guides_follow_the_links), cmocka_unit_test(guided_gathers_equal_their_rays),
+        cmocka_unit_test(guided_gathers_are_unbiased), cmocka_unit_test(anchors_aim_from_their_side)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
