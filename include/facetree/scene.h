@@ -5,8 +5,8 @@
  * more than 512 times its size away from the origin of its files, where floats have few digits left: then it
  * is near the scene, and rays, points, bounds, transforms and the camera are relative to it.
  *
- * Lengths have the unit of the scene file. Emission is radiant exitance (power that leaves per area), linear
- * RGB.
+ * Lengths have the unit of the scene file. Emission is a radiance, linear RGB, as in glTF; docs/radiosity.md,
+ * "Units", says how it relates to power.
  */
 #ifndef FACETREE_SCENE_H
 #define FACETREE_SCENE_H
