@@ -161,7 +161,7 @@ keys files object file faces source
 check "a file per object" test "$(ls lit | wc -l)" = 9
 check "no two names differ in case only" test "$(ls lit | tr A-Z a-z | sort -u | wc -l)" = 9
 check "the names" test "$(cd lit; LC_ALL=C; echo *)" = "A.ply _..ply a-2-2.ply a-2.ply a_b-2.ply a_b-3.ply a_b.ply Ä.ply ä-2.ply"
-check "one entry of files[] per object" test "$(grep -c '"object"' out)" = 9
+check "one entry of files[] per object" test "$(grep -c '"source"' out)" = 9
 check "the object of a file" test "$(grep -A 1 '"object": "a/b"' out | grep -c 'lit/a_b.ply')" = 1
 check "the source of a file" test "$(grep -c '"source": "ball"' out)" = 9
 i=0
