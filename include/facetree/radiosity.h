@@ -77,7 +77,8 @@ typedef struct fct_bake fct_bake;
 
 /* The error of an object's light, estimated at random points of its output: 16 to 512 per instance, by area.
  * There the shown light is compared with two independent gathers, whose own noise cancels. An error of the
- * stored solution is not in it. All zero for an object without output, and for REFERENCE. */
+ * stored solution is not in it. With def.keep, the shown light is that of the corners, before vertices or
+ * faces take a mean of them. All zero for an object without output, and for REFERENCE. */
 typedef struct fct_bake_error {
     double error; /* RMS over the mean light */
     double bias;  /* mean difference over the mean light */
@@ -117,8 +118,8 @@ FCT_API fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *ou
 FCT_API fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts);
 
 /* Writes the lit scene as a .glb that keeps its nodes: each object has a node with its name and transform,
- * and a mesh in the space of that node, with a primitive per material. Colours, _RADIOSITY and other lights
- * are those of fct_mesh_save. docs/radiosity.md lists what is kept.
+ * and a mesh in the space of that node, with a primitive per material. fct_mesh_save describes
+ * its colours and lights, and docs/radiosity.md the data that the file keeps.
  *
  * document: the .glb or .gltf that the scene was read from, which keeps its hierarchy, materials, textures,
  * cameras, lights and extras; or NULL: the nodes, materials and camera are those of the scene. def may be

@@ -34,15 +34,15 @@ typedef struct fct_texture {
     const uint8_t *pixels; /* height x width x 3 sRGB bytes, rows from the top */
 } fct_texture;
 
-/* What happens outside of [0, 1]. */
+/* The texel of a coordinate outside of [0, 1]: of the repeated image, of its border, or of the mirrored
+ * image. */
 typedef enum fct_wrap { FCT_WRAP_REPEAT, FCT_WRAP_CLAMP, FCT_WRAP_MIRROR } fct_wrap;
 
 /* How the reflectance of a material varies over a surface. The reflectance of a point is
  *     min(factor * texel, .9) * colour    with a texture
  *     min(factor * colour, .9)            without
  * with the colour of the vertices, at most 1. Texels are interpolated between their centres, vertices inside
- * triangles. A model without texture coordinates takes the
- * factor instead of the texture. */
+ * triangles. A model without texture coordinates takes the factor instead of the texture. */
 typedef struct fct_paint {
     uint32_t size;
     float factor[3];  /* each >= 0; default 1 */

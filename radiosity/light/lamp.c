@@ -24,11 +24,11 @@
 #define RAY_STEP 8
 #define MAX_RAYS 64
 /* First rays to lamps in doubt, which must find a border that the rays of a neighbour have found. */
-#define DOUBT_RAYS 16
+#define DOUBT_RAYS 32
 /* Rays to the minor lamps together if the first ones disagree, at least and at most. */
 #define LEAST_MINOR_RAYS 4
 #define MOST_MINOR_RAYS  16
-/* A lamp above this share of the total gets twice the first rays: a wrong agreement of four would show. */
+/* A lamp above this share of the total gets twice the first rays: a wrong agreement would show. */
 #define BRIGHT_SHARE .2
 /* Wanted standard error of a lamp's light as a share of the receiver's light, times the first rays per lamp.
  */

@@ -2,18 +2,18 @@
  *
  * 1. Tessellate the instance, find the vertices that other surfaces cover (cover.h), cut surfaces along the
  * border of their cover, and place anchors.
- * 2. Light each other vertex at its sample point: direct light by shadow rays, indirect light from the
- * anchors. With FCT_FINAL_NONE, the links bring both.
+ * 2. Light each other vertex at its sample point: direct light by shadow rays, more of them where neighbours
+ * see different parts of a lamp; indirect light from the anchors. With FCT_FINAL_NONE, the links bring both.
  * 3. Split edges across which the light changes, cut new covers, and light the new vertices, up to
  * BORDER_ROUNDS times. So the edges of the mesh follow shadow borders.
  * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices show their emission alone.
+ * 5. Check the result at random points (check.h).
  */
 #include "radiosity/output/output.h"
 
 #include <string.h>
 
 #include "mesh/mesh.h"
-
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/attributes.h"
 #include "radiosity/output/blend.h"

@@ -1,13 +1,7 @@
 /* radiosity/output/solution.c: see solution.h. */
 #include "radiosity/output/solution.h"
 
-#include "radiosity/surface/tessellate.h"
-
 enum { MOST_LAMP_RAYS = 64 };
-/* The longest reach of an anchor over the longest edge of the output: an eighth of the diagonal of most
- * scenes. */
-#define LONGEST_REACH 9
-
 uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least) {
     return (uint32_t)fct_min(fct_max(least * s->fineness, least), MOST_LAMP_RAYS);
 }
@@ -23,8 +17,7 @@ void fct_solution_direct(const fct_solution *s, const float point[3], const floa
 }
 
 fct_source fct_solution_source(const fct_solution *s) {
-    return (fct_source){&s->elements, &s->guides, s->transport.stored,
-                        LONGEST_REACH * fct_surface_default_edge(s->scene)};
+    return (fct_source){&s->elements, &s->guides, s->transport.stored, s->longest_reach};
 }
 
 void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const float reflectance[3],

@@ -7,6 +7,10 @@
 #include "radiosity/solve/link.h"
 #include "radiosity/solve/transport.h"
 
+/* The longest reach of an anchor over the default edge of the scene: an eighth of the diagonal of most
+ * scenes. */
+#define FCT_LONGEST_REACH 9
+
 typedef struct fct_solution {
     const fct_env *env;
     const fct_scene *scene;
@@ -17,6 +21,7 @@ typedef struct fct_solution {
     fct_transport transport;
     fct_guides guides;
     double max_edge;       /* def.max_edge, or the default of the scene */
+    double longest_reach;  /* of anchors: FCT_LONGEST_REACH times the default edge */
     double fineness;       /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
     double mean_radiosity; /* rho E over the scene's area and channels: the scale of visible differences */
 } fct_solution;

@@ -46,6 +46,18 @@ static void name_item(json_t *object, const char *what, size_t index, char *out,
 
 /* ---- Materials: those of the file, then one for primitives without a material ---- */
 
+/* The material of a baked scene is white and unlit, and keeps its reflectance beside (mesh/glb/scene/). */
+static void take_baked_reflectance(json_t *material, double color[3]) {
+    json_t *list = json_object_get(json_object_get(material, "extras"), "reflectance");
+    double values[3];
+    if (!fct_glb_extension(material, "KHR_materials_unlit") || json_array_size(list) != 3) return;
+    for (size_t c = 0; c < 3; ++c) {
+        values[c] = json_number_value(json_array_get(list, c));
+        if (!json_is_number(json_array_get(list, c)) || !(values[c] >= 0 && values[c] <= 1)) return;
+    }
+    memcpy(color, values, sizeof values);
+}
+
 static fct_result read_material(reader *r, json_t *object, size_t index, double color[4], fct_material *out) {
     json_t *surface = json_object_get(object, "pbrMetallicRoughness"),
            *strong = json_object_get(fct_glb_extension(object, "KHR_materials_emissive_strength"),
@@ -58,6 +70,7 @@ static fct_result read_material(reader *r, json_t *object, size_t index, double 
     if (result == FCT_OK)
         result = fct_glb_numbers(&r->glb, object, "materials", (int64_t)index, "emissiveFactor", 3, light);
     if (result != FCT_OK) return result;
+    take_baked_reflectance(object, color);
     for (int c = 0; c < 3; ++c) {
         if (!(color[c] >= 0) || !(light[c] >= 0 && strength >= 0))
             return fct_glb_fail(&r->glb, "materials[%zu]: expected a base colour and an emission >= 0",

@@ -70,6 +70,13 @@ check "objects have errors" grep -q '"object": "tall_block"' out
 expect 64 bake cornell/scene.json --probe probes.txt --error 2%
 expect 64 bake cornell/scene.json -o lit.ply --method reference --error 2%
 expect 64 bake cornell/scene.json -o lit.ply --error 0%
+expect 64 bake cornell/scene.json -o - --error 2%
+
+# A baked .glb is a scene again: its white materials keep their reflectance.
+expect 0 bake cornell/scene.json -o again.glb --max-edge .06 --json
+absorbed=$(value absorbed)
+expect 0 bake again.glb -o twice.ply --max-edge .06 --json
+holds "$(value absorbed) > .98 * $absorbed && $(value absorbed) < 1.02 * $absorbed"
 expect 0 bake furnace.json -o - --quiet
 check "a PLY on standard output" test "$(head -c 3 out)" = ply
 for bad in '0 0 0 1 0' '0 0 0 0 0 x' '0 0 0 0 0 0' '0 0 nan 0 0 1'; do

@@ -392,11 +392,9 @@ static int check_target(tool *t, const bake_options *o) {
     if (!(o->target.share > 0)) return TOOL_DONE;
     if (o->def.method == FCT_BAKE_REFERENCE)
         return tool_fail(t, TOOL_USAGE, "--error with %% needs --method face: the reference takes --samples");
-    if (!t->output || !strcmp(t->output, "-") || (o->also && !strcmp(o->also, "-")))
-        return tool_fail(
-            t, TOOL_USAGE,
-            "--error with %% needs -o with a file or a folder, which is written until the error is "
-            "reached");
+    if (!t->output || tool_is_stream(t->output) || (o->also && tool_is_stream(o->also)))
+        return tool_fail(t, TOOL_USAGE,
+                         "--error with %% needs a file or a folder as output, because each bake replaces it");
     return TOOL_DONE;
 }
 

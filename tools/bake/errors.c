@@ -12,12 +12,13 @@ enum { MOST_TRIES = 6 };
 #define AIM .85
 /* The error falls with the root of --error. One bake changes it by these factors at most, and at least. */
 #define MOST_STEP  .1
-#define LEAST_STEP .5
+#define LEAST_STEP .25
 /* The least --error, and the least one for a target: numbers of rays do not grow below it. */
 #define LEAST_ERROR 1e-9
 #define FINEST      8e-8
-/* Where more rays have lowered the error to no less than this share of it, triangles get shorter too. */
-#define SMALL_GAIN .8
+/* Where more rays have lowered the error to no less than this share of it, the next bake has shorter edges.
+ */
+#define SMALL_GAIN .75
 /* Share of the checked area below which an object is not printed, and the objects that are. */
 #define PRINTED_AREA .005
 enum { PRINTED_OBJECTS = 3 };
@@ -39,7 +40,9 @@ bool bake_try_again(tool *t, bake_target *target, const fct_bake_stats *stats, f
     const double estimate = stats->error_estimate, last = target->last;
     if (!(target->share > 0) || estimate <= target->share || ++target->tries >= MOST_TRIES) return false;
     const double wanted = target->share * AIM / estimate;
-    if (last > 0 && (estimate > SMALL_GAIN * last || def->error <= FINEST))
+    const bool gained = !target->more_rays || estimate < SMALL_GAIN * last;
+    target->more_rays = gained && def->error > FINEST;
+    if (!target->more_rays)
         def->max_edge = stats->max_edge * .5;
     else
         def->error = fmax(def->error * fmin(fmax(wanted * wanted, MOST_STEP), LEAST_STEP), FINEST);

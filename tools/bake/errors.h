@@ -8,8 +8,9 @@
 
 /* The estimate that a bake must reach; share 0: any. */
 typedef struct bake_target {
-    double share, last; /* last: the estimate of the bake before; 0: none */
+    double share, last; /* last: the estimate of the bake before */
     int tries;          /* so far */
+    bool more_rays;     /* the last bake had more rays than the one before */
 } bake_target;
 
 /* Reads --error: a share of power, or a percentage such as 2%, which sets the target. */

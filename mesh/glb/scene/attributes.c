@@ -114,7 +114,7 @@ static bool begins_with(const char *text, const char *start) {
     return !strncmp(text, start, strlen(start));
 }
 
-/* Whether the attribute is written anew, or belongs to what is left out. */
+/* True if the attribute is not copied: it is written anew, or belongs to a skin, which is left out. */
 static bool is_replaced(const char *name) {
     static const char *const names[] = {"POSITION", "NORMAL",      "_RADIOSITY",
                                         "_DIRECT",  "_IRRADIANCE", "_INDIRECT"};

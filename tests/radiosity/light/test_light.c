@@ -140,7 +140,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
     double all = 0, seen = 0;
     uint32_t sent = 0, goal = !fixed && power > .2 * total ? 2 * base : base;
     const uint32_t slot = (uint32_t)(lamp - q->h->own) % 31, doubted = count_rays(base, .5, 1, power / scale);
-    if (q->doubt >> slot & 1 && goal < 16) goal = doubted > 16 ? 16 : doubted > goal ? doubted : goal;
+    if (q->doubt >> slot & 1 && goal < 32) goal = doubted > 32 ? 32 : doubted > goal ? doubted : goal;
     while (sent < goal) {
         for (; sent < goal; ++sent) {
             double u[2];

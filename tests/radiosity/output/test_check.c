@@ -15,7 +15,7 @@ enum { GRID = 60 };
 
 static void solve_scene(fct_solution *s, const fct_scene *scene) {
     const fct_transport_def t = {.seed = 1, .epsilon = 1, .tolerance = 1e-4, .fineness = 1};
-    s->scene = scene;
+    s->scene = scene, s->longest_reach = 9 * fct_surface_default_edge(scene);
     assert_int_equal(fct_lamps_create(&plain, scene, &s->lamps), FCT_OK);
     assert_int_equal(fct_elements_create(&plain, scene, 1, &s->elements), FCT_OK);
     assert_int_equal(fct_links_create(&plain, &s->links), FCT_OK);

@@ -104,7 +104,7 @@ static void refuses_damaged_files(void **unused) {
     expect_failure(png.data, png.size, "a damaged PNG");
     expect_failure(cmyk.data, cmyk.size, "a damaged JPEG: Unsupported color conversion");
     expect_failure("GIF89a", 6, "image: expected a PNG or JPEG image");
-    for (size_t size = 0; size < jpeg.size; ++size) { /* what is there is decoded */
+    for (size_t size = 0; size < jpeg.size; ++size) { /* a shorter file: its part is decoded */
         recorder r = {0};
         const fct_env env = recorder_env(&r);
         fct_image image;
