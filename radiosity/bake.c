@@ -12,6 +12,7 @@
 #include "radiosity/solve/refine.h"
 #include "radiosity/surface/paint.h"
 #include "radiosity/surface/tessellate.h"
+#include "scene/coarse.h"
 
 /* Default epsilon over the absorbed power: 2.0 % RMS error in the Cornell box, 2.6 % in the museum. Larger
  * values give fewer elements and rays. */
@@ -156,10 +157,14 @@ static double estimate_work(const fct_scene_view *view, uint32_t instance, doubl
     return tree_view.face_count + 12 * area * sqrt(scale2) / (max_edge * max_edge);
 }
 
+static fct_bounds bound_model(const fct_model *m) {
+    return m->bvh ? fct_bvh_bounds(m->bvh) : fct_tree_get(m->tree).bounds;
+}
+
 /* Rejects diagonals outside [LEAST_SIZE, MOST_SIZE]. A scene that is a single point is valid and dark. */
 static fct_result check_extents(const fct_env *env, const fct_scene_view *view) {
     for (uint32_t m = 0; m <= view->model_count; ++m) {
-        fct_bounds b = m < view->model_count ? fct_bvh_bounds(view->models[m].bvh) : view->bounds;
+        fct_bounds b = m < view->model_count ? bound_model(&view->models[m]) : view->bounds;
         double size = v3_norm(v3_sub(v3_load(b.upper), v3_load(b.lower)));
         if (size != 0 && !(size >= LEAST_SIZE && size <= MOST_SIZE))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g across; light needs %g to %g",
@@ -191,7 +196,8 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
         result = fct_fail_memory(env, "a bake");
     } else if (def->method == FCT_BAKE_FACE) {
         result = fct_lamps_create(env, scene, &s->lamps);
-        if (result == FCT_OK) result = fct_elements_create(env, scene, s->max_edge / 4, &s->elements);
+        if (result == FCT_OK)
+            result = fct_elements_create(env, fct_scene_coarse(scene), s->max_edge / 4, &s->elements);
         if (result == FCT_OK) result = solve_scene(bake);
     } else {
         bake->stats.converged = true;
@@ -346,11 +352,21 @@ static fct_result light_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     return result;
 }
 
+/* Before output: exact rays, and elements that refer to the models themselves. */
+static fct_result complete_scene(fct_bake *bake) {
+    fct_solution *s = &bake->solution;
+    const bool coarse = fct_scene_coarse(s->scene) != s->scene;
+    const fct_result result = coarse ? fct_scene_complete(s->scene) : FCT_OK;
+    if (s->def.method == FCT_BAKE_FACE && result == FCT_OK) fct_elements_refer(&s->elements, s->scene);
+    return result;
+}
+
 static fct_result light_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], bool back[2],
                               uint32_t *count) {
+    fct_result result = complete_scene(bake);
+    if (result != FCT_OK) return result;
     if (bake->solution.def.method != FCT_BAKE_FACE) return trace_sides(bake, instance, sides, back, count);
     *count = count_places(bake, fct_output_sides(&bake->solution, instance, back));
-    fct_result result = FCT_OK;
     for (uint32_t k = 0; k < *count && result == FCT_OK; ++k)
         result = light_side(bake, instance, back[k], &sides[k]);
     return result;
@@ -422,10 +438,11 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
 fct_result fct_bake_probe(fct_bake *bake, size_t count, const float *points, const float *normals,
                           fct_probe *out) {
     double start = fct_seconds();
-    fct_result result =
-        bake->solution.def.method == FCT_BAKE_FACE
-            ? fct_output_probe(&bake->solution, count, points, normals, out, &bake->stats.output_rays)
-            : trace_probes(bake, count, points, normals, out);
+    fct_result result = complete_scene(bake);
+    if (result != FCT_OK) return result;
+    result = bake->solution.def.method == FCT_BAKE_FACE
+                 ? fct_output_probe(&bake->solution, count, points, normals, out, &bake->stats.output_rays)
+                 : trace_probes(bake, count, points, normals, out);
     bake->stats.seconds_push += fct_seconds() - start;
     return result;
 }

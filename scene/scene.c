@@ -12,6 +12,7 @@
 #include "base/math/round.h"
 #include "facetree/dual.h"
 #include "scene/attributes.h"
+#include "scene/coarse.h"
 #include "scene/transform.h"
 #include "scene/winding.h"
 
@@ -21,6 +22,7 @@ fct_result fct_scene_create(const fct_env *env, fct_backend backend, fct_scene *
     if (!scene) return fct_fail_memory(env, "a scene");
     scene->env = env;
     scene->backend = backend;
+    scene->patches = FCT_SCENE_PATCHES;
     *out = scene;
     return FCT_OK;
 }
@@ -28,6 +30,8 @@ fct_result fct_scene_create(const fct_env *env, fct_backend backend, fct_scene *
 static void release_model(const fct_env *env, fct_scene_model *model) {
     if (model->bvh) fct_bvh_destroy(model->bvh);
     if (model->points) fct_bvh_destroy(model->points);
+    if (model->coarse_bvh) fct_bvh_destroy(model->coarse_bvh);
+    fct_coarse_release(env, &model->coarse);
     if (model->tree) fct_tree_destroy(model->tree);
     fct_release(env, model->source_faces);
     fct_release(env, model->source_vertices);
@@ -40,6 +44,7 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
 void fct_scene_destroy(fct_scene *scene) {
     if (!scene) return;
     const fct_env *env = scene->env;
+    fct_scene_release_coarse(scene);
     for (uint32_t m = 0; m < scene->model_count; ++m) release_model(env, scene->own + m);
     for (uint32_t g = 0; g < scene->light_group_count; ++g) fct_release(env, scene->light_groups[g]);
     fct_scene_release_textures(scene);
@@ -446,10 +451,12 @@ void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera) {
 
 /* ---- Commit ---- */
 
+/* Of models without a coarse form, if there are coarse forms. */
 static fct_result build_ray_structures(fct_scene *scene) {
     const fct_env *env = scene->env;
     for (uint32_t m = 0; m < scene->model_count; ++m) {
         fct_scene_model *own = scene->own + m;
+        if (own->coarse.tree) continue;
         fct_result result = fct_bvh_create(env, own->tree, scene->backend, &own->bvh);
         if (result == FCT_OK && scene->backend == FCT_BACKEND_EMBREE)
             result = fct_bvh_create(env, own->tree, FCT_BACKEND_OBB, &own->points);
@@ -459,12 +466,17 @@ static fct_result build_ray_structures(fct_scene *scene) {
     return FCT_OK;
 }
 
+/* The tree's bounds hold all vertices, those of a ray structure only vertices of faces. */
+static fct_bounds bound_model(const fct_scene_model *own) {
+    return own->bvh ? fct_bvh_bounds(own->bvh) : fct_tree_get(own->tree).bounds;
+}
+
 /* Chooses the scene's origin and makes transforms and camera relative to it. */
 static fct_result move_to_origin(fct_scene *scene) {
     double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         const float *m = scene->instances[i].to_world;
-        fct_bounds b = fct_bvh_bounds(scene->own[scene->instances[i].model].bvh);
+        fct_bounds b = bound_model(&scene->own[scene->instances[i].model]);
         for (int c = 0; c < 3; ++c) {
             double middle = scene->frames[i].at[c], half = 0;
             for (int k = 0; k < 3; ++k) {
@@ -494,7 +506,7 @@ static fct_result bound_instances(fct_scene *scene, fct_bounds *bounds) {
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         fct_instance *instance = scene->instances + i;
         const fct_scene_model *own = scene->own + instance->model;
-        fct_bounds model = fct_bvh_bounds(own->bvh);
+        fct_bounds model = bound_model(own);
         fct_result result =
             fct_transform_bounds(scene->env, own->tree, &model, instance->to_world, &instance->bounds);
         if (result != FCT_OK) return result;
@@ -546,6 +558,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
     const fct_env *env = scene->env;
     if (scene->instance_count == 0) return fct_fail(env, FCT_ERROR_DATA, "the scene has no instances");
     fct_result result = check_light_groups(scene);
+    if (result == FCT_OK && scene->backend == FCT_BACKEND_MULTIRES) result = fct_scene_coarsen_models(scene);
     if (result == FCT_OK) result = build_ray_structures(scene);
     if (result == FCT_OK) result = move_to_origin(scene);
     if (result != FCT_OK) return result;
@@ -566,7 +579,7 @@ fct_result fct_scene_commit(fct_scene *scene) {
     scene->bounds = scene->volumes[0].bounds;
     if (!scene->camera.given) set_default_camera(scene);
     scene->committed = true;
-    return FCT_OK;
+    return fct_scene_share_coarse(scene);
 }
 
 fct_scene_view fct_scene_get(const fct_scene *scene) {

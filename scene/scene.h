@@ -2,6 +2,7 @@
 #ifndef FCT_SCENE_SCENE_H
 #define FCT_SCENE_SCENE_H
 
+#include "cluster/tree/coarse.h"
 #include "scene/texture/image.h"
 #include "scene/volume.h"
 
@@ -26,7 +27,9 @@ typedef struct fct_scene_frame {
 typedef struct fct_scene_model {
     fct_tree *tree;
     fct_bvh *bvh;
-    fct_bvh *points; /* answers closest points if bvh cannot (Embree), else NULL */
+    fct_bvh *points;   /* answers closest points if bvh cannot (Embree), else NULL */
+    fct_coarse coarse; /* of a large model in a scene of several resolutions; its tree is NULL otherwise */
+    fct_bvh *coarse_bvh;
     uint32_t *source_faces, *source_vertices, *loose_vertices;
     float *loose_positions, *texcoords, *normals;
     double origin[3];      /* the tree's positions are relative to it */
@@ -75,6 +78,11 @@ struct fct_scene {
     fct_camera camera;
     uint64_t face_count;
     double origin[3];
+
+    struct fct_scene *coarse; /* this scene with the coarse forms of its models, whose other arrays it shares;
+                                 NULL if no model has one */
+    bool is_coarse;
+    uint32_t patches; /* of all coarse forms together, about */
 };
 
 /* The texture of that name, or FCT_NONE. */

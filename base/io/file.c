@@ -83,7 +83,7 @@ void fct_file_close(const fct_env *env, fct_file *file) {
 
 void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use) {
     if (!file->mapped || file->data == empty || !size) return;
-    static const int advices[] = {MADV_RANDOM, MADV_SEQUENTIAL, MADV_NORMAL};
+    static const int advices[] = {MADV_RANDOM, MADV_SEQUENTIAL, MADV_NORMAL, MADV_DONTNEED};
     uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), begin = offset / page * page;
     (void)!madvise((char *)file->data + begin, offset + size - begin, advices[use]);
 }

@@ -19,9 +19,10 @@ const char *fct_file_format(const fct_env *env, const char *path);
 /* Closes and zeroes; a zero struct is allowed. */
 void fct_file_close(const fct_env *env, fct_file *file);
 
-/* A hint how the program will read a part of a mapped file: few pages, everything in order, or unknown.
- * Reading a whole file from the disk with SPARSE takes 20 times as long as with WHOLE. */
-typedef enum fct_file_use { FCT_FILE_SPARSE, FCT_FILE_WHOLE, FCT_FILE_USUAL } fct_file_use;
+/* A hint how the program will read a part of a mapped file: few pages, everything in order, or unknown; or
+ * that it will not read it soon, so that its pages leave the process. Reading a whole file from the disk with
+ * SPARSE takes 20 times as long as with WHOLE. */
+typedef enum fct_file_use { FCT_FILE_SPARSE, FCT_FILE_WHOLE, FCT_FILE_USUAL, FCT_FILE_UNUSED } fct_file_use;
 void fct_file_advise(const fct_file *file, uint64_t offset, uint64_t size, fct_file_use use);
 
 #endif

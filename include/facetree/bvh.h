@@ -19,8 +19,10 @@ extern "C" {
 
 typedef struct fct_bvh fct_bvh;
 
-/* OBB is our own structure, which answers all queries. EMBREE answers ray queries alone. */
-typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE } fct_backend;
+/* OBB is our own structure, which answers all queries. EMBREE answers ray queries alone. MULTIRES is for
+ * scenes (scene.h): OBB, and coarse forms of large models for the solution of radiosity; for a single model
+ * it is OBB. */
+typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULTIRES } fct_backend;
 
 /* The tree must outlive the bvh. Errors: DATA (a damaged hierarchy file), MEMORY, CANCELLED, INTERNAL
  * (Embree). */

@@ -162,6 +162,12 @@ FCT_API void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera);
  * CANCELLED, INTERNAL. */
 FCT_API fct_result fct_scene_commit(fct_scene *scene);
 
+/* In a scene of FCT_BACKEND_MULTIRES, large models have no ray structure after fct_scene_commit: a bake needs
+ * none until its output. Builds them; the scene then answers queries like any other. Does nothing if they
+ * exist. No other function may use the scene meanwhile. Errors: DATA (a damaged hierarchy file), MEMORY,
+ * CANCELLED. */
+FCT_API fct_result fct_scene_complete(const fct_scene *scene);
+
 /* Makes every material that emits no light reflect on both sides. Allowed before and after
  * fct_scene_commit, but not while a bake of the scene exists. */
 FCT_API void fct_scene_make_two_sided(fct_scene *scene);

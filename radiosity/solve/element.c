@@ -10,6 +10,7 @@
 
 #include "base/math/barycentric.h"
 #include "cluster/tree/node.h"
+#include "scene/coarse.h"
 #include "scene/transform.h"
 
 enum { PAGE = 4096 };
@@ -23,6 +24,7 @@ static v3 area_to_world(const fct_instance *in, v3 s) {
 /* Marks the pages of a model's hierarchy that hold bytes [begin, begin + size) of section 0 (nodes),
  * 1 (triangles) or 2 (positions). */
 static void mark_pages(const fct_elements *set, uint32_t model, int section, size_t begin, size_t size) {
+    if (set->solved || fct_scene_coarse_model(set->scene, model)) return;
     const fct_tree_view t = fct_tree_get(set->view.models[model].tree);
     size_t base = 0;
     if (section > 0) base += (size_t)t.node_count * sizeof(fct_cluster) / PAGE + 1;
@@ -36,7 +38,11 @@ uint64_t fct_elements_touched(const fct_elements *set) {
     for (uint32_t m = 0; m < set->view.model_count; ++m)
         for (size_t i = 0; i < set->touched_sizes[m]; ++i)
             pages += atomic_load_explicit(&set->touched[m][i], memory_order_relaxed);
-    return pages * PAGE;
+    return pages * PAGE + set->touched_before;
+}
+
+static const fct_coarse *coarse_form(const fct_elements *set, uint32_t instance) {
+    return fct_scene_coarse_model(set->scene, set->view.instances[instance].model);
 }
 
 /* World-space corners of the face at `place`. */
@@ -120,9 +126,15 @@ static fct_result reserve_elements(fct_elements *set, size_t more) {
     if (r == FCT_OK)
         r = fct_grow(set->env, (void **)&set->ranges, &set->range_capacity, set->count + more,
                      sizeof *set->ranges);
-    if (r == FCT_OK)
-        r = fct_grow(set->env, (void **)&set->points, &set->point_capacity,
-                     (set->count + more) * FCT_ELEMENT_POINTS, sizeof *set->points);
+    while (r == FCT_OK && set->block_count * FCT_POINT_BLOCK < set->count + more) {
+        r = fct_grow(set->env, (void **)&set->points, &set->block_capacity, set->block_count + 1,
+                     sizeof *set->points);
+        if (r != FCT_OK) break;
+        fct_element_point *block =
+            fct_allocate(set->env, FCT_POINT_BLOCK * FCT_ELEMENT_POINTS, sizeof *block);
+        if (!block) return fct_fail_memory(set->env, "the elements");
+        set->points[set->block_count++] = block;
+    }
     return r;
 }
 
@@ -190,7 +202,10 @@ static void copy_light_to_children(fct_elements *set, uint32_t id) {
 bool fct_elements_can_split(const fct_elements *set, uint32_t id) {
     const fct_element *e = &set->items[id];
     if (e->child_count) return false;
-    if (e->kind == FCT_ELEMENT_CLUSTER) return true;
+    if (e->kind == FCT_ELEMENT_CLUSTER) {
+        const fct_coarse *coarse = coarse_form(set, e->instance);
+        return !coarse || e->node < coarse->top_count;
+    }
     if (e->kind == FCT_ELEMENT_VOLUME) return false;
     v3 p[3];
     load_corners(set, e->triangle, p);
@@ -295,6 +310,8 @@ fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, doubl
     if (!set->roots || !set->root_counts || !set->touched || !set->touched_sizes) goto done;
     for (uint32_t m = 0; m < view->model_count; ++m) {
         fct_tree_view t = fct_tree_get(view->models[m].tree);
+        const fct_coarse *coarse = fct_scene_coarse_model(scene, m);
+        if (coarse) set->touched_before += coarse->touched_bytes;
         size_t pages = (size_t)t.node_count * sizeof(fct_cluster) / PAGE + (size_t)t.face_count * 12 / PAGE +
                        (size_t)t.vertex_count * 12 / PAGE + 6;
         set->touched[m] = fct_allocate_zero(env, pages, 1);
@@ -335,6 +352,7 @@ void fct_elements_release(fct_elements *set) {
     fct_paints_release(&set->paints);
     for (uint32_t m = 0; set->touched && m < set->view.model_count; ++m)
         fct_release(set->env, set->touched[m]);
+    for (size_t b = 0; b < set->block_count; ++b) fct_release(set->env, set->points[b]);
     void *owned[] = {set->items, set->ranges,      set->points,  set->corners,
                      set->roots, set->root_counts, set->touched, set->touched_sizes};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; ++i) fct_release(set->env, owned[i]);
@@ -361,6 +379,16 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
     return node - view.node_count;
 }
 
+/* Shrinks a triangle of a patch toward the middle of the rectangle, to the area of the cluster's outline:
+ * points near the rim of the rectangle lie beside the surface. */
+static void shrink_to_outline(const fct_coarse *coarse, uint32_t place, v3 p[3]) {
+    const uint32_t patch = coarse->patches[place];
+    const bool second = place > 0 && coarse->patches[place - 1] == patch;
+    const double s = sqrt((double)coarse->fill[patch]);
+    const v3 middle = v3_scale(v3_add(p[0], p[second ? 1 : 2]), .5);
+    for (int k = 0; k < 3; ++k) p[k] = v3_mad(v3_scale(p[k], s), 1 - s, middle);
+}
+
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out) {
     const fct_element *e = &set->items[id];
@@ -383,13 +411,19 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         out->place = find_face_by_area(set, in, e->node, &t);
         load_face(set, in, out->place, p);
     }
+    const fct_coarse *coarse = coarse_form(set, e->instance);
+    double height = 0;
+    if (coarse) {
+        shrink_to_outline(coarse, out->place, p);
+        height = in->uniform_scale * coarse->height[coarse->patches[out->place]];
+    }
     double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
     v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
     v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
-    out->u = (float)u, out->v = (float)v;
-    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger. */
+    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger; above the relief of
+     * a patch. */
     double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
-    out->offset = (float)(1e-4 * size + 2e-7 * reach);
+    out->offset = (float)(1e-4 * size + 2e-7 * reach + height);
     v3_store(out->position, x);
     v3_store(out->normal, v3_unit(s));
 }
@@ -401,8 +435,9 @@ static void choose_points_chunk(void *user, size_t begin, size_t end, size_t chu
         for (int k = 0; k < FCT_ELEMENT_POINTS; ++k) {
             double r[3];
             for (int d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(i, (uint64_t)k, (uint64_t)d));
-            fct_element_sample(set, (uint32_t)i, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2],
-                               &set->points[i * FCT_ELEMENT_POINTS + (size_t)k]);
+            fct_element_sample(
+                set, (uint32_t)i, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2],
+                &set->points[i / FCT_POINT_BLOCK][i % FCT_POINT_BLOCK * FCT_ELEMENT_POINTS + (size_t)k]);
         }
 }
 
@@ -457,6 +492,23 @@ uint32_t fct_elements_locate_point(const fct_elements *set, uint32_t instance, b
     double uv[2];
     fct_barycentrics(p, point, uv);
     return fct_elements_locate(set, instance, back, place, (float)uv[0], (float)uv[1]);
+}
+
+void fct_elements_refer(fct_elements *set, const fct_scene *scene) {
+    const fct_scene *from = set->scene;
+    set->scene = scene, set->view = fct_scene_get(scene), set->solved = true;
+    if (from == scene) return;
+    for (size_t i = 0; i < set->count; ++i) {
+        fct_element *e = &set->items[i];
+        if (e->kind == FCT_ELEMENT_VOLUME) continue;
+        const uint32_t model = set->view.instances[e->instance].model;
+        const fct_coarse *coarse = fct_scene_coarse_model(from, model);
+        if (!coarse) continue;
+        const fct_tree *tree = set->view.models[model].tree;
+        e->node = fct_coarse_origin(coarse, e->node);
+        set->ranges[i].first = fct_node_first(tree, e->node);
+        set->ranges[i].count = fct_node_faces(tree, e->node);
+    }
 }
 
 void fct_elements_pull(fct_elements *set) {

@@ -20,7 +20,7 @@
 #include "radiosity/sample.h"
 #include "radiosity/solve/paint.h"
 
-enum { FCT_ELEMENT_POINTS = 16 };
+enum { FCT_ELEMENT_POINTS = 16, FCT_POINT_BLOCK = 256 };
 /* Angle of a cone that no longer bounds the side that an element shows: a right angle. */
 #define FCT_ELEMENT_OPEN_CONE 1.5707963267948966
 
@@ -51,7 +51,6 @@ typedef struct fct_element {
 typedef struct fct_element_point {
     float position[3], normal[3];
     float offset;   /* rays start at position + offset * normal */
-    float u, v;     /* barycentrics of the second and third corner */
     uint32_t place; /* of the face in the tree's order */
 } fct_element_point;
 
@@ -68,8 +67,11 @@ typedef struct fct_elements {
     fct_scene_view view;
     fct_element *items;
     fct_element_range *ranges;
-    fct_element_point *points; /* FCT_ELEMENT_POINTS per element */
-    size_t count, capacity, range_capacity, point_capacity;
+    /* FCT_ELEMENT_POINTS per element, in blocks of FCT_POINT_BLOCK elements: they are most of the memory, and
+     * a growing array would hold up to three times as many for a moment. */
+    fct_element_point **points;
+    size_t count, capacity, range_capacity;
+    size_t block_count, block_capacity;
     size_t pointed; /* elements that have their points */
     float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
@@ -79,12 +81,19 @@ typedef struct fct_elements {
     double min_edge;        /* a triangle whose longest edge is at most this is not quartered */
     atomic_uchar **touched; /* per model and page of 4 KiB of its hierarchy: 1 after a read */
     size_t *touched_sizes;
+    uint64_t touched_before; /* bytes that the coarse forms of models took from files */
+    bool solved;             /* reads no longer count */
 } fct_elements;
 
-/* Creates the volumes and the instances' roots. Errors: MEMORY. */
+/* Creates the volumes and the instances' roots. The scene may be coarse (scene/coarse.h). Errors: MEMORY. */
 fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, double min_edge,
                                fct_elements *out);
 void fct_elements_release(fct_elements *set);
+
+/* The points of an element that has them. */
+static inline const fct_element_point *fct_element_points(const fct_elements *set, size_t id) {
+    return set->points[id / FCT_POINT_BLOCK] + id % FCT_POINT_BLOCK * FCT_ELEMENT_POINTS;
+}
 
 static inline bool fct_element_is_leaf(const fct_element *e) {
     return e->child_count == 0;
@@ -106,6 +115,9 @@ uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool ba
 /* The same for the projection of a world point onto the face, which has an area. */
 uint32_t fct_elements_locate_point(const fct_elements *set, uint32_t instance, bool back, uint32_t place,
                                    v3 point);
+/* Ends the solution. Makes the elements of a coarse scene refer to the nodes and places of `scene`, which it
+ * belongs to, and which is complete. Elements cannot be split any more. */
+void fct_elements_refer(fct_elements *set, const fct_scene *scene);
 /* Sets radiosity and power of all inner elements from their leaves. */
 void fct_elements_pull(fct_elements *set);
 /* Size of the hierarchies' pages that were read so far, bytes. */

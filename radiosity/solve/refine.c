@@ -54,8 +54,8 @@ static bool points_see_each_other(const fct_elements *set, const fct_element_poi
  * rays: point pairs that face away send none. */
 static uint32_t send_pair_rays(const fct_elements *set, const fct_link *link, uint32_t from, uint32_t to,
                                double *clear, double *seen) {
-    const fct_element_point *ps = set->points + (size_t)link->receiver * FCT_ELEMENT_POINTS;
-    const fct_element_point *qs = set->points + (size_t)link->source * FCT_ELEMENT_POINTS;
+    const fct_element_point *ps = fct_element_points(set, link->receiver);
+    const fct_element_point *qs = fct_element_points(set, link->source);
     double floor2 = set->items[link->source].area / FCT_ELEMENT_POINTS;
     uint32_t turn = (uint32_t)fct_hash2(link->receiver, link->source), rays = 0;
     for (uint32_t k = from; k < to; ++k) {

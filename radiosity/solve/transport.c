@@ -5,6 +5,7 @@
 
 #include "radiosity/solve/iterate.h"
 #include "radiosity/solve/oracle.h"
+#include "scene/coarse.h"
 #include "scene/rays.h"
 
 /* Points per leaf for direct light, shadow rays per point and lamp, and points that test for coincident
@@ -35,7 +36,10 @@ fct_found fct_transport_look(const fct_elements *set, const float *stored, const
     if (!fct_scene_light_hit(set->scene, &ray, &hit, NULL))
         return (fct_found){.radiosity = black, .leaf = FCT_NONE, .distance = INFINITY};
     double cosine = v3_dot(v3_load(direction), v3_load(hit.normal));
-    uint32_t leaf = fct_elements_locate(set, hit.instance, cosine > 0, hit.place, hit.u, hit.v);
+    const fct_coarse *coarse = fct_scene_coarse_model(set->scene, set->view.instances[hit.instance].model);
+    /* The back of a patch of a closed surface: the ray has passed between patches that do not meet. */
+    const bool back = cosine > 0 && !(coarse && coarse->closed);
+    uint32_t leaf = fct_elements_locate(set, hit.instance, back, hit.place, hit.u, hit.v);
     if (leaf == FCT_NONE)
         return (fct_found){.radiosity = black, .leaf = FCT_NONE, .distance = hit.t, .black = true};
     return (fct_found){stored + 3 * (size_t)leaf, leaf, hit.t, fabs(cosine), false};
@@ -61,7 +65,7 @@ typedef struct gathering {
  * alike than its surface. */
 static void sample_direct(const gathering *g, uint32_t id, uint64_t fresh, double irradiance[][3],
                           uint64_t *rays) {
-    const fct_element_point *points = g->set->points + (size_t)id * FCT_ELEMENT_POINTS;
+    const fct_element_point *points = fct_element_points(g->set, id);
     const size_t stride = FCT_ELEMENT_POINTS / DIRECT_POINTS;
     for (int k = 0; k < DIRECT_POINTS; ++k) {
         const fct_element_point *p =
@@ -96,8 +100,10 @@ static void direct_chunk(void *user, size_t begin, size_t end, size_t chunk, uin
     g->chunk_rays[chunk] += rays;
 }
 
-/* True unless a ray straight down onto the point hits another face, which then coincides with the point's. */
+/* True unless a ray straight down onto the point hits another face, which then coincides with the point's. A
+ * patch overlaps its neighbours. */
 static bool is_bare(const fct_elements *set, uint32_t instance, const fct_element_point *p) {
+    if (fct_scene_coarse_model(set->scene, set->view.instances[instance].model)) return true;
     fct_ray ray = {.t_min = 0, .t_max = 2};
     fct_scene_hit hit;
     for (int c = 0; c < 3; ++c) {
@@ -116,8 +122,7 @@ static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32
         uint64_t seed = fct_hash2(g->seed ^ 0x6761746865720001u, id);
         uint32_t instance = g->set->items[id].instance, bare = 0;
         for (int k = 0; k < BARE_POINTS; ++k)
-            bare +=
-                is_bare(g->set, instance, &g->set->points[(size_t)id * FCT_ELEMENT_POINTS + 4 * (size_t)k]);
+            bare += is_bare(g->set, instance, fct_element_points(g->set, id) + 4 * k);
         g->bare[l] = (float)bare / BARE_POINTS;
         for (uint32_t k = 0; k < g->rays; ++k) {
             double plane[2], place[2];

@@ -130,6 +130,18 @@ static fct_result commit_embree(const fct_env *env) {
     return commit_with(env, FCT_BACKEND_EMBREE);
 }
 
+static fct_result commit_multires(const fct_env *env) {
+    return commit_with(env, FCT_BACKEND_MULTIRES);
+}
+
+static fct_result complete_scene(const fct_env *env) {
+    fct_scene *scene;
+    assert_int_equal(fct_scene_load(env, IN "lit.json", FCT_BACKEND_MULTIRES, &scene), FCT_OK);
+    fct_result result = STARVE(fct_scene_complete(scene));
+    fct_scene_destroy(scene);
+    return result;
+}
+
 static fct_result load_scene(const fct_env *env, const char *path) {
     fct_scene *scene;
     fct_result result = STARVE(fct_scene_load(env, path, FCT_BACKEND_OBB, &scene));
@@ -326,6 +338,8 @@ const memory_call scene_calls[] = {{"fct_scene_create", "", create_scene, false}
                                    {"fct_scene_add_light_group", "", add_groups, false},
                                    {"fct_scene_commit", "obb", commit, false},
                                    {"fct_scene_commit", "embree", commit_embree, true},
+                                   {"fct_scene_commit", "multires", commit_multires, false},
+                                   {"fct_scene_complete", "", complete_scene, false},
                                    {"fct_scene_load", "json", load_json, false},
                                    {"fct_scene_load", "obj", load_obj, false},
                                    {"fct_scene_load", "gltf", load_gltf, false},

@@ -29,6 +29,7 @@ typedef struct bake_options {
     bool two_sided, merge, no_textures;
     int quality; /* of qualities */
     bool error_given, final_given;
+    uint64_t solve_peak; /* peak memory before the output */
     bake_target target;
 } bake_options;
 
@@ -73,7 +74,11 @@ static const struct argp_option bake_options_table[] = {
      0},
     {"samples", KEY_SAMPLES, "N", 0,
      "reference: paths per vertex (default 256); face: gather rays per anchor (default: from --error)", 0},
-    {"visibility", KEY_VISIBILITY, "NAME", 0, "Backend for rays: obb (default) or embree", 0},
+    {"visibility", KEY_VISIBILITY, "NAME", 0,
+     "Rays: obb (default) or embree. multires: obb, and the solution replaces each model of many faces by a "
+     "few "
+     "thousand flat patches of its hierarchy, so its memory does not grow with the models",
+     0},
     {"backend", KEY_VISIBILITY, NULL, OPTION_ALIAS, NULL, 0},
     {"indirect-only", KEY_INDIRECT, NULL, 0, "Leave out emission and direct light", 0},
     {"final", KEY_FINAL, "HOW", 0,
@@ -124,6 +129,8 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const char *const names[] = {"draft", "normal", "fine", NULL};
     static const char *const keeps[] = {"corner", "vertex", "face", NULL};
     static const fct_keep keep_values[] = {FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE};
+    static const char *const backends[] = {"obb", "embree", "multires", NULL};
+    static const fct_backend backend_values[] = {FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULTIRES};
     bake_options *o = state->input;
     int index = 0;
     double exposure = 1;
@@ -161,7 +168,9 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_SAMPLES:
         return tool_parse_count32(state, "--samples", text, 1, 100000000, &o->def.samples);
     case KEY_VISIBILITY:
-        return tool_parse_backend(state, "--visibility", text, &o->backend);
+        error = tool_parse_choice(state, "--visibility", text, backends, &index);
+        o->backend = backend_values[index];
+        return error;
     case KEY_INDIRECT:
         o->def.indirect_only = true;
         return 0;
@@ -255,6 +264,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
         s->error_estimate);
     if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (object) json_object_set_new(object, "textures", json_integer(textures));
+    if (object) json_object_set_new(object, "solve_peak_bytes", json_integer((json_int_t)o->solve_peak));
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
     if (object) json_object_set_new(object, "check_rays", json_integer((json_int_t)s->check_rays));
     if (answers->objects && object) json_object_set(object, "objects", answers->objects);
@@ -292,10 +302,11 @@ static void warn_sides(tool *t, const fct_bake_stats *s) {
 }
 
 /* One bake. *bake: the caller destroys it, also after a failure. */
-static int bake_once(tool *t, const bake_options *o, const fct_scene *scene, bake_objects *objects,
-                     fct_bake **bake, json_t **files) {
+static int bake_once(tool *t, bake_options *o, const fct_scene *scene, bake_objects *objects, fct_bake **bake,
+                     json_t **files) {
     const fct_scene_view view = fct_scene_get(scene);
     int code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, bake));
+    o->solve_peak = tool_peak_bytes();
     if (code != TOOL_DONE || !t->output) return code;
     if (!is_folder_output(t->output)) return write_file(t, o, *bake);
     json_decref(*files);

@@ -167,7 +167,7 @@ static void samples_follow_the_area(void **state) {
             assert_near(v3_norm(v3_load(p.normal)), 1, 1e-5);
             assert_true(p.offset > 0 && p.offset < .01);
             if (e->kind == FCT_ELEMENT_VOLUME || k % 16) continue;
-            uint32_t leaf = fct_elements_locate(&set, e->instance, e->back, p.place, p.u, p.v);
+            uint32_t leaf = fct_elements_locate_point(&set, e->instance, e->back, p.place, v3_load(p.position));
             uint32_t up = leaf;
             /* (u, v) of a quarter are its own: only whole triangles are located */
             if (e->kind == FCT_ELEMENT_TRIANGLE && set.items[e->parent].kind == FCT_ELEMENT_TRIANGLE)
@@ -227,7 +227,7 @@ static void points_are_stratified(void **state) {
     uint32_t root = set.roots[4];
     int first = 0;
     for (int k = 0; k < FCT_ELEMENT_POINTS; ++k)
-        first += set.points[root * FCT_ELEMENT_POINTS + (uint32_t)k].place == 0;
+        first += fct_element_points(&set, root)[k].place == 0;
     assert_int_equal(first, 8);
     fct_elements_release(&set);
     fct_scene_destroy(scene);
@@ -328,7 +328,6 @@ static bool find_sample(const fct_elements *set, uint32_t id, double t, double a
     v3 first = v3_sub(p[turn ? 2 : 1], p[0]), second = v3_sub(p[turn ? 1 : 2], p[0]);
     v3 x = v3_mad(v3_mad(p[0], u, first), v, second), s = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
     v3_store(out->position, x), v3_store(out->normal, v3_unit(s));
-    out->u = (float)u, out->v = (float)v;
     out->offset = (float)(1e-4 * sqrt(v3_norm(s)) + 2e-7 * fmax(fabs(x.x), fmax(fabs(x.y), fabs(x.z))));
     return true;
 }
@@ -348,7 +347,6 @@ static void samples_equal_the_face_at_their_fraction(void **state) {
             assert_int_equal(p.place, q.place);
             assert_same(v3_load(p.position), v3_load(q.position), 2e-6 * (1 + v3_norm(v3_load(q.position))));
             assert_same(v3_load(p.normal), v3_load(q.normal), 1e-4);
-            assert_near(p.u, q.u, 1e-6), assert_near(p.v, q.v, 1e-6);
             assert_near(p.offset, q.offset, 1e-4 * q.offset);
             ++tested;
         }
@@ -357,7 +355,7 @@ static void samples_equal_the_face_at_their_fraction(void **state) {
     fct_elements_make_points(&set);
     for (uint32_t id = 0; id < set.count; id += 3)
         for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
-            const fct_element_point *p = &set.points[id * FCT_ELEMENT_POINTS + k];
+            const fct_element_point *p = fct_element_points(&set, id) + k;
             uint32_t last = 0, first = FCT_NONE;
             for (int i = 0; i <= 40; ++i) {
                 fct_element_point q;
