@@ -28,7 +28,8 @@ static void mark_pages(const fct_elements *set, uint32_t model, int section, siz
     if (section > 0) base += (size_t)t.node_count * sizeof(fct_cluster) / PAGE + 1;
     if (section > 1) base += (size_t)t.face_count * 12 / PAGE + 1;
     for (size_t page = base + begin / PAGE; page <= base + (begin + size - 1) / PAGE; ++page)
-        atomic_store_explicit(&set->touched[model][page], 1, memory_order_relaxed);
+        if (!atomic_load_explicit(&set->touched[model][page], memory_order_relaxed)) /* keeps lines shared */
+            atomic_store_explicit(&set->touched[model][page], 1, memory_order_relaxed);
 }
 
 uint64_t fct_elements_touched(const fct_elements *set) {
@@ -120,9 +121,6 @@ static fct_result reserve_elements(fct_elements *set, size_t more) {
     if (r == FCT_OK)
         r = fct_grow(set->env, (void **)&set->ranges, &set->range_capacity, set->count + more,
                      sizeof *set->ranges);
-    if (r == FCT_OK)
-        r = fct_grow(set->env, (void **)&set->points, &set->point_capacity,
-                     (set->count + more) * FCT_ELEMENT_POINTS, sizeof *set->points);
     return r;
 }
 
@@ -335,8 +333,8 @@ void fct_elements_release(fct_elements *set) {
     fct_paints_release(&set->paints);
     for (uint32_t m = 0; set->touched && m < set->view.model_count; ++m)
         fct_release(set->env, set->touched[m]);
-    void *owned[] = {set->items, set->ranges,      set->points,  set->corners,
-                     set->roots, set->root_counts, set->touched, set->touched_sizes};
+    void *owned[] = {set->items,       set->ranges,  set->corners,      set->roots,
+                     set->root_counts, set->touched, set->touched_sizes};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; ++i) fct_release(set->env, owned[i]);
     *set = (fct_elements){0};
 }
@@ -394,21 +392,21 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
     v3_store(out->normal, v3_unit(s));
 }
 
-static void choose_points_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    fct_elements *set = user;
-    (void)chunk, (void)thread;
-    for (size_t i = set->pointed + begin; i < set->pointed + end; ++i)
-        for (int k = 0; k < FCT_ELEMENT_POINTS; ++k) {
-            double r[3];
-            for (int d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(i, (uint64_t)k, (uint64_t)d));
-            fct_element_sample(set, (uint32_t)i, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2],
-                               &set->points[i * FCT_ELEMENT_POINTS + (size_t)k]);
-        }
+void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out) {
+    double r[3];
+    for (uint64_t d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(id, k, d));
+    fct_element_sample(set, id, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2], out);
 }
 
-void fct_elements_make_points(fct_elements *set) {
-    fct_parallel_for(set->env, set->count - set->pointed, 64, choose_points_chunk, set);
-    set->pointed = set->count;
+void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count) {
+    set->count = count;
+    set->corner_count = corner_count;
+    for (size_t id = 0; id < count; ++id) {
+        fct_element *e = &set->items[id];
+        if (e->child_count == 0 || e->child < count) continue;
+        e->child = e->child_count = 0;
+        set->ranges[id].child = set->ranges[id].child_count = 0;
+    }
 }
 
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,

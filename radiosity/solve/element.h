@@ -68,9 +68,7 @@ typedef struct fct_elements {
     fct_scene_view view;
     fct_element *items;
     fct_element_range *ranges;
-    fct_element_point *points; /* FCT_ELEMENT_POINTS per element */
-    size_t count, capacity, range_capacity, point_capacity;
-    size_t pointed; /* elements that have their points */
+    size_t count, capacity, range_capacity;
     float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
     fct_paints paints;
@@ -93,12 +91,16 @@ static inline bool fct_element_is_leaf(const fct_element *e) {
 bool fct_elements_can_split(const fct_elements *set, uint32_t id);
 /* Adds the children of a leaf that can be split. They start with its light. Errors: MEMORY. */
 fct_result fct_elements_split(fct_elements *set, uint32_t id);
-/* Chooses the points of all elements that have none: point k lies in the k-th sixteenth of the area. */
-void fct_elements_make_points(fct_elements *set);
 /* The point at fraction t in [0, 1) of the area. (a, b) in [0, 1)^2 chooses the point of the triangle found
  * there, uniformly. Stratified t gives points that are stratified over the surface. */
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out);
+/* Point k < FCT_ELEMENT_POINTS of an element: it lies in the k-th sixteenth of the area, and is the same in
+ * each call. Points are not stored, because they would take two thirds of the memory of the elements. */
+void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out);
+/* Removes the elements from number `count` on, and the corners from `corner_count` on: the elements whose
+ * children are among them are leaves again. Both numbers are those of an earlier moment. */
+void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count);
 /* The leaf that contains barycentrics (u, v) of the face at `place`; FCT_NONE on the back of a one-sided
  * material. */
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,
