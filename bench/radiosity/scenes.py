@@ -150,7 +150,73 @@ def make_classroom(s):
     s.save([8.6, 2.3, 10.6], [3.5, .6, 3.5])
 
 
+def add_boxes(s, name, boxes, material, whole):
+    """Boxes as one object each, or as one mesh."""
+    if whole:
+        s.add(name, s.obj(name, boxes), material)
+    else:
+        for i, (center, half) in enumerate(boxes):
+            s.add(f"{name} {i}", s.cube(), material, center, half)
+
+
+def make_school(s, whole=False):
+    """A classroom of 840 boxes (10,080 triangles): thirty desks and chairs of their parts, books, and shelves."""
+    s.room(11, 3.2, 13)
+    pick, woods, chairs, books = random.Random(3), [], [], []
+    for i in range(30):
+        x, z = 1.4 + 1.9 * (i % 5), 2.2 + 1.75 * (i // 5)
+        woods += [((x, .72, z), (.6, .02, .3)), ((x, .5, z - .27), (.55, .12, .01))]
+        woods += [((x + a, .35, z + b), (.02, .35, .02)) for a in (-.55, .55) for b in (-.25, .25)]
+        books += [((x + .22 * k - .45, .755, z + pick.uniform(-.12, .12)), (.08, .015, .11)) for k in range(5)]
+        chairs += [((x, .44, z + .55), (.2, .015, .2)), ((x, .8, z + .74), (.2, .12, .012))]
+        chairs += [((x + a, .22, z + .55 + b), (.015, .22, .015)) for a in (-.18, .18) for b in (-.18, .18)]
+        chairs += [((x + a, .62, z + .74), (.015, .2, .012)) for a in (-.18, .18)]
+    for row in range(4):
+        woods.append(((10.8, .4 + .5 * row, 6), (.18, .015, 3)))
+        books += [((10.8, .54 + .5 * row, 3.2 + .11 * k), (.1, pick.uniform(.09, .12), .04)) for k in range(65)]
+    while len(woods) + len(chairs) + len(books) < 840:
+        books.append(((pick.uniform(1, 10), .03, pick.uniform(1, 12)), (.08, .015, .11)))
+    for name, boxes, material in (("desk", woods, "wood"), ("chair", chairs, "blue"), ("book", books, "red")):
+        add_boxes(s, name, boxes, material, whole)
+    for i in range(6):
+        s.panel(f"lamp {i}", [11, 11, 10.5], (3 + 5 * (i % 2), 3.15, 2 + 4.2 * (i // 2)), (.6, .12))
+    s.save([10.6, 2.3, 12.6], [3.5, .6, 3.5])
+
+
+def make_boxes(s):
+    """10,000 boxes of many sizes on the floor of a hall."""
+    s.room(40, 8, 40)
+    pick = random.Random(7)
+    for i in range(10000):
+        half = [pick.uniform(.04, .15) for _ in range(3)]
+        place = (.4 + .395 * (i % 100), half[1], .4 + .395 * (i // 100))
+        s.add(f"box {i}", s.cube(), ("wood", "red", "blue", "white")[pick.randrange(4)], place, half, pick.uniform(0, 90))
+    for i in range(9):
+        s.panel(f"lamp {i}", [16, 15, 13], (7 + 13 * (i % 3), 7.9, 7 + 13 * (i // 3)), (1.5, 1.5))
+    s.save([38, 6, 38], [15, 0, 15])
+
+
+def make_library(s):
+    """50,000 books on sixty shelves."""
+    s.room(42, 5, 30, floor="stone")
+    pick = random.Random(9)
+    for shelf in range(60):
+        x, z = 3.5 + 4 * (shelf % 10), 3 + 4.8 * (shelf // 10)
+        for board in range(8):
+            s.add(f"board {shelf} {board}", s.cube(), "wood", (x, .1 + .38 * board, z), (1.7, .012, .3))
+        for i in range(833 + (shelf < 20)):
+            board, at, side = i % 7, i // 14, i // 7 % 2
+            half = (.024, pick.uniform(.1, .16), .11)
+            place = (x - 1.6 + .054 * at, .112 + .38 * board + half[1], z + (.14 if side else -.14))
+            s.add(f"book {shelf} {i}", s.cube(), ("red", "blue", "white", "grey")[pick.randrange(4)], place, half)
+    for i in range(20):
+        s.panel(f"lamp {i}", [14, 13.5, 12], (4.2 + 8.4 * (i % 5), 4.95, 4 + 7.3 * (i // 5)), (1.2, .2))
+    s.save([41, 3.5, 29], [15, 1, 10])
+
+
 MAKERS = {"hall": make_hall, "lamps": make_lamps, "courtyard": make_courtyard, "classroom": make_classroom}
+DENSE = {  # scenes of many small parts, which are made on request
+    "school": make_school, "school-mesh": lambda s: make_school(s, True), "boxes": make_boxes, "library": make_library}
 MADE = {"museum": 30000, "cornell": 1000}  # by the program alone: triangles
 
 
@@ -163,7 +229,7 @@ def make_scene(tool, out, name):
             subprocess.run([tool, "make", name, "-q", "-o", folder, "--triangles", str(MADE[name])], check=True)
         else:
             scene = Scene(tool, folder)
-            MAKERS[name](scene)
+            {**MAKERS, **DENSE}[name](scene)
     return folder
 
 

@@ -14,6 +14,10 @@
 #include "scene/transform.h"
 
 enum { PAGE = 4096 };
+/* Distance of points above their patches, over the height of the patch: neighbouring rectangles, which
+ * overlap at an angle, would hide lower points. With 1, a bumpy body misses 15 % of its direct light; with 2,
+ * 5 %; with 4 and more, nothing. */
+#define PATCH_LIFT 4.F
 
 /* An area vector in world space that still points to the outside of a mirrored model. */
 static v3 area_to_world(const fct_instance *in, v3 s) {
@@ -25,12 +29,13 @@ static v3 area_to_world(const fct_instance *in, v3 s) {
  * 1 (triangles) or 2 (positions). */
 static void mark_pages(const fct_elements *set, uint32_t model, int section, size_t begin, size_t size) {
     if (set->solved || fct_scene_coarse_model(set->scene, model)) return;
-    const fct_tree_view t = fct_tree_get(set->view.models[model].tree);
+    const fct_tree_view *t = &set->view.models[model].tree->view; /* no copy: this runs for each point */
     size_t base = 0;
-    if (section > 0) base += (size_t)t.node_count * sizeof(fct_cluster) / PAGE + 1;
-    if (section > 1) base += (size_t)t.face_count * 12 / PAGE + 1;
+    if (section > 0) base += (size_t)t->node_count * sizeof(fct_cluster) / PAGE + 1;
+    if (section > 1) base += (size_t)t->face_count * 12 / PAGE + 1;
     for (size_t page = base + begin / PAGE; page <= base + (begin + size - 1) / PAGE; ++page)
-        atomic_store_explicit(&set->touched[model][page], 1, memory_order_relaxed);
+        if (!atomic_load_explicit(&set->touched[model][page], memory_order_relaxed)) /* keeps lines shared */
+            atomic_store_explicit(&set->touched[model][page], 1, memory_order_relaxed);
 }
 
 uint64_t fct_elements_touched(const fct_elements *set) {
@@ -47,12 +52,12 @@ static const fct_coarse *coarse_form(const fct_elements *set, uint32_t instance)
 
 /* World-space corners of the face at `place`. */
 static void load_face(const fct_elements *set, const fct_instance *in, uint32_t place, v3 p[3]) {
-    fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
+    const fct_tree_view *t = &set->view.models[in->model].tree->view;
     mark_pages(set, in->model, 1, (size_t)place * 12, 12);
     for (int k = 0; k < 3; ++k) {
-        uint32_t v = t.triangles[3 * (size_t)place + (size_t)k];
+        uint32_t v = t->triangles[3 * (size_t)place + (size_t)k];
         mark_pages(set, in->model, 2, (size_t)v * 12, 12);
-        p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * (size_t)v));
+        p[k] = fct_transform_point(in->to_world, v3_load(t->positions + 3 * (size_t)v));
     }
 }
 
@@ -126,15 +131,9 @@ static fct_result reserve_elements(fct_elements *set, size_t more) {
     if (r == FCT_OK)
         r = fct_grow(set->env, (void **)&set->ranges, &set->range_capacity, set->count + more,
                      sizeof *set->ranges);
-    while (r == FCT_OK && set->block_count * FCT_POINT_BLOCK < set->count + more) {
-        r = fct_grow(set->env, (void **)&set->points, &set->block_capacity, set->block_count + 1,
-                     sizeof *set->points);
-        if (r != FCT_OK) break;
-        fct_element_point *block =
-            fct_allocate(set->env, FCT_POINT_BLOCK * FCT_ELEMENT_POINTS, sizeof *block);
-        if (!block) return fct_fail_memory(set->env, "the elements");
-        set->points[set->block_count++] = block;
-    }
+    if (r == FCT_OK)
+        r = fct_grow(set->env, (void **)&set->places, &set->place_capacity,
+                     (set->count + more) * FCT_ELEMENT_POINTS, sizeof *set->places);
     return r;
 }
 
@@ -352,8 +351,7 @@ void fct_elements_release(fct_elements *set) {
     fct_paints_release(&set->paints);
     for (uint32_t m = 0; set->touched && m < set->view.model_count; ++m)
         fct_release(set->env, set->touched[m]);
-    for (size_t b = 0; b < set->block_count; ++b) fct_release(set->env, set->points[b]);
-    void *owned[] = {set->items, set->ranges,      set->points,  set->corners,
+    void *owned[] = {set->items, set->ranges,      set->places,  set->corners,
                      set->roots, set->root_counts, set->touched, set->touched_sizes};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; ++i) fct_release(set->env, owned[i]);
     *set = (fct_elements){0};
@@ -362,8 +360,8 @@ void fct_elements_release(fct_elements *set) {
 /* Place of the face at fraction *t of the area of a node; *t becomes the fraction within that face. */
 static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *in, uint32_t node, double *t) {
     const fct_tree *tree = set->view.models[in->model].tree;
-    fct_tree_view view = fct_tree_get(tree);
-    while (node < view.node_count) {
+    const uint32_t inner = tree->view.node_count;
+    while (node < inner) {
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         double area[2];
         for (int k = 0; k < 2; ++k) {
@@ -376,7 +374,7 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
         *t = fct_min(fct_max(*t, 0), 1 - 1e-12);
         node = fct_node_child(tree, node, k);
     }
-    return node - view.node_count;
+    return node - inner;
 }
 
 /* Shrinks a triangle of a patch toward the middle of the rectangle, to the area of the cluster's outline:
@@ -387,6 +385,32 @@ static void shrink_to_outline(const fct_coarse *coarse, uint32_t place, v3 p[3])
     const double s = sqrt((double)coarse->fill[patch]);
     const v3 middle = v3_scale(v3_add(p[0], p[second ? 1 : 2]), .5);
     for (int k = 0; k < 3; ++k) p[k] = v3_mad(v3_scale(p[k], s), 1 - s, middle);
+}
+
+/* The point of the face at out->place that (a, b) chooses; of the part of it that a triangle element is. */
+static void find_point(const fct_elements *set, const fct_element *e, double a, double b,
+                       fct_element_point *out) {
+    const fct_instance *in = &set->view.instances[e->instance];
+    const fct_coarse *coarse = coarse_form(set, e->instance);
+    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v, height = 0;
+    v3 p[3];
+    if (e->kind == FCT_ELEMENT_TRIANGLE)
+        load_corners(set, e->triangle, p);
+    else
+        load_face(set, in, out->place, p);
+    if (coarse) {
+        shrink_to_outline(coarse, out->place, p);
+        height = PATCH_LIFT * in->uniform_scale * coarse->height[coarse->patches[out->place]];
+    }
+    double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
+    v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
+    v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
+    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger; above the relief of
+     * a patch. */
+    double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
+    out->offset = (float)(1e-4 * size + 2e-7 * reach + height);
+    v3_store(out->position, x);
+    v3_store(out->normal, v3_unit(s));
 }
 
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
@@ -401,49 +425,54 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         t = area > 0 ? fct_min(fct_max((t * total - before) / area, 0), 1 - 1e-12) : .5;
         e = &set->items[c];
     }
-    const fct_instance *in = &set->view.instances[e->instance];
-    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v;
-    v3 p[3];
-    if (e->kind == FCT_ELEMENT_TRIANGLE) {
-        load_corners(set, e->triangle, p);
-        out->place = set->ranges[e - set->items].first;
-    } else {
-        out->place = find_face_by_area(set, in, e->node, &t);
-        load_face(set, in, out->place, p);
-    }
-    const fct_coarse *coarse = coarse_form(set, e->instance);
-    double height = 0;
-    if (coarse) {
-        shrink_to_outline(coarse, out->place, p);
-        height = in->uniform_scale * coarse->height[coarse->patches[out->place]];
-    }
-    double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
-    v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
-    v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
-    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger; above the relief of
-     * a patch. */
-    double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
-    out->offset = (float)(1e-4 * size + 2e-7 * reach + height);
-    v3_store(out->position, x);
-    v3_store(out->normal, v3_unit(s));
+    out->place = e->kind == FCT_ELEMENT_TRIANGLE
+                     ? set->ranges[e - set->items].first
+                     : find_face_by_area(set, &set->view.instances[e->instance], e->node, &t);
+    find_point(set, e, a, b, out);
 }
 
-static void choose_points_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static double spread_point(uint64_t id, uint64_t k, uint64_t dimension) {
+    return fct_uniform(fct_hash3(id, k, dimension));
+}
+
+static void choose_places(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     fct_elements *set = user;
     (void)chunk, (void)thread;
-    for (size_t i = set->pointed + begin; i < set->pointed + end; ++i)
-        for (int k = 0; k < FCT_ELEMENT_POINTS; ++k) {
-            double r[3];
-            for (int d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(i, (uint64_t)k, (uint64_t)d));
-            fct_element_sample(
-                set, (uint32_t)i, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2],
-                &set->points[i / FCT_POINT_BLOCK][i % FCT_POINT_BLOCK * FCT_ELEMENT_POINTS + (size_t)k]);
+    for (size_t i = set->placed + begin; i < set->placed + end; ++i) {
+        const fct_element *e = &set->items[i];
+        for (size_t k = 0; k < FCT_ELEMENT_POINTS && e->kind == FCT_ELEMENT_CLUSTER; ++k) {
+            double t = ((double)k + spread_point(i, k, 0)) / FCT_ELEMENT_POINTS;
+            set->places[i * FCT_ELEMENT_POINTS + k] =
+                find_face_by_area(set, &set->view.instances[e->instance], e->node, &t);
         }
+    }
 }
 
-void fct_elements_make_points(fct_elements *set) {
-    fct_parallel_for(set->env, set->count - set->pointed, 64, choose_points_chunk, set);
-    set->pointed = set->count;
+void fct_elements_place_points(fct_elements *set) {
+    fct_parallel_for(set->env, set->count - set->placed, 64, choose_places, set);
+    set->placed = set->count;
+}
+
+void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out) {
+    const double a = spread_point(id, k, 1), b = spread_point(id, k, 2);
+    if (set->items[id].kind != FCT_ELEMENT_CLUSTER) {
+        fct_element_sample(set, id, (k + spread_point(id, k, 0)) / FCT_ELEMENT_POINTS, a, b, out);
+        return;
+    }
+    out->place = set->places[(size_t)id * FCT_ELEMENT_POINTS + k];
+    find_point(set, &set->items[id], a, b, out);
+}
+
+void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count) {
+    set->count = count;
+    set->placed = set->placed < count ? set->placed : count;
+    set->corner_count = corner_count;
+    for (size_t id = 0; id < count; ++id) {
+        fct_element *e = &set->items[id];
+        if (e->child_count == 0 || e->child < count) continue;
+        e->child = e->child_count = 0;
+        set->ranges[id].child = set->ranges[id].child_count = 0;
+    }
 }
 
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,

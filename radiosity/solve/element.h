@@ -20,7 +20,7 @@
 #include "radiosity/sample.h"
 #include "radiosity/solve/paint.h"
 
-enum { FCT_ELEMENT_POINTS = 16, FCT_POINT_BLOCK = 256 };
+enum { FCT_ELEMENT_POINTS = 16 };
 /* Angle of a cone that no longer bounds the side that an element shows: a right angle. */
 #define FCT_ELEMENT_OPEN_CONE 1.5707963267948966
 
@@ -67,12 +67,9 @@ typedef struct fct_elements {
     fct_scene_view view;
     fct_element *items;
     fct_element_range *ranges;
-    /* FCT_ELEMENT_POINTS per element, in blocks of FCT_POINT_BLOCK elements: they are most of the memory, and
-     * a growing array would hold up to three times as many for a moment. */
-    fct_element_point **points;
-    size_t count, capacity, range_capacity;
-    size_t block_count, block_capacity;
-    size_t pointed; /* elements that have their points */
+    uint32_t *places; /* FCT_ELEMENT_POINTS per element: of its points, if it is a cluster */
+    size_t count, capacity, range_capacity, place_capacity;
+    size_t placed;  /* elements whose points have places */
     float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
     fct_paints paints;
@@ -90,11 +87,6 @@ fct_result fct_elements_create(const fct_env *env, const fct_scene *scene, doubl
                                fct_elements *out);
 void fct_elements_release(fct_elements *set);
 
-/* The points of an element that has them. */
-static inline const fct_element_point *fct_element_points(const fct_elements *set, size_t id) {
-    return set->points[id / FCT_POINT_BLOCK] + id % FCT_POINT_BLOCK * FCT_ELEMENT_POINTS;
-}
-
 static inline bool fct_element_is_leaf(const fct_element *e) {
     return e->child_count == 0;
 }
@@ -102,12 +94,19 @@ static inline bool fct_element_is_leaf(const fct_element *e) {
 bool fct_elements_can_split(const fct_elements *set, uint32_t id);
 /* Adds the children of a leaf that can be split. They start with its light. Errors: MEMORY. */
 fct_result fct_elements_split(fct_elements *set, uint32_t id);
-/* Chooses the points of all elements that have none: point k lies in the k-th sixteenth of the area. */
-void fct_elements_make_points(fct_elements *set);
 /* The point at fraction t in [0, 1) of the area. (a, b) in [0, 1)^2 chooses the point of the triangle found
  * there, uniformly. Stratified t gives points that are stratified over the surface. */
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out);
+/* Chooses the faces of the points of all elements that have none. */
+void fct_elements_place_points(fct_elements *set);
+/* Point k < FCT_ELEMENT_POINTS of an element: it lies in the k-th sixteenth of the area, and is the same in
+ * each call. Only the places of points are stored: whole points would take most of the memory of the
+ * elements, and the way down to a face takes most of the time of a point. */
+void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out);
+/* Removes the elements from number `count` on, and the corners from `corner_count` on: the elements whose
+ * children are among them are leaves again. Both numbers are those of an earlier moment. */
+void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count);
 /* The leaf that contains barycentrics (u, v) of the face at `place`; FCT_NONE on the back of a one-sided
  * material. */
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,

@@ -54,20 +54,21 @@ static bool points_see_each_other(const fct_elements *set, const fct_element_poi
  * rays: point pairs that face away send none. */
 static uint32_t send_pair_rays(const fct_elements *set, const fct_link *link, uint32_t from, uint32_t to,
                                double *clear, double *seen) {
-    const fct_element_point *ps = fct_element_points(set, link->receiver);
-    const fct_element_point *qs = fct_element_points(set, link->source);
     double floor2 = set->items[link->source].area / FCT_ELEMENT_POINTS;
     uint32_t turn = (uint32_t)fct_hash2(link->receiver, link->source), rays = 0;
     for (uint32_t k = from; k < to; ++k) {
         /* i is k with its bits reversed: the first four pairs spread over both elements. */
         uint32_t i = ((k & 1) << 3 | (k & 2) << 1 | (k & 4) >> 1 | (k & 8) >> 3), j = (i * 5 + turn) & 15;
         if (link->receiver == link->source && i == j) j = (j + 8) & 15;
-        double r2, cosines = multiply_cosines(&ps[i], &qs[j], &r2);
+        fct_element_point p, q;
+        fct_element_point_at(set, link->receiver, i, &p);
+        fct_element_point_at(set, link->source, j, &q);
+        double r2, cosines = multiply_cosines(&p, &q, &r2);
         if (cosines <= 0) continue;
         double kernel = cosines / (FCT_PI * r2 + floor2);
         *clear += kernel;
         ++rays;
-        if (points_see_each_other(set, &ps[i], &qs[j])) *seen += kernel;
+        if (points_see_each_other(set, &p, &q)) *seen += kernel;
     }
     return rays;
 }
@@ -193,7 +194,7 @@ static fct_result refine_round(fct_elements *set, fct_links *links, double epsil
     r.rays = fct_allocate(env, chunks, sizeof *r.rays);
     fct_result result = FCT_OK;
     if (r.verdicts && r.rays) {
-        fct_elements_make_points(set);
+        fct_elements_place_points(set);
         fct_parallel_for(env, pairs->count, 256, judge_chunk, &r);
         for (size_t c = 0; c < chunks; ++c) links->rays += r.rays[c];
         result = apply_verdicts(set, links, &r, pairs->count, next);

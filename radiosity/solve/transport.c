@@ -65,16 +65,15 @@ typedef struct gathering {
  * alike than its surface. */
 static void sample_direct(const gathering *g, uint32_t id, uint64_t fresh, double irradiance[][3],
                           uint64_t *rays) {
-    const fct_element_point *points = fct_element_points(g->set, id);
-    const size_t stride = FCT_ELEMENT_POINTS / DIRECT_POINTS;
+    const uint64_t stride = FCT_ELEMENT_POINTS / DIRECT_POINTS;
     for (int k = 0; k < DIRECT_POINTS; ++k) {
-        const fct_element_point *p =
-            &points[(size_t)k * stride + (fct_hash3(g->seed, id, (uint64_t)k) + fresh) % stride];
+        const uint64_t turn = (fct_hash3(g->seed, id, (uint64_t)k) + fresh) % stride;
+        fct_element_point p;
+        fct_element_point_at(g->set, id, (uint32_t)((uint64_t)k * stride + turn), &p);
         double x[3], n[3];
-        for (int c = 0; c < 3; ++c) x[c] = p->position[c], n[c] = p->normal[c];
-        fct_lamps_direct(g->lamps, g->set->scene, x, n, p->offset,
-                         fct_hash3(g->seed + fresh, id, (uint64_t)k), DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL,
-                         irradiance[k], rays);
+        for (int c = 0; c < 3; ++c) x[c] = p.position[c], n[c] = p.normal[c];
+        fct_lamps_direct(g->lamps, g->set->scene, x, n, p.offset, fct_hash3(g->seed + fresh, id, (uint64_t)k),
+                         DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL, irradiance[k], rays);
     }
 }
 
@@ -121,8 +120,11 @@ static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32
         uint32_t id = g->leaves[l];
         uint64_t seed = fct_hash2(g->seed ^ 0x6761746865720001u, id);
         uint32_t instance = g->set->items[id].instance, bare = 0;
-        for (int k = 0; k < BARE_POINTS; ++k)
-            bare += is_bare(g->set, instance, fct_element_points(g->set, id) + 4 * k);
+        for (uint32_t k = 0; k < BARE_POINTS; ++k) {
+            fct_element_point p;
+            fct_element_point_at(g->set, id, 4 * k, &p);
+            bare += is_bare(g->set, instance, &p);
+        }
         g->bare[l] = (float)bare / BARE_POINTS;
         for (uint32_t k = 0; k < g->rays; ++k) {
             double plane[2], place[2];
@@ -289,12 +291,12 @@ static fct_result split_by_direct(gathering *g, double epsilon) {
     size_t from = 0;
     for (int round = 0; round < MOST_ROUNDS && result == FCT_OK && from < set->count; ++round) {
         if ((result = fct_progress(set->env, "direct light", round / (double)MOST_ROUNDS)) != FCT_OK) break;
-        fct_elements_make_points(set);
+        fct_elements_place_points(set);
         size_t count = set->count;
         result = split_round(g, from, epsilon);
         from = count;
     }
-    fct_elements_make_points(set);
+    fct_elements_place_points(set);
     return result;
 }
 

@@ -223,11 +223,13 @@ static void points_are_stratified(void **state) {
     fct_scene *scene = make_scene(true);
     fct_elements set;
     assert_int_equal(fct_elements_create(&plain, scene, 100, &set), FCT_OK);
-    fct_elements_make_points(&set);
-    uint32_t root = set.roots[4];
+    fct_elements_place_points(&set);
     int first = 0;
-    for (int k = 0; k < FCT_ELEMENT_POINTS; ++k)
-        first += fct_element_points(&set, root)[k].place == 0;
+    for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
+        fct_element_point p;
+        fct_element_point_at(&set, set.roots[4], k, &p);
+        first += p.place == 0;
+    }
     assert_int_equal(first, 8);
     fct_elements_release(&set);
     fct_scene_destroy(scene);
@@ -275,7 +277,12 @@ static void touched_pages_are_few(void **state) {
     assert_int_equal(fct_elements_touched(&set), 4096);
     assert_int_equal(fct_elements_split(&set, set.roots[0]), FCT_OK);
     assert_true(fct_elements_touched(&set) <= 4 * 4096);
-    fct_elements_make_points(&set);
+    fct_elements_place_points(&set);
+    for (uint32_t id = 0; id < set.count; ++id)
+        for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
+            fct_element_point p;
+            fct_element_point_at(&set, id, k, &p);
+        }
     assert_true(fct_elements_touched(&set) >= 8 * 4096);
     fct_elements_release(&set);
     fct_scene_destroy(scene);
@@ -351,11 +358,12 @@ static void samples_equal_the_face_at_their_fraction(void **state) {
             ++tested;
         }
     assert_true(tested > 10 * set.count);
-    /* The stored points are those of the sixteenths. */
-    fct_elements_make_points(&set);
+    /* The points are those of the sixteenths. */
+    fct_elements_place_points(&set);
     for (uint32_t id = 0; id < set.count; id += 3)
         for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
-            const fct_element_point *p = fct_element_points(&set, id) + k;
+            fct_element_point p;
+            fct_element_point_at(&set, id, k, &p);
             uint32_t last = 0, first = FCT_NONE;
             for (int i = 0; i <= 40; ++i) {
                 fct_element_point q;
@@ -363,7 +371,7 @@ static void samples_equal_the_face_at_their_fraction(void **state) {
                 if (set.items[id].kind == FCT_ELEMENT_VOLUME) continue;
                 first = q.place < first ? q.place : first, last = q.place > last ? q.place : last;
             }
-            assert_true(first == FCT_NONE || (p->place >= first && p->place <= last));
+            assert_true(first == FCT_NONE || (p.place >= first && p.place <= last));
         }
     fct_elements_release(&set);
     fct_scene_destroy(scene);

@@ -108,7 +108,8 @@ static void rays_find_the_leaf_that_they_hit(void **state) {
 /* Direct light at the k-th of four points; `fresh`: 0 for splits, 1 for the solution. */
 static void light_point(const fct_elements *set, const fct_lamps *lamps, uint64_t seed, uint32_t id,
                         uint64_t k, uint64_t fresh, double e[3], uint64_t *rays) {
-    const fct_element_point *p = fct_element_points(set, id) + 4 * k + (fct_hash3(seed, id, k) + fresh) % 4;
+    fct_element_point at, *p = &at;
+    fct_element_point_at(set, id, (uint32_t)(4 * k + (fct_hash3(seed, id, k) + fresh) % 4), p);
     const double x[3] = {p->position[0], p->position[1], p->position[2]},
                  n[3] = {p->normal[0], p->normal[1], p->normal[2]};
     fct_lamps_direct(lamps, set->scene, x, n, p->offset, fct_hash3(seed + fresh, id, k), 2 | FCT_LAMPS_FIXED,

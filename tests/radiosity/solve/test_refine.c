@@ -88,8 +88,11 @@ static bool is_turned_away(const fct_element *e, v3 u, double sine) {
 /* Mean over point pairs [from, to) of the kernel (`clear`), and of those that see each other. */
 static int sum_pairs(judge *g, const fct_link *l, int from, int to, double *clear, double *seen) {
     static const int order[16] = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15};
-    const fct_element_point *p = fct_element_points(g->set, l->receiver),
-                            *q = fct_element_points(g->set, l->source);
+    fct_element_point p[16], q[16];
+    for (uint32_t k = 0; k < 16; ++k) {
+        fct_element_point_at(g->set, l->receiver, k, &p[k]);
+        fct_element_point_at(g->set, l->source, k, &q[k]);
+    }
     int sent = 0;
     for (int k = from; k < to; ++k) {
         int i = order[k], j = (int)((5 * (uint32_t)i + (uint32_t)fct_hash2(l->receiver, l->source)) % 16);
