@@ -73,14 +73,6 @@ fct_result fct_scene_share_coarse(fct_scene *scene) {
     return FCT_OK;
 }
 
-void fct_scene_release_coarse(fct_scene *scene) {
-    if (!scene->coarse) return;
-    fct_release(scene->env, scene->coarse->models);
-    fct_release(scene->env, scene->coarse->frames);
-    fct_release(scene->env, scene->coarse);
-    scene->coarse = NULL;
-}
-
 fct_result fct_scene_complete(const fct_scene *scene) {
     fct_scene *whole = (fct_scene *)(uintptr_t)scene;
     for (uint32_t m = 0; m < scene->model_count; ++m) {

@@ -14,16 +14,10 @@
 
 #include "scene/scene.h"
 
-/* Patches of all coarse forms together. A patch takes some 400 bytes with its part of the ray structure, so
- * all take less than the elements of a usual solution. With fewer patches, contacts and thin parts of large
- * models block light too widely. */
-#define FCT_SCENE_PATCHES 32768
-
 /* Makes the coarse forms. For fct_scene_commit, before ray structures. Errors: DATA, MEMORY, CANCELLED. */
 fct_result fct_scene_coarsen_models(fct_scene *scene);
 /* Sets scene->coarse, if there are coarse forms. For fct_scene_commit, at its end. Errors: MEMORY. */
 fct_result fct_scene_share_coarse(fct_scene *scene);
-void fct_scene_release_coarse(fct_scene *scene);
 
 /* The coarse scene, or the scene itself if none of its models has a coarse form. The scene owns it. Only ray
  * queries work on it; places in their results are those of the coarse trees. */

@@ -1,5 +1,5 @@
-/* scene/scene.c: builds a scene: materials, models split by material, objects, and the commit that makes it
- * immutable. Queries are in rays.c and closest.c, the hierarchy over instances is in volume.c.
+/* scene/scene.c: builds a scene: materials, models split by material, objects. The commit that makes it
+ * immutable is in commit.c, queries are in rays.c and closest.c, the hierarchy over instances is in volume.c.
  */
 #include "scene/scene.h"
 
@@ -12,7 +12,6 @@
 #include "base/math/round.h"
 #include "facetree/dual.h"
 #include "scene/attributes.h"
-#include "scene/coarse.h"
 #include "scene/transform.h"
 #include "scene/winding.h"
 
@@ -44,7 +43,11 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
 void fct_scene_destroy(fct_scene *scene) {
     if (!scene) return;
     const fct_env *env = scene->env;
-    fct_scene_release_coarse(scene);
+    if (scene->coarse) {
+        fct_release(env, scene->coarse->models);
+        fct_release(env, scene->coarse->frames);
+        fct_release(env, scene->coarse);
+    }
     for (uint32_t m = 0; m < scene->model_count; ++m) release_model(env, scene->own + m);
     for (uint32_t g = 0; g < scene->light_group_count; ++g) fct_release(env, scene->light_groups[g]);
     fct_scene_release_textures(scene);
@@ -113,7 +116,7 @@ fct_result fct_scene_add_light_group(fct_scene *scene, const char *name, uint32_
 /* Coordinates so many times larger than their bounding box have few digits left, and get a local origin. */
 #define FAR_AWAY 512
 
-static void choose_origin(const double lower[3], const double upper[3], double origin[3]) {
+void fct_scene_choose_origin(const double lower[3], const double upper[3], double origin[3]) {
     fct_extent extent = {.any = true, .fine = true};
     double largest = 0, side = 0;
     for (int c = 0; c < 3; ++c) {
@@ -135,7 +138,7 @@ static fct_result center_mesh(const fct_env *env, fct_mesh *mesh, double origin[
         lower[i % 3] = x < lower[i % 3] ? x : lower[i % 3],
                   upper[i % 3] = x > upper[i % 3] ? x : upper[i % 3];
     }
-    choose_origin(lower, upper, away);
+    fct_scene_choose_origin(lower, upper, away);
     *moved = away[0] != 0 || away[1] != 0 || away[2] != 0;
     if (!*moved) return FCT_OK;
     float *positions = fct_allocate(env, count, sizeof *positions);
@@ -330,8 +333,8 @@ fct_result fct_scene_split(fct_scene *scene, const char *name, const fct_mesh *m
 
 /* ---- Instances ---- */
 
-static fct_result set_instance_transform(const fct_env *env, const char *name, const float transform[12],
-                                         fct_instance *instance, fct_scene_frame *frame) {
+fct_result fct_scene_set_transform(const fct_env *env, const char *name, const float transform[12],
+                                   fct_instance *instance, fct_scene_frame *frame) {
     const float *m = transform ? transform : fct_transform_identity;
     switch (fct_transform_set(m, instance, frame->to_model)) {
     case FCT_TRANSFORM_NOT_FINITE:
@@ -365,7 +368,7 @@ fct_result fct_scene_place(fct_scene *scene, const char *name, uint32_t first, u
     fct_instance instance = {.object = scene->object_count};
     fct_scene_frame frame = {0};
     fct_result result = copy_name(env, "instance", name, instance.name, sizeof instance.name);
-    if (result == FCT_OK) result = set_instance_transform(env, name, transform, &instance, &frame);
+    if (result == FCT_OK) result = fct_scene_set_transform(env, name, transform, &instance, &frame);
     size_t needed = (size_t)scene->instance_count + count;
     if (result == FCT_OK && needed > INT32_MAX / 2)
         result = fct_fail(env, FCT_ERROR_DATA, "the scene has more than 2^30 instances");
@@ -406,7 +409,7 @@ fct_result fct_scene_add_object(fct_scene *scene, const char *name, const fct_me
     fct_scene_parts parts = {0};
     fct_instance probe; /* a bad transform is reported before the mesh is clustered */
     fct_scene_frame frame;
-    fct_result result = set_instance_transform(env, name, transform, &probe, &frame);
+    fct_result result = fct_scene_set_transform(env, name, transform, &probe, &frame);
     if (result == FCT_OK && mesh) result = fct_mesh_validate(env, mesh);
     if (result == FCT_OK && !tree && mesh->face_count == 0)
         result = fct_fail(env, FCT_ERROR_DATA, "object \"%s\" has no faces", name);
@@ -447,139 +450,6 @@ fct_result fct_scene_add_instance(fct_scene *scene, const char *name, uint32_t o
 void fct_scene_set_camera(fct_scene *scene, const fct_camera *camera) {
     scene->camera = *camera;
     scene->camera.given = true;
-}
-
-/* ---- Commit ---- */
-
-/* Of models without a coarse form, if there are coarse forms. */
-static fct_result build_ray_structures(fct_scene *scene) {
-    const fct_env *env = scene->env;
-    for (uint32_t m = 0; m < scene->model_count; ++m) {
-        fct_scene_model *own = scene->own + m;
-        if (own->coarse.tree) continue;
-        fct_result result = fct_bvh_create(env, own->tree, scene->backend, &own->bvh);
-        if (result == FCT_OK && scene->backend == FCT_BACKEND_EMBREE)
-            result = fct_bvh_create(env, own->tree, FCT_BACKEND_OBB, &own->points);
-        if (result != FCT_OK) return result;
-        scene->models[m].bvh = own->bvh;
-    }
-    return FCT_OK;
-}
-
-/* The tree's bounds hold all vertices, those of a ray structure only vertices of faces. */
-static fct_bounds bound_model(const fct_scene_model *own) {
-    return own->bvh ? fct_bvh_bounds(own->bvh) : fct_tree_get(own->tree).bounds;
-}
-
-/* Chooses the scene's origin and makes transforms and camera relative to it. */
-static fct_result move_to_origin(fct_scene *scene) {
-    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t i = 0; i < scene->instance_count; ++i) {
-        const float *m = scene->instances[i].to_world;
-        fct_bounds b = bound_model(&scene->own[scene->instances[i].model]);
-        for (int c = 0; c < 3; ++c) {
-            double middle = scene->frames[i].at[c], half = 0;
-            for (int k = 0; k < 3; ++k) {
-                middle += (double)m[4 * c + k] * (.5 * ((double)b.lower[k] + b.upper[k]));
-                half += fabs((double)m[4 * c + k]) * (.5 * ((double)b.upper[k] - b.lower[k]));
-            }
-            lower[c] = fmin(lower[c], middle - half), upper[c] = fmax(upper[c], middle + half);
-        }
-    }
-    choose_origin(lower, upper, scene->origin);
-    for (uint32_t i = 0; i < scene->instance_count; ++i) {
-        float m[12];
-        memcpy(m, scene->instances[i].to_world, sizeof m);
-        for (int c = 0; c < 3; ++c) m[4 * c + 3] = (float)(scene->frames[i].at[c] - scene->origin[c]);
-        fct_result result = set_instance_transform(scene->env, scene->instances[i].name, m,
-                                                   &scene->instances[i], &scene->frames[i]);
-        if (result != FCT_OK) return result;
-    }
-    for (int c = 0; c < 3; ++c) {
-        scene->camera.position[c] = (float)(scene->camera.position[c] - scene->origin[c]);
-        scene->camera.target[c] = (float)(scene->camera.target[c] - scene->origin[c]);
-    }
-    return FCT_OK;
-}
-
-static fct_result bound_instances(fct_scene *scene, fct_bounds *bounds) {
-    for (uint32_t i = 0; i < scene->instance_count; ++i) {
-        fct_instance *instance = scene->instances + i;
-        const fct_scene_model *own = scene->own + instance->model;
-        fct_bounds model = bound_model(own);
-        fct_result result =
-            fct_transform_bounds(scene->env, own->tree, &model, instance->to_world, &instance->bounds);
-        if (result != FCT_OK) return result;
-        for (int c = 0; c < 3; ++c)
-            if (!isfinite(instance->bounds.lower[c]) || !isfinite(instance->bounds.upper[c]))
-                return fct_fail(scene->env, FCT_ERROR_DATA, "instance \"%s\": its bounds do not fit a float",
-                                instance->name);
-        bounds[i] = instance->bounds;
-        scene->frames[i].bvh = own->bvh;
-        scene->face_count += fct_tree_get(own->tree).face_count;
-    }
-    return FCT_OK;
-}
-
-/* Default camera: from the front right, a little above (y is up). The sphere around the bounds fills the
- * view. */
-static void set_default_camera(fct_scene *scene) {
-    double square = 0;
-    v3 toward = v3_unit(v3_make(.45, .35, .85));
-    for (int c = 0; c < 3; ++c) {
-        double size = (double)scene->bounds.upper[c] - scene->bounds.lower[c];
-        scene->camera.target[c] =
-            (float)fct_round(.5 * ((double)scene->bounds.upper[c] + scene->bounds.lower[c]));
-        square += size * size;
-    }
-    double radius = fmax(.5 * sqrt(square), 1e-30);
-    scene->camera.vertical_fov = 40;
-    double distance = radius / fct_sin(20 * 3.14159265358979323846 / 180); /* half of the angle */
-    v3_store(scene->camera.position, v3_mad(v3_load(scene->camera.target), distance, toward));
-    scene->camera.up[1] = 1;
-}
-
-static fct_result check_light_groups(fct_scene *scene) {
-    uint32_t id;
-    if (scene->light_group_count == 0) {
-        fct_result result = fct_scene_add_light_group(scene, "all", &id);
-        if (result != FCT_OK) return result;
-    }
-    for (uint32_t m = 0; m < scene->material_count; ++m)
-        if (scene->materials[m].light_group >= scene->light_group_count)
-            return fct_fail(
-                scene->env, FCT_ERROR_DATA, "material \"%s\" has light group %u, expected one below %u",
-                scene->materials[m].name, scene->materials[m].light_group, scene->light_group_count);
-    return FCT_OK;
-}
-
-fct_result fct_scene_commit(fct_scene *scene) {
-    assert(!scene->committed);
-    const fct_env *env = scene->env;
-    if (scene->instance_count == 0) return fct_fail(env, FCT_ERROR_DATA, "the scene has no instances");
-    fct_result result = check_light_groups(scene);
-    if (result == FCT_OK && scene->backend == FCT_BACKEND_MULTIRES) result = fct_scene_coarsen_models(scene);
-    if (result == FCT_OK) result = build_ray_structures(scene);
-    if (result == FCT_OK) result = move_to_origin(scene);
-    if (result != FCT_OK) return result;
-    fct_bounds *bounds = fct_allocate(env, scene->instance_count, sizeof *bounds);
-    scene->volumes = fct_allocate(env, 2 * (size_t)scene->instance_count - 1, sizeof *scene->volumes);
-    if (!bounds || !scene->volumes) {
-        fct_release(env, bounds);
-        return fct_fail_memory(env, "the volumes of a scene");
-    }
-    result = bound_instances(scene, bounds);
-    if (result == FCT_OK)
-        result = fct_scene_build_volumes(env, scene->instance_count, bounds, scene->volumes);
-    if (result == FCT_OK)
-        result = fct_scene_build_nodes(env, scene->instance_count, scene->volumes, &scene->nodes);
-    fct_release(env, bounds);
-    if (result != FCT_OK) return result;
-    fct_scene_note_bare_textures(scene);
-    scene->bounds = scene->volumes[0].bounds;
-    if (!scene->camera.given) set_default_camera(scene);
-    scene->committed = true;
-    return fct_scene_share_coarse(scene);
 }
 
 fct_scene_view fct_scene_get(const fct_scene *scene) {

@@ -10,6 +10,11 @@
  * below 3 log2 F < 96. */
 enum { FCT_SCENE_TREE_DEPTH = 254 };
 
+/* Patches of all coarse forms together. A patch takes some 400 bytes with its part of the ray structure, so
+ * all take less than the elements of a usual solution. With fewer patches, contacts and thin parts of large
+ * models block light too widely. */
+#define FCT_SCENE_PATCHES 32768
+
 /* Readers of files clamp reflectances to this. With a reflectance of 1, light would never be absorbed. */
 #define FCT_SCENE_MOST_REFLECTANCE .9f
 
@@ -82,8 +87,15 @@ struct fct_scene {
     struct fct_scene *coarse; /* this scene with the coarse forms of its models, whose other arrays it shares;
                                  NULL if no model has one */
     bool is_coarse;
-    uint32_t patches; /* of all coarse forms together, about */
+    uint32_t patches; /* of all coarse forms together, about; default FCT_SCENE_PATCHES */
 };
+
+/* Sets the transform (NULL: identity) of an instance and of its frame. Errors: DATA (singular, not finite).
+ */
+fct_result fct_scene_set_transform(const fct_env *env, const char *name, const float transform[12],
+                                   fct_instance *instance, fct_scene_frame *frame);
+/* 0, or a point near the middle of bounds that lie too far from 0 for floats. */
+void fct_scene_choose_origin(const double lower[3], const double upper[3], double origin[3]);
 
 /* The texture of that name, or FCT_NONE. */
 uint32_t fct_scene_find_texture(const fct_scene *scene, const char *name);

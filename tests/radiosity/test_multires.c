@@ -115,7 +115,8 @@ static fct_bake *solve(const fct_env *env, const fct_scene *scene, fct_bake_stat
     const fct_bake_def def = fct_bake_def_default();
     assert_int_equal(fct_bake_create(env, scene, &def, &bake), FCT_OK);
     *stats = fct_bake_get_stats(bake);
-    printf("    %u patches: %llu elements, %llu rays, %.0f KiB read; power %g emitted, %g absorbed, %g escaped\n",
+    printf("    %u patches: %llu elements, %llu rays, %.0f KiB read; power %g emitted, %g absorbed, %g "
+           "escaped\n",
            scene->patches, (unsigned long long)stats->elements, (unsigned long long)stats->rays,
            (double)stats->touched_bytes / 1024, stats->power_emitted, stats->power_absorbed,
            stats->power_escaped);

@@ -167,7 +167,8 @@ static void samples_follow_the_area(void **state) {
             assert_near(v3_norm(v3_load(p.normal)), 1, 1e-5);
             assert_true(p.offset > 0 && p.offset < .01);
             if (e->kind == FCT_ELEMENT_VOLUME || k % 16) continue;
-            uint32_t leaf = fct_elements_locate_point(&set, e->instance, e->back, p.place, v3_load(p.position));
+            uint32_t leaf =
+                fct_elements_locate_point(&set, e->instance, e->back, p.place, v3_load(p.position));
             uint32_t up = leaf;
             /* (u, v) of a quarter are its own: only whole triangles are located */
             if (e->kind == FCT_ELEMENT_TRIANGLE && set.items[e->parent].kind == FCT_ELEMENT_TRIANGLE)
