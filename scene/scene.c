@@ -7,9 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/math/elementary.h"
 #include "base/math/origin.h"
-#include "base/math/round.h"
 #include "facetree/dual.h"
 #include "scene/attributes.h"
 #include "scene/transform.h"
