@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
+#define XXH_STATIC_LINKING_ONLY /* the size of XXH3_state_t */
 #include <xxhash.h>
 
 #include "base/io/beside.h"
@@ -150,6 +151,20 @@ fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool 
     return result;
 }
 
+enum { HASH_BLOCK = 1 << 24 };
+
+/* Lets pages go when they have been read, so that a file of many gigabytes does not fill the memory. */
+static uint64_t hash_file(const fct_file *file) {
+    XXH3_state_t state;
+    XXH3_64bits_reset(&state);
+    for (size_t at = 0; at < file->size; at += HASH_BLOCK) {
+        const size_t size = file->size - at < HASH_BLOCK ? file->size - at : HASH_BLOCK;
+        XXH3_64bits_update(&state, file->data + at, size);
+        fct_file_advise(file, at, size, FCT_FILE_UNUSED);
+    }
+    return XXH3_64bits_digest(&state);
+}
+
 fct_result fct_mesh_file_hash(const fct_env *env, const char *path, uint64_t *out) {
     *out = 0;
     const format *f = find_format(fct_file_format(env, path));
@@ -161,7 +176,7 @@ fct_result fct_mesh_file_hash(const fct_env *env, const char *path, uint64_t *ou
         fct_source source = {env, path, file.data, file.size, folder};
         result = fct_glb_hash(&source, out);
     } else if (result == FCT_OK) {
-        *out = XXH3_64bits(file.data, file.size);
+        *out = hash_file(&file);
     }
     fct_file_close(env, &file);
     fct_release(env, folder);
