@@ -19,8 +19,16 @@ fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const f
         return fct_fail_memory(env, "a model's texture coordinates and normals");
     for (size_t p = 0; *texcoords && p < t.face_count; ++p)
         memcpy(*texcoords + 6 * p, mesh->texcoords + 6 * (size_t)t.face_ids[p], 6 * sizeof **texcoords);
-    for (size_t v = 0; *normals && v < t.vertex_count; ++v)
-        memcpy(*normals + 3 * v, mesh->normals + 3 * (size_t)t.vertex_ids[v], 3 * sizeof **normals);
+    bool any = false;
+    for (size_t v = 0; *normals && v < t.vertex_count; ++v) {
+        const float *from = mesh->normals + 3 * (size_t)t.vertex_ids[v];
+        memcpy(*normals + 3 * v, from, 3 * sizeof *from);
+        any |= from[0] != 0 || from[1] != 0 || from[2] != 0;
+    }
+    if (!any) {
+        fct_release(env, *normals);
+        *normals = NULL;
+    }
     return FCT_OK;
 }
 

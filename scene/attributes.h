@@ -6,7 +6,7 @@
 #include "facetree/cluster.h"
 
 /* Copies texture coordinates and normals of the mesh from which the tree was built. *texcoords has 3 x 2
- * numbers per place, *normals 3 per tree vertex; NULL where the mesh has none. The caller releases them, also
+ * numbers per place, *normals 3 per tree vertex; NULL where the mesh has none or only zeros. The caller releases them, also
  * after an error. Errors: DATA (a damaged tree, or one of another mesh), MEMORY. */
 fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const fct_tree *tree,
                                float **texcoords, float **normals);
