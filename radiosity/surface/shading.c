@@ -27,7 +27,8 @@
 fct_shading fct_shading_make(const fct_scene *scene, uint32_t instance, fct_normals rule, double crease,
                              bool back) {
     const fct_scene_view view = fct_scene_get(scene);
-    const bool given = view.models[view.instances[instance].model].normals != NULL;
+    const fct_model *model = &view.models[view.instances[instance].model];
+    const bool given = model->normals || model->corner_normals;
     const double degrees = rule == FCT_NORMALS_CREASE ? crease : FCT_CREASE_DEGREES;
     return (fct_shading){.scene = scene,
                          .instance = instance,
@@ -47,8 +48,10 @@ void fct_shading_face(const fct_shading *shading, uint32_t place, fct_shaded_fac
     const fct_tree_view t = fct_tree_get(model->tree);
     out->mirrored = placed->mirrored;
     for (size_t k = 0; k < 3; ++k) {
-        const size_t v = 3 * (size_t)t.triangles[3 * (size_t)place + (placed->mirrored ? (3 - k) % 3 : k)];
-        const v3 n = v3_unit(fct_transform_normal(placed->normal_matrix, v3_load(model->normals + v)));
+        const size_t corner = 3 * (size_t)place + (placed->mirrored ? (3 - k) % 3 : k);
+        const size_t v = 3 * (size_t)t.triangles[corner];
+        const float *own = model->normals ? model->normals + v : model->corner_normals + 3 * corner;
+        const v3 n = v3_unit(fct_transform_normal(placed->normal_matrix, v3_load(own)));
         out->positions[k] = fct_transform_point(placed->to_world, v3_load(t.positions + v));
         out->normals[k] = placed->mirrored ? v3_scale(n, -1) : n;
     }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/io/file.h"
+#include "mesh/load.h"
 #include "mesh/ply/header.h"
 #include "scene/attributes.h"
 #include "scene/read/path.h"
@@ -42,7 +43,7 @@ static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fc
 
 static fct_result load_mesh(const fct_env *env, const char *path, fct_mesh *out) {
     const char *format = fct_file_format(env, path);
-    fct_result result = fct_mesh_load(env, path, out);
+    fct_result result = fct_mesh_load_shaded(env, path, out);
     if (result == FCT_OK && strcasecmp(format, "glb") && strcasecmp(format, "gltf"))
         fct_attributes_count_from_top(out);
     return result;
