@@ -325,6 +325,115 @@ static void documents_have_normals(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* ---- Files ---- */
+
+/* A room: a cube of quads around the origin with a normal per side. inward: wound to the inside, as the
+ * normals are; one corner has none. */
+static void write_cube(const char *path, bool inward) {
+    static const int sides[6][4] = {{1, 3, 7, 5}, {2, 6, 8, 4}, {1, 5, 6, 2},
+                                    {3, 4, 8, 7}, {1, 2, 4, 3}, {5, 7, 8, 6}};
+    static const int normals[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    for (int v = 0; v < 8; ++v) fprintf(file, "v %d %d %d\n", v & 1, v >> 1 & 1, v >> 2);
+    for (int s = 0; s < 6; ++s) {
+        const int sign = inward ? -1 : 1;
+        fprintf(file, "vn %d %d %d\nf", sign * normals[s][0], sign * normals[s][1], sign * normals[s][2]);
+        for (int k = 0; k < 4; ++k) {
+            const int v = sides[s][inward ? k : 3 - k];
+            if (s == 0 && k == 0)
+                fprintf(file, " %d", v);
+            else
+                fprintf(file, " %d//%d", v, s + 1);
+        }
+        fprintf(file, "\n");
+    }
+    fclose(file);
+}
+
+static void objs_have_normals_of_corners(void **state) {
+    (void)state;
+    char path[128];
+    snprintf(path, sizeof path, "%s/cube.obj", folder);
+    for (int k = 0; k < 3; ++k) { /* outward, inward, turned outward */
+        const bool inward = k > 0;
+        write_cube(path, inward);
+        fct_scene *scene;
+        plain = fct_env_default();
+        plain.flip_inward = k == 2;
+        assert_int_equal(fct_scene_load(&plain, path, FCT_BACKEND_OBB, &scene), FCT_OK);
+        const fct_model *model = fct_scene_get(scene).models;
+        const fct_tree_view t = fct_tree_get(model->tree);
+        assert_true(!model->normals && model->corner_normals && t.face_count == 12);
+        int zeros = 0;
+        for (size_t place = 0; place < 12; ++place) {
+            v3 c[3];
+            for (size_t i = 0; i < 3; ++i) c[i] = load(t.positions, t.triangles[3 * place + i]);
+            const v3 n = v3_unit(v3_cross(v3_sub(c[1], c[0]), v3_sub(c[2], c[0])));
+            const v3 out = v3_sub(c[0], v3_make(.5, .5, .5));
+            assert_true((v3_dot(n, out) > 0) == (k != 1));
+            for (size_t i = 0; i < 3; ++i) {
+                const v3 own = load(model->corner_normals, 3 * place + i);
+                zeros += v3_norm2(own) == 0;
+                if (v3_norm2(own) > 0) assert_true(v3_norm(v3_sub(own, n)) < 1e-6);
+            }
+        }
+        assert_in_range(zeros, 1, 2);
+        fct_scene_destroy(scene);
+        fct_mesh m; /* a mesh alone keeps normals of vertices only */
+        assert_int_equal(fct_mesh_load(&plain, path, &m), FCT_OK);
+        assert_true(!m.normals && !m.corner_normals);
+        fct_mesh_release(&plain, &m);
+    }
+    remove(path);
+    plain = fct_env_default();
+}
+
+/* A hierarchy beside a mesh stores no normals: they come from the mesh. */
+static void hierarchies_have_the_normals_of_their_mesh(void **state) {
+    (void)state;
+    char mesh_path[128], tree_path[128];
+    const char *const endings[] = {"ply", "obj", "glb"};
+    fct_mesh ball = make_ball(6, false);
+    for (int k = 0; k < 3; ++k)
+        for (int with = 0; with < 2; ++with) {
+            snprintf(mesh_path, sizeof mesh_path, "%s/ball.%s", folder, endings[k]);
+            snprintf(tree_path, sizeof tree_path, "%s/ball.fct", folder);
+            fct_mesh plain_ball = ball;
+            if (!with) plain_ball.normals = NULL;
+            assert_int_equal(fct_mesh_save(&plain, mesh_path, &plain_ball, NULL), FCT_OK);
+            fct_tree *tree;
+            fct_tree_def def = fct_tree_def_default();
+            fct_mesh read;
+            assert_int_equal(fct_mesh_load(&plain, mesh_path, &read), FCT_OK);
+            assert_int_equal(fct_mesh_file_hash(&plain, mesh_path, &def.source_hash), FCT_OK);
+            assert_int_equal(fct_tree_build(&plain, &read, &def, NULL, &tree), FCT_OK);
+            assert_int_equal(fct_tree_save(&plain, tree, tree_path), FCT_OK);
+            fct_tree_destroy(tree);
+            fct_mesh_release(&plain, &read);
+            char json[256], json_path[128];
+            snprintf(json_path, sizeof json_path, "%s/scene.json", folder);
+            snprintf(json, sizeof json,
+                     "{\"materials\": {\"a\": {}}, \"models\": {\"ball\": \"ball.%s\"}, \"instances\": "
+                     "[{\"model\": \"ball\", \"material\": \"a\"}]}",
+                     endings[k]);
+            FILE *file = fopen(json_path, "w");
+            assert_non_null(file);
+            fputs(json, file);
+            fclose(file);
+            fct_scene *scene;
+            assert_int_equal(fct_scene_load(&plain, json_path, FCT_BACKEND_OBB, &scene), FCT_OK);
+            const fct_model *model = fct_scene_get(scene).models;
+            const fct_tree_view t = fct_tree_get(model->tree);
+            assert_true(t.source_hash == def.source_hash && (model->normals != NULL) == (with == 1));
+            for (size_t v = 0; with && v < t.vertex_count; ++v)
+                assert_true(v3_norm(v3_sub(load(model->normals, v), load(t.positions, v))) < 1e-6);
+            fct_scene_destroy(scene);
+            remove(mesh_path), remove(tree_path), remove(json_path);
+        }
+    fct_mesh_release(&plain, &ball);
+}
+
 /* ---- Wrong input ---- */
 
 static void wrong_input_is_named(void **state) {
@@ -367,10 +476,16 @@ static void wrong_input_is_named(void **state) {
 int main(void) {
     if (!mkdtemp(folder)) return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(light_follows_the_file), cmocka_unit_test(creases_have_other_light),
-        cmocka_unit_test(furnaces_are_even),      cmocka_unit_test(probes_start_on_the_curve),
-        cmocka_unit_test(outputs_have_normals),   cmocka_unit_test(both_sides_have_normals),
-        cmocka_unit_test(documents_have_normals), cmocka_unit_test(wrong_input_is_named),
+        cmocka_unit_test(light_follows_the_file),
+        cmocka_unit_test(creases_have_other_light),
+        cmocka_unit_test(furnaces_are_even),
+        cmocka_unit_test(probes_start_on_the_curve),
+        cmocka_unit_test(outputs_have_normals),
+        cmocka_unit_test(both_sides_have_normals),
+        cmocka_unit_test(documents_have_normals),
+        cmocka_unit_test(objs_have_normals_of_corners),
+        cmocka_unit_test(hierarchies_have_the_normals_of_their_mesh),
+        cmocka_unit_test(wrong_input_is_named),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     rmdir(folder);

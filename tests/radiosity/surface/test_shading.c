@@ -180,6 +180,37 @@ static void shared_vertices_stay_one(void **state) {
     fct_mesh_release(&plain, &mesh);
 }
 
+/* A shared vertex with a normal per corner: the normals of the corners decide, in mirrored instances too. */
+static void corners_have_normals(void **state) {
+    (void)state;
+    const float mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    for (int k = 0; k < 4; ++k) {
+        fct_mesh hinge = make_hinge(20, false, true);
+        const bool bent = k & 1;
+        hinge.corner_normals = fct_allocate(&plain, hinge.face_count, 9 * sizeof(float));
+        assert_non_null(hinge.corner_normals);
+        for (size_t c = 0; c < 12; ++c) {
+            const double turn = (!bent ? 10 : c < 6 ? 5 : 15) * FCT_PI / 180;
+            v3_store(hinge.corner_normals + 3 * c, v3_make(sin(turn), c % 3 * .01, cos(turn)));
+        }
+        fct_release(&plain, hinge.normals);
+        hinge.normals = NULL;
+        fct_scene *scene = one_mesh(&hinge, k & 2 ? mirror : NULL);
+        fct_surface s = build(scene, FCT_NORMALS_FILE, 40, false, 10);
+        assert_int_equal(s.shading.rule, FCT_NORMALS_FILE);
+        const double least = find_spread(&s);
+        assert_true(bent ? fabs(least - cos(10 * FCT_PI / 180)) < 1e-3 : least > 1 - 1e-6);
+        for (size_t c = 0; c < 12 && bent; ++c) {
+            const size_t corner = c - c % 3 + (k & 2 && c % 3 ? 3 - c % 3 : c % 3);
+            const v3 n = v3_unit(load(hinge.corner_normals, corner));
+            expect_near(load(s.normals, s.mesh.triangles[c]), v3_make(k & 2 ? -n.x : n.x, n.y, n.z), .02);
+        }
+        fct_surface_release(&plain, &s);
+        fct_scene_destroy(scene);
+        fct_mesh_release(&plain, &hinge);
+    }
+}
+
 /* The unit cube around the origin with a normal per corner. */
 static void smooth_cubes_have_eight_vertices(void **state) {
     (void)state;
@@ -421,11 +452,17 @@ static void limits(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(files_decide_creases),     cmocka_unit_test(split_normals_are_creases),
-        cmocka_unit_test(shared_vertices_stay_one), cmocka_unit_test(smooth_cubes_have_eight_vertices),
-        cmocka_unit_test(transforms_turn_normals),  cmocka_unit_test(new_vertices_interpolate),
-        cmocka_unit_test(centres_interpolate),      cmocka_unit_test(lifts_stop_at_surfaces),
-        cmocka_unit_test(bad_normals_fall_back),    cmocka_unit_test(limits),
+        cmocka_unit_test(files_decide_creases),
+        cmocka_unit_test(split_normals_are_creases),
+        cmocka_unit_test(shared_vertices_stay_one),
+        cmocka_unit_test(corners_have_normals),
+        cmocka_unit_test(smooth_cubes_have_eight_vertices),
+        cmocka_unit_test(transforms_turn_normals),
+        cmocka_unit_test(new_vertices_interpolate),
+        cmocka_unit_test(centres_interpolate),
+        cmocka_unit_test(lifts_stop_at_surfaces),
+        cmocka_unit_test(bad_normals_fall_back),
+        cmocka_unit_test(limits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
