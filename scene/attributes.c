@@ -19,22 +19,24 @@ static fct_result copy_rows(const fct_env *env, const float *from, const uint32_
     return FCT_OK;
 }
 
-fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, fct_scene_model *model) {
+fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const fct_tree *tree,
+                               fct_attributes *out) {
+    *out = (fct_attributes){0};
     const bool normals = has_values(mesh->normals, 3 * (size_t)mesh->vertex_count);
     const bool corners = !normals && has_values(mesh->corner_normals, 9 * (size_t)mesh->face_count);
     if (!mesh->texcoords && !normals && !corners) return FCT_OK;
-    fct_result result = fct_tree_check(env, model->tree);
+    fct_result result = fct_tree_check(env, tree);
     if (result != FCT_OK) return result;
-    const fct_tree_view t = fct_tree_get(model->tree);
+    const fct_tree_view t = fct_tree_get(tree);
     if (t.face_count != mesh->face_count || t.vertex_count != mesh->vertex_count)
         return fct_fail(env, FCT_ERROR_DATA, "the tree has %u faces and %u vertices, its mesh %u and %u",
                         t.face_count, t.vertex_count, mesh->face_count, mesh->vertex_count);
     if (mesh->texcoords)
-        result = copy_rows(env, mesh->texcoords, t.face_ids, t.face_count, 6, &model->texcoords);
+        result = copy_rows(env, mesh->texcoords, t.face_ids, t.face_count, 6, &out->texcoords);
     if (result == FCT_OK && normals)
-        result = copy_rows(env, mesh->normals, t.vertex_ids, t.vertex_count, 3, &model->normals);
+        result = copy_rows(env, mesh->normals, t.vertex_ids, t.vertex_count, 3, &out->normals);
     if (result == FCT_OK && corners)
-        result = copy_rows(env, mesh->corner_normals, t.face_ids, t.face_count, 9, &model->corner_normals);
+        result = copy_rows(env, mesh->corner_normals, t.face_ids, t.face_count, 9, &out->corner_normals);
     return result;
 }
 

@@ -423,7 +423,9 @@ static void bad_normals_fall_back(void **state) {
     memset(ball.normals, 0, 3 * (size_t)ball.vertex_count * sizeof(float));
     scene = one_mesh(&ball, NULL);
     assert_null(fct_scene_get(scene).models[0].normals);
-    assert_int_equal(fct_shading_make(scene, 0, FCT_NORMALS_FILE, 40, false).rule, FCT_NORMALS_CREASE);
+    const fct_shading bare = fct_shading_make(scene, 0, FCT_NORMALS_FILE, 180, false);
+    assert_int_equal(bare.rule, FCT_NORMALS_CREASE);
+    assert_true(fabs(bare.crease_cosine - cos(40 * FCT_PI / 180)) < 1e-5);
     fct_scene_destroy(scene);
     fct_mesh_release(&plain, &ball);
 }
