@@ -94,7 +94,7 @@ static void light_follows_the_file(void **state) {
         }
         assert_true(lit > 100 && dark > 100);
         fct_bake_error error = fct_bake_get_error(bake, 0);
-        if (!(k & 2)) assert_true(error.error < .08); /* between the vertices, too */
+        if (!(k & 2)) assert_true(error.error < .006); /* between the vertices, too */
         fct_mesh_release(&plain, &m);
         fct_bake_destroy(bake);
         fct_scene_destroy(scene);
