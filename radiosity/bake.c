@@ -283,18 +283,6 @@ fct_bake_error fct_bake_get_error(const fct_bake *bake, uint32_t object) {
                             .bias = c->light > 0 ? c->bias / c->light : 0};
 }
 
-fct_normals fct_bake_get_normals(const fct_bake *bake, uint32_t object) {
-    const fct_solution *s = &bake->solution;
-    uint32_t first, count;
-    fct_bake_parts(&s->elements.view, object, &first, &count);
-    fct_normals rule = FCT_NORMALS_CREASE;
-    for (uint32_t i = first; i < first + count; ++i) {
-        rule = fct_solution_shading(s, i, false).rule;
-        if (rule == FCT_NORMALS_FILE) break;
-    }
-    return rule;
-}
-
 static uint32_t choose_samples(const fct_bake *bake) {
     return bake->solution.def.samples ? bake->solution.def.samples : REFERENCE_SAMPLES;
 }

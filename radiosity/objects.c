@@ -20,6 +20,18 @@ void fct_bake_parts(const fct_scene_view *view, uint32_t object, uint32_t *first
     while (low + *count < view->instance_count && view->instances[low + *count].object == object) ++*count;
 }
 
+fct_normals fct_bake_get_normals(const fct_bake *bake, uint32_t object) {
+    const fct_solution *s = fct_bake_solution(bake);
+    uint32_t first, count;
+    fct_bake_parts(&s->elements.view, object, &first, &count);
+    fct_normals rule = FCT_NORMALS_CREASE;
+    for (uint32_t i = first; i < first + count; ++i) {
+        rule = fct_solution_shading(s, i, false).rule;
+        if (rule == FCT_NORMALS_FILE) break;
+    }
+    return rule;
+}
+
 /* The parts [first, first + count) of an object in the order of the mesh as it was added. */
 static fct_result keep_parts(fct_bake *bake, uint32_t first, uint32_t count, fct_mesh *out) {
     const fct_solution *s = fct_bake_solution(bake);
