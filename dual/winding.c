@@ -180,6 +180,25 @@ static void turn_faces(fct_mesh *mesh, const uint8_t *faces) {
         uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
         t[1] = t[2], t[2] = swap;
         if (mesh->texcoords) swap_floats(mesh->texcoords + 6 * f + 2, mesh->texcoords + 6 * f + 4, 2);
+        if (mesh->corner_normals)
+            swap_floats(mesh->corner_normals + 9 * f + 3, mesh->corner_normals + 9 * f + 6, 3);
+    }
+}
+
+/* Twice the area vector of a face. */
+static v3 find_cross(const fct_mesh *mesh, size_t f) {
+    const uint32_t *t = mesh->triangles + 3 * f;
+    const v3 p = v3_load(mesh->positions + 3 * (size_t)t[0]);
+    return v3_cross(v3_sub(v3_load(mesh->positions + 3 * (size_t)t[1]), p),
+                    v3_sub(v3_load(mesh->positions + 3 * (size_t)t[2]), p));
+}
+
+/* Negates the normals of the corners of marked faces that point away from the side of their face. */
+static void turn_corner_normals(fct_mesh *mesh, const uint8_t *faces) {
+    for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) {
+        float *n = mesh->corner_normals + 3 * c;
+        if (faces[c / 3] && v3_dot(find_cross(mesh, c / 3), v3_load(n)) < 0)
+            v3_store(n, v3_scale(v3_load(n), -1));
     }
 }
 
@@ -189,9 +208,7 @@ static void turn_normals(fct_mesh *mesh, const uint8_t *faces, double *sums) {
     for (size_t f = 0; f < mesh->face_count; ++f) {
         if (!faces[f]) continue;
         const uint32_t *t = mesh->triangles + 3 * f;
-        v3 p = v3_load(mesh->positions + 3 * (size_t)t[0]);
-        v3 n = v3_cross(v3_sub(v3_load(mesh->positions + 3 * (size_t)t[1]), p),
-                        v3_sub(v3_load(mesh->positions + 3 * (size_t)t[2]), p));
+        const v3 n = find_cross(mesh, f);
         for (int k = 0; k < 3; ++k) {
             double *sum = sums + 3 * (size_t)t[k];
             sum[0] += n.x, sum[1] += n.y, sum[2] += n.z;
@@ -215,6 +232,7 @@ fct_result fct_inward_flip(const fct_env *env, fct_mesh *mesh, uint32_t *count) 
     if (result == FCT_OK && *count) {
         turn_faces(mesh, faces);
         if (mesh->normals) turn_normals(mesh, faces, sums);
+        if (mesh->corner_normals) turn_corner_normals(mesh, faces);
     }
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     return result;

@@ -67,7 +67,7 @@ static fct_result attempt_read(const format *f, const fct_source *source, fct_so
     env.message = hold_message, env.message_user = h;
     fct_source quiet = *source;
     quiet.env = &env;
-    fct_soup empty = {.layout = soup->layout};
+    fct_soup empty = {.layout = soup->layout, .wants_corners = soup->wants_corners};
     memcpy(empty.origin, soup->origin, sizeof empty.origin);
     fct_soup_release(source->env, soup);
     *soup = empty;
@@ -94,14 +94,15 @@ static fct_result read_soup(const format *f, const fct_source *source, fct_soup 
     return result;
 }
 
-static fct_result parse_source(const fct_source *source, const format *f, fct_mesh *out) {
+static fct_result parse_source(const fct_source *source, const format *f, bool corner_normals,
+                               fct_mesh *out) {
     const fct_env *env = source->env;
     if (!source->size) return fct_fail(env, FCT_ERROR_DATA, "%s: the file is empty", source->name);
     fct_result result = fct_progress(env, "read", 0);
     if (result != FCT_OK) return result;
     held *messages = fct_allocate(env, 2, sizeof *messages);
     if (!messages) return fct_fail_memory(env, "messages");
-    fct_soup soup = {0};
+    fct_soup soup = {.wants_corners = corner_normals};
     result = read_soup(f, source, &soup, messages, messages + 1);
     fct_release(env, messages);
     if (result == FCT_OK) result = fct_progress(env, "read", 1);
@@ -110,15 +111,26 @@ static fct_result parse_source(const fct_source *source, const format *f, fct_me
     return result;
 }
 
-fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
-                          const char *ending, fct_mesh *out) {
+static fct_result parse_memory(const fct_source *source, const char *ending, bool corner_normals,
+                               fct_mesh *out) {
     *out = (fct_mesh){0};
     const format *f = find_format(ending);
-    fct_source source = {env, name, data, size, NULL};
-    return f ? parse_source(&source, f, out) : fail_format(env, name);
+    return f ? parse_source(source, f, corner_normals, out) : fail_format(source->env, source->name);
 }
 
-fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out) {
+fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
+                          const char *ending, fct_mesh *out) {
+    const fct_source source = {env, name, data, size, NULL};
+    return parse_memory(&source, ending, false, out);
+}
+
+fct_result fct_mesh_parse_shaded(const fct_env *env, const char *name, const void *data, size_t size,
+                                 const char *ending, fct_mesh *out) {
+    const fct_source source = {env, name, data, size, NULL};
+    return parse_memory(&source, ending, true, out);
+}
+
+static fct_result load_file(const fct_env *env, const char *path, bool corner_normals, fct_mesh *out) {
     *out = (fct_mesh){0};
     bool standard = !strcmp(path, "-");
     const format *f = find_format(fct_file_format(env, path));
@@ -129,11 +141,19 @@ fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out) {
     fct_result result = fct_file_open(env, path, &file);
     if (result == FCT_OK) {
         fct_source source = {env, standard ? "standard input" : path, file.data, file.size, folder};
-        result = parse_source(&source, f, out);
+        result = parse_source(&source, f, corner_normals, out);
     }
     fct_file_close(env, &file);
     fct_release(env, folder);
     return result;
+}
+
+fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out) {
+    return load_file(env, path, false, out);
+}
+
+fct_result fct_mesh_load_shaded(const fct_env *env, const char *path, fct_mesh *out) {
+    return load_file(env, path, true, out);
 }
 
 fct_result fct_mesh_file_holds_light(const fct_env *env, const char *path, bool *out) {

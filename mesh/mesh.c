@@ -35,6 +35,7 @@ void fct_mesh_arrays(fct_mesh *m, fct_mesh_array out[FCT_MESH_ARRAYS]) {
         {&m->indirect, 3 * sizeof(float), FCT_MESH_INDIRECT, false},
         {&m->normals, 3 * sizeof(float), FCT_MESH_NORMALS, false},
         {&m->texcoords, 6 * sizeof(float), FCT_MESH_TEXCOORDS, true},
+        {&m->corner_normals, 9 * sizeof(float), FCT_MESH_CORNER_NORMALS, true},
         {&m->face_colors, 3 * sizeof(float), FCT_MESH_FACE_COLORS, true},
         {&m->materials, sizeof(uint32_t), FCT_MESH_MATERIALS, true},
         {&m->source_faces, sizeof(uint32_t), FCT_MESH_SOURCE_FACES, true},
@@ -317,6 +318,7 @@ fct_result fct_mesh_check(const fct_env *env, const char *name, const fct_mesh *
                   {"vertex", "indirect light", mesh->indirect, vertices, 3},
                   {"vertex", "normal", mesh->normals, vertices, 3},
                   {"face", "texture coordinate", mesh->texcoords, faces, 6},
+                  {"face", "normal", mesh->corner_normals, faces, 9},
                   {"face", "colour", mesh->face_colors, faces, 3},
                   {"face", "place in its source face", mesh->source_uv, faces, 6}};
     for (size_t i = 0; result == FCT_OK && i < sizeof floats / sizeof *floats; ++i)
@@ -329,12 +331,12 @@ fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh) {
     return fct_mesh_check(env, NULL, mesh);
 }
 
-/* Swaps the second and the third pair of every six floats. NULL is allowed. */
-static void swap_corners(float *pairs, size_t faces) {
-    for (size_t f = 0; pairs && f < faces; ++f)
-        for (size_t k = 0; k < 2; ++k) {
-            float *second = pairs + 6 * f + 2 + k, swap = *second;
-            *second = second[2], second[2] = swap;
+/* Swaps the values of the second and the third corner of every face, `width` floats each. NULL is allowed. */
+static void swap_corners(float *values, size_t faces, size_t width) {
+    for (size_t f = 0; values && f < faces; ++f)
+        for (size_t k = 0; k < width; ++k) {
+            float *second = values + (3 * f + 1) * width + k, swap = *second;
+            *second = second[width], second[width] = swap;
         }
 }
 
@@ -343,6 +345,7 @@ void fct_mesh_turn_over(fct_mesh *mesh) {
         uint32_t *t = mesh->triangles + 3 * f, swap = t[1];
         t[1] = t[2], t[2] = swap;
     }
-    swap_corners(mesh->texcoords, mesh->face_count);
-    swap_corners(mesh->source_uv, mesh->face_count);
+    swap_corners(mesh->texcoords, mesh->face_count, 2);
+    swap_corners(mesh->source_uv, mesh->face_count, 2);
+    swap_corners(mesh->corner_normals, mesh->face_count, 3);
 }

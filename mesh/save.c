@@ -69,5 +69,7 @@ fct_result fct_mesh_save(const fct_env *env, const char *path, const fct_mesh *m
     if (result != FCT_OK) return result;
     result = fct_choose_display(env, path, mesh, def->display, &shown.colors);
     if (result != FCT_OK) return result;
+    if (mesh->corner_normals)
+        fct_note(env, FCT_MESSAGE_NOTE, "%s: normals that differ by corner are left out", path);
     return fct_sink_write(env, path, produce, &j);
 }

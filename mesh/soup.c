@@ -15,6 +15,7 @@ void fct_soup_release(const fct_env *env, fct_soup *soup) {
     fct_release(env, soup->corners);
     fct_release(env, soup->starts);
     fct_release(env, soup->texcoords);
+    fct_release(env, soup->corner_normals);
     fct_release(env, soup->polygon_colors);
     fct_release(env, soup->materials);
     fct_names_release(env, soup->material_names, soup->material_count);
@@ -112,10 +113,11 @@ static void move_triangles(fct_soup *soup, fct_mesh *out) {
     out->face_count = soup->polygon_count;
     out->triangles = soup->corners;
     out->texcoords = soup->texcoords;
+    out->corner_normals = soup->corner_normals;
     out->face_colors = soup->polygon_colors;
     out->materials = soup->materials;
     soup->corners = soup->materials = NULL;
-    soup->texcoords = soup->polygon_colors = NULL;
+    soup->texcoords = soup->corner_normals = soup->polygon_colors = NULL;
 }
 
 static void cut_polygons(const fct_env *env, const char *name, const fct_soup *soup,
@@ -132,6 +134,9 @@ static void cut_polygons(const fct_env *env, const char *name, const fct_soup *s
                 out->triangles[place] = soup->corners[corner];
                 if (out->texcoords)
                     memcpy(out->texcoords + 2 * place, soup->texcoords + 2 * corner, 2 * sizeof(float));
+                if (out->corner_normals)
+                    memcpy(out->corner_normals + 3 * place, soup->corner_normals + 3 * corner,
+                           3 * sizeof(float));
             }
             out->source_faces[face] = polygon;
             if (out->materials) out->materials[face] = soup->materials[polygon];
@@ -157,6 +162,7 @@ static fct_result triangulate_soup(const fct_env *env, const char *name, fct_sou
                                FCT_ARRAY(scratch.previous, widest), FCT_ARRAY(scratch.reflex, widest),
                                FCT_ARRAY(local, 3 * (size_t)widest)};
     unsigned arrays = FCT_MESH_SOURCE_FACES | (soup->texcoords ? FCT_MESH_TEXCOORDS : 0) |
+                      (soup->corner_normals ? FCT_MESH_CORNER_NORMALS : 0) |
                       (soup->polygon_colors ? FCT_MESH_FACE_COLORS : 0) |
                       (soup->materials ? FCT_MESH_MATERIALS : 0);
     fct_mesh faces = {0};

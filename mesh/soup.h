@@ -28,16 +28,18 @@ typedef struct fct_source {
 typedef struct fct_soup {
     uint32_t vertex_count, polygon_count;
     size_t corner_count;
-    unsigned layout;   /* input: a reader with several layouts of text tries this one */
-    double origin[3];  /* input: the reader subtracts this from the coordinates */
-    fct_extent extent; /* the coordinates in double, if the file can hold more digits than a float */
-    float *positions;  /* vertex_count x 3 */
-    float *colors;     /* vertex_count x 3, linear, or NULL */
-    float *normals;    /* vertex_count x 3 or NULL */
+    unsigned layout;    /* input: a reader with several layouts of text tries this one */
+    bool wants_corners; /* input: keep normals that differ between the corners of a vertex */
+    double origin[3];   /* input: the reader subtracts this from the coordinates */
+    fct_extent extent;  /* the coordinates in double, if the file can hold more digits than a float */
+    float *positions;   /* vertex_count x 3 */
+    float *colors;      /* vertex_count x 3, linear, or NULL */
+    float *normals;     /* vertex_count x 3 or NULL */
     float *irradiance, *direct, *indirect; /* vertex_count x 3 or NULL */
     uint32_t *corners;                     /* corner_count vertex indices, possibly out of range */
     uint32_t *starts;      /* polygon_count + 1 places in corners, ascending, or NULL: three corners each */
     float *texcoords;      /* corner_count x 2 or NULL */
+    float *corner_normals; /* corner_count x 3 or NULL */
     float *polygon_colors; /* polygon_count x 3, linear, or NULL */
     uint32_t *materials;   /* polygon_count, or NULL */
     uint32_t material_count;

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "facetree/radiosity.h"
-#include "mesh/mesh.h"
 #include "radiosity/bake.h"
 #include "radiosity/output/attributes.h"
 #include "radiosity/output/output.h"
@@ -44,8 +43,11 @@ struct fct_bake {
 };
 
 fct_bake_def fct_bake_def_default(void) {
-    return (fct_bake_def){
-        .size = sizeof(fct_bake_def), .final = FCT_FINAL_GATHER, .error = DEFAULT_ERROR, .seed = 1};
+    return (fct_bake_def){.size = sizeof(fct_bake_def),
+                          .final = FCT_FINAL_GATHER,
+                          .error = DEFAULT_ERROR,
+                          .seed = 1,
+                          .crease = FCT_CREASE_DEGREES};
 }
 
 /* Area times emission over all surfaces, summed over channels. */
@@ -174,11 +176,33 @@ static fct_result check_extents(const fct_env *env, const fct_scene_view *view) 
     return FCT_OK;
 }
 
+/* Counts the corners of models with normals, once per model, at its first instance. */
+static fct_result count_normals(fct_bake *bake) {
+    const fct_solution *s = &bake->solution;
+    const fct_scene_view *view = &s->elements.view;
+    bool *seen = fct_allocate_zero(s->env, view->model_count, sizeof *seen);
+    if (!seen) return fct_fail_memory(s->env, "a bake");
+    for (uint32_t i = 0; i < view->instance_count; ++i) {
+        const fct_shading shading = fct_solution_shading(s, i, false);
+        const uint32_t model = view->instances[i].model;
+        uint64_t corners;
+        if (seen[model] || shading.rule != FCT_NORMALS_FILE) continue;
+        seen[model] = true;
+        bake->stats.normals_unusable += fct_shading_count_unusable(&shading, &corners);
+        bake->stats.normals_given += corners;
+    }
+    fct_release(s->env, seen);
+    return FCT_OK;
+}
+
 fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                            fct_bake **out) {
     *out = NULL;
     if (def->size != sizeof *def || !(def->error > 0) || !(def->max_edge >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "error must be positive and max_edge not negative");
+    if (!(def->crease > 0 && def->crease <= 180))
+        return fct_fail(env, FCT_ERROR_DATA, "a crease angle is over 0 and at most 180 degrees, found %g",
+                        def->crease);
     fct_scene_view view = fct_scene_get(scene);
     fct_result result = fct_attributes_check(env, def);
     if (result == FCT_OK) result = check_extents(env, &view);
@@ -203,6 +227,7 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
         bake->stats.converged = true;
         s->elements.view = view;
     }
+    if (result == FCT_OK) result = count_normals(bake);
     if (result != FCT_OK) {
         fct_bake_destroy(bake);
         return result;
@@ -274,6 +299,10 @@ static void count_power(fct_bake_stats *stats, const fct_material *m, const floa
     }
 }
 
+static void negate_normals(fct_surface *f) {
+    for (size_t i = 0; i < 3 * (size_t)f->mesh.vertex_count; ++i) f->normals[i] = -f->normals[i];
+}
+
 /* Vertex colours of one side by path tracing, on the surface without splits at shadow borders. *power: the
  * radiosity summed over area and channels. */
 static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_mesh *out, double *power) {
@@ -281,16 +310,17 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
     const fct_scene_view *view = &s->elements.view;
     const fct_material *m = &view->materials[view->instances[instance].material];
     fct_surface f;
-    fct_result result = fct_output_surface(s, instance, &f);
+    fct_result result = fct_output_surface(s, instance, back, &f);
     if (result != FCT_OK) return result;
     float *lost = fct_allocate(s->env, f.mesh.vertex_count, sizeof *lost);
-    for (size_t i = 0; back && i < 3 * (size_t)f.mesh.vertex_count; ++i) f.normals[i] = -f.normals[i];
+    if (back) negate_normals(&f);
     if (lost)
         result = fct_reference_estimate(s->env, s->scene, f.mesh.vertex_count, f.sample_points, f.normals,
                                         f.offsets, choose_samples(bake), fct_hash2(s->def.seed, instance),
                                         s->def.indirect_only, f.mesh.colors, lost, &bake->stats.output_rays);
     else
         result = fct_fail_memory(s->env, "a reference");
+    if (back) negate_normals(&f);
     *power = 0;
     if (result == FCT_OK) result = fct_attributes_add(s->env, s->def.outputs, NULL, f.mesh.colors, &f.mesh);
     for (size_t i = 0; result == FCT_OK && i < f.mesh.vertex_count; ++i) {
@@ -305,11 +335,7 @@ static fct_result trace_side(fct_bake *bake, uint32_t instance, bool back, fct_m
         }
     }
     fct_release(s->env, lost);
-    if (result == FCT_OK) {
-        *out = f.mesh;
-        f.mesh = (fct_mesh){0};
-        if (back && s->def.keep == FCT_KEEP_NONE) fct_mesh_turn_over(out);
-    }
+    if (result == FCT_OK) fct_output_take(s, &f, back, out);
     fct_surface_release(s->env, &f);
     return result;
 }
@@ -413,6 +439,7 @@ static fct_result trace_probes(fct_bake *bake, size_t count, const float *points
     for (size_t i = 0; i < count; ++i) {
         v3_store(units + 3 * i, v3_unit(v3_load(normals + 3 * i)));
         fct_site site = fct_probe_site(s->scene, points + 3 * i, units + 3 * i);
+        fct_probe_lift(s, &site);
         out[i] = (fct_probe){.instance = site.instance, .face = site.face};
         offsets[i] = site.offset;
         memcpy(sites + 3 * i, site.point, sizeof site.point);

@@ -13,6 +13,11 @@ fct_result fct_bake_join(const fct_env *env, fct_mesh *parts, uint32_t count, fc
                          fct_mesh *out);
 /* Releases the arrays that lead to the mesh as it was added. */
 void fct_bake_drop_sources(const fct_env *env, fct_mesh *mesh);
+/* Releases the normals unless they are an output. */
+void fct_bake_drop_normals(const fct_solution *s, fct_mesh *mesh);
+
+/* fct_bake_object, with normals in any case. */
+fct_result fct_bake_lit_object(fct_bake *bake, uint32_t object, fct_mesh *out);
 
 /* Lights the sides of an instance, the brighter one first, each as a mesh with the origin of the scene.
  * back[k]: side k is the back. With def.keep there is one side, the surface of the model with the winding of

@@ -20,6 +20,18 @@ void fct_bake_parts(const fct_scene_view *view, uint32_t object, uint32_t *first
     while (low + *count < view->instance_count && view->instances[low + *count].object == object) ++*count;
 }
 
+fct_normals fct_bake_get_normals(const fct_bake *bake, uint32_t object) {
+    const fct_solution *s = fct_bake_solution(bake);
+    uint32_t first, count;
+    fct_bake_parts(&s->elements.view, object, &first, &count);
+    fct_normals rule = FCT_NORMALS_CREASE;
+    for (uint32_t i = first; i < first + count; ++i) {
+        rule = fct_solution_shading(s, i, false).rule;
+        if (rule == FCT_NORMALS_FILE) break;
+    }
+    return rule;
+}
+
 /* The parts [first, first + count) of an object in the order of the mesh as it was added. */
 static fct_result keep_parts(fct_bake *bake, uint32_t first, uint32_t count, fct_mesh *out) {
     const fct_solution *s = fct_bake_solution(bake);
@@ -59,15 +71,17 @@ static fct_result join_sides(fct_bake *bake, uint32_t instance, fct_mesh *out) {
 fct_result fct_bake_instance(fct_bake *bake, uint32_t instance, fct_mesh *out) {
     const fct_solution *s = fct_bake_solution(bake);
     const fct_instance *i = &s->elements.view.instances[instance];
+    const bool kept = s->def.keep != FCT_KEEP_NONE;
     uint32_t first, count;
     *out = (fct_mesh){0};
-    if (s->def.keep == FCT_KEEP_NONE) return join_sides(bake, instance, out);
     fct_bake_parts(&s->elements.view, i->object, &first, &count);
-    if (count > 1)
+    if (kept && count > 1)
         return fct_fail(s->env, FCT_ERROR_DATA,
                         "instance %u is a part of object \"%s\", which is kept as a whole", instance,
                         i->name);
-    return keep_parts(bake, first, 1, out);
+    fct_result result = kept ? keep_parts(bake, first, 1, out) : join_sides(bake, instance, out);
+    fct_bake_drop_normals(s, out);
+    return result;
 }
 
 fct_result fct_bake_join(const fct_env *env, fct_mesh *parts, uint32_t count, fct_result result,
@@ -83,7 +97,7 @@ fct_result fct_bake_join(const fct_env *env, fct_mesh *parts, uint32_t count, fc
     return result;
 }
 
-fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out) {
+fct_result fct_bake_lit_object(fct_bake *bake, uint32_t object, fct_mesh *out) {
     const fct_solution *s = fct_bake_solution(bake);
     uint32_t first, count;
     *out = (fct_mesh){0};
@@ -94,6 +108,18 @@ fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out) {
     fct_result result = FCT_OK;
     for (uint32_t p = 0; p < count && result == FCT_OK; ++p) result = join_sides(bake, first + p, &parts[p]);
     return fct_bake_join(s->env, parts, count, result, out);
+}
+
+fct_result fct_bake_object(fct_bake *bake, uint32_t object, fct_mesh *out) {
+    fct_result result = fct_bake_lit_object(bake, object, out);
+    fct_bake_drop_normals(fct_bake_solution(bake), out);
+    return result;
+}
+
+void fct_bake_drop_normals(const fct_solution *s, fct_mesh *mesh) {
+    if (s->def.outputs & FCT_MESH_NORMALS) return;
+    fct_release(s->env, mesh->normals);
+    mesh->normals = NULL;
 }
 
 void fct_bake_drop_sources(const fct_env *env, fct_mesh *mesh) {
@@ -121,6 +147,7 @@ fct_result fct_bake_mesh(fct_bake *bake, fct_mesh *out, uint32_t *face_counts) {
     for (uint32_t i = 0; i < count && result == FCT_OK; ++i) {
         result = kept ? fct_bake_object(bake, i, &parts[i]) : join_sides(bake, i, &parts[i]);
         if (!s->def.sources) fct_bake_drop_sources(s->env, &parts[i]);
+        fct_bake_drop_normals(s, &parts[i]);
     }
     if (result == FCT_OK && face_counts) count_faces(view, parts, kept, face_counts);
     return fct_bake_join(s->env, parts, count, result, out);

@@ -100,6 +100,17 @@ static uint32_t find_corner(const float *uv) {
     return uv[0] == 1 && uv[1] == 0 ? 1 : 3;
 }
 
+/* Turns the normals of a lit mesh into the space of the node: with the transposed transform. */
+static void turn_to_node(const saving *w, uint32_t instance, fct_mesh *mesh) {
+    const float *m = w->view->instances[instance].to_world;
+    for (size_t v = 0; mesh->normals && v < mesh->vertex_count; ++v) {
+        float *n = mesh->normals + 3 * v;
+        const double x = n[0], y = n[1], z = n[2];
+        v3_store(n, v3_unit(v3_make(m[0] * x + m[4] * y + m[8] * z, m[1] * x + m[5] * y + m[9] * z,
+                                    m[2] * x + m[6] * y + m[10] * z)));
+    }
+}
+
 /* Moves the positions of a lit mesh into the space of the node. */
 static void move_to_node(const saving *w, uint32_t instance, const place *at, const fct_mesh *own,
                          fct_mesh *mesh) {
@@ -136,6 +147,11 @@ static uint32_t *list_corners(const saving *w, uint32_t instance, const fct_mesh
     return corners;
 }
 
+static void drop_normals(const fct_env *env, fct_mesh *mesh) {
+    fct_release(env, mesh->normals);
+    mesh->normals = NULL;
+}
+
 /* Adds the lit mesh of an instance and takes it. both: the other side has its own mesh. */
 static fct_result add_lit(const saving *w, uint32_t instance, const place *at, bool both, bool back,
                           fct_mesh *mesh) {
@@ -144,7 +160,12 @@ static fct_result add_lit(const saving *w, uint32_t instance, const place *at, b
     fct_mesh own = {0};
     uint32_t *corners = NULL;
     fct_result result = fct_tree_mesh(env, w->view->models[i->model].tree, &own);
-    if (result == FCT_OK && !at->world) move_to_node(w, instance, at, &own, mesh);
+    if (result == FCT_OK && !at->world) {
+        move_to_node(w, instance, at, &own, mesh);
+        turn_to_node(w, instance, mesh);
+    }
+    if (w->document && fct_solution_shading(w->s, instance, back).rule == FCT_NORMALS_FILE)
+        drop_normals(env, mesh); /* the file keeps its own, bit for bit */
     if (result == FCT_OK && w->document && !(corners = list_corners(w, instance, &own, mesh)))
         result = fct_fail_memory(env, "a lit mesh");
     fct_mesh_release(env, &own);
@@ -170,6 +191,7 @@ static fct_result keep_copy(saving *w, const fct_mesh *mesh) {
     if (result == FCT_OK) result = fct_mesh_copy(env, mesh, &w->merged[w->merged_count]);
     if (result != FCT_OK) return result;
     if (!w->s->def.sources) fct_bake_drop_sources(env, &w->merged[w->merged_count]);
+    fct_bake_drop_normals(w->s, &w->merged[w->merged_count]);
     ++w->merged_count;
     return FCT_OK;
 }
@@ -196,13 +218,15 @@ static fct_result spread_faces(const fct_env *env, fct_mesh *mesh) {
     if (corners > FCT_MESH_LIMIT)
         return fct_fail(env, FCT_ERROR_MEMORY, "%u faces with three vertices each are too many",
                         mesh->face_count);
-    fct_result result =
-        fct_mesh_create(env, (uint32_t)corners, mesh->face_count,
-                        FCT_MESH_COLORS | FCT_MESH_SOURCE_FACES | FCT_MESH_SOURCE_UV, &spread);
+    fct_result result = fct_mesh_create(
+        env, (uint32_t)corners, mesh->face_count,
+        FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_SOURCE_FACES | FCT_MESH_SOURCE_UV, &spread);
     if (result != FCT_OK) return result;
     for (size_t c = 0; c < corners; ++c) {
+        const size_t v = 3 * (size_t)mesh->triangles[c];
         spread.triangles[c] = (uint32_t)c;
-        memcpy(spread.positions + 3 * c, mesh->positions + 3 * (size_t)mesh->triangles[c], 3 * sizeof(float));
+        memcpy(spread.positions + 3 * c, mesh->positions + v, 3 * sizeof(float));
+        memcpy(spread.normals + 3 * c, mesh->normals + v, 3 * sizeof(float));
         memcpy(spread.colors + 3 * c, mesh->face_colors + c / 3 * 3, 3 * sizeof(float));
     }
     memcpy(spread.source_faces, mesh->source_faces, mesh->face_count * sizeof *spread.source_faces);
@@ -228,7 +252,7 @@ static fct_result extract_part(const saving *w, uint32_t instance, const fct_mes
 
 static fct_result save_kept(saving *w, uint32_t object, uint32_t first, uint32_t count, const place *at) {
     fct_mesh mesh, part;
-    fct_result result = fct_bake_object(w->bake, object, &mesh);
+    fct_result result = fct_bake_lit_object(w->bake, object, &mesh);
     if (result == FCT_OK) result = keep_copy(w, &mesh);
     for (uint32_t i = first; i < first + count && result == FCT_OK; ++i) {
         result = extract_part(w, i, &mesh, &part);

@@ -3,25 +3,41 @@
 
 #include <string.h>
 
+static bool has_values(const float *values, size_t count) {
+    for (size_t i = 0; values && i < count; ++i)
+        if (values[i] != 0) return true;
+    return false;
+}
+
+/* Copies `count` rows of `width` floats in the order of ids. */
+static fct_result copy_rows(const fct_env *env, const float *from, const uint32_t *ids, size_t count,
+                            size_t width, float **out) {
+    *out = fct_allocate(env, count, width * sizeof **out);
+    if (!*out) return fct_fail_memory(env, "a model's texture coordinates and normals");
+    for (size_t i = 0; i < count; ++i)
+        memcpy(*out + width * i, from + width * (size_t)ids[i], width * sizeof **out);
+    return FCT_OK;
+}
+
 fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const fct_tree *tree,
-                               float **texcoords, float **normals) {
-    *texcoords = *normals = NULL;
-    if (!mesh->texcoords && !mesh->normals) return FCT_OK;
+                               fct_attributes *out) {
+    *out = (fct_attributes){0};
+    const bool normals = has_values(mesh->normals, 3 * (size_t)mesh->vertex_count);
+    const bool corners = !normals && has_values(mesh->corner_normals, 9 * (size_t)mesh->face_count);
+    if (!mesh->texcoords && !normals && !corners) return FCT_OK;
     fct_result result = fct_tree_check(env, tree);
     if (result != FCT_OK) return result;
     const fct_tree_view t = fct_tree_get(tree);
     if (t.face_count != mesh->face_count || t.vertex_count != mesh->vertex_count)
         return fct_fail(env, FCT_ERROR_DATA, "the tree has %u faces and %u vertices, its mesh %u and %u",
                         t.face_count, t.vertex_count, mesh->face_count, mesh->vertex_count);
-    if (mesh->texcoords) *texcoords = fct_allocate(env, t.face_count, 6 * sizeof **texcoords);
-    if (mesh->normals) *normals = fct_allocate(env, t.vertex_count, 3 * sizeof **normals);
-    if ((mesh->texcoords && !*texcoords) || (mesh->normals && !*normals))
-        return fct_fail_memory(env, "a model's texture coordinates and normals");
-    for (size_t p = 0; *texcoords && p < t.face_count; ++p)
-        memcpy(*texcoords + 6 * p, mesh->texcoords + 6 * (size_t)t.face_ids[p], 6 * sizeof **texcoords);
-    for (size_t v = 0; *normals && v < t.vertex_count; ++v)
-        memcpy(*normals + 3 * v, mesh->normals + 3 * (size_t)t.vertex_ids[v], 3 * sizeof **normals);
-    return FCT_OK;
+    if (mesh->texcoords)
+        result = copy_rows(env, mesh->texcoords, t.face_ids, t.face_count, 6, &out->texcoords);
+    if (result == FCT_OK && normals)
+        result = copy_rows(env, mesh->normals, t.vertex_ids, t.vertex_count, 3, &out->normals);
+    if (result == FCT_OK && corners)
+        result = copy_rows(env, mesh->corner_normals, t.face_ids, t.face_count, 9, &out->corner_normals);
+    return result;
 }
 
 void fct_attributes_count_from_top(fct_mesh *mesh) {

@@ -5,11 +5,18 @@
 #include "base/env.h"
 #include "facetree/cluster.h"
 
-/* Copies texture coordinates and normals of the mesh from which the tree was built. *texcoords has 3 x 2
- * numbers per place, *normals 3 per tree vertex; NULL where the mesh has none. The caller releases them, also
- * after an error. Errors: DATA (a damaged tree, or one of another mesh), MEMORY. */
+/* The caller releases the arrays. */
+typedef struct fct_attributes {
+    float *texcoords;      /* per place x 3 x 2, or NULL */
+    float *normals;        /* per tree vertex x 3, or NULL */
+    float *corner_normals; /* per place x 3 x 3, or NULL */
+} fct_attributes;
+
+/* Copies texture coordinates and normals of the mesh from which the tree was built; NULL where the mesh has
+ * none, or only zeros as normals. *out may have arrays after an error too. Errors: DATA (a damaged tree, or
+ * one of another mesh), MEMORY. */
 fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const fct_tree *tree,
-                               float **texcoords, float **normals);
+                               fct_attributes *out);
 /* Replaces v by 1 - v. Files other than glTF count v from the bottom of the image, models from the top. */
 void fct_attributes_count_from_top(fct_mesh *mesh);
 

@@ -9,7 +9,6 @@
 
 #include "base/math/origin.h"
 #include "facetree/dual.h"
-#include "scene/attributes.h"
 #include "scene/transform.h"
 #include "scene/winding.h"
 
@@ -34,8 +33,9 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
     fct_release(env, model->source_vertices);
     fct_release(env, model->loose_vertices);
     fct_release(env, model->loose_positions);
-    fct_release(env, model->texcoords);
-    fct_release(env, model->normals);
+    fct_release(env, model->attributes.texcoords);
+    fct_release(env, model->attributes.normals);
+    fct_release(env, model->attributes.corner_normals);
 }
 
 void fct_scene_destroy(fct_scene *scene) {
@@ -160,8 +160,9 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
                        .source_vertices = own->source_vertices,
                        .source_face_count = fct_tree_get(own->tree).face_count,
                        .source_vertex_count = fct_tree_get(own->tree).vertex_count,
-                       .texcoords = own->texcoords,
-                       .normals = own->normals,
+                       .texcoords = own->attributes.texcoords,
+                       .normals = own->attributes.normals,
+                       .corner_normals = own->attributes.corner_normals,
                        .inward = fct_tree_get(own->tree).inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
@@ -203,7 +204,7 @@ static fct_result add_model_of_faces(fct_scene *scene, const char *name, const f
     bool moved = false;
     if (result == FCT_OK) result = center_mesh(env, &plain, own.origin, &moved);
     if (result == FCT_OK) result = fct_tree_build(env, &plain, &def, NULL, &own.tree);
-    if (result == FCT_OK) result = fct_attributes_copy(env, &plain, own.tree, &own.texcoords, &own.normals);
+    if (result == FCT_OK) result = fct_attributes_copy(env, &plain, own.tree, &own.attributes);
     if (moved) fct_release(env, plain.positions);
     if (faces) fct_mesh_release(env, &part);
     if (result != FCT_OK) {
@@ -221,8 +222,7 @@ static fct_result add_model_of_tree(fct_scene *scene, const char *name, const fc
     fct_scene_model own = {.tree = tree};
     memcpy(own.origin, fct_tree_get(tree).origin, sizeof own.origin);
     if (fct_tree_get(tree).root_count <= MOST_ROOTS) {
-        fct_result result =
-            from ? fct_attributes_copy(env, from, tree, &own.texcoords, &own.normals) : FCT_OK;
+        fct_result result = from ? fct_attributes_copy(env, from, tree, &own.attributes) : FCT_OK;
         if (result == FCT_OK) return add_model(scene, name, &own);
         release_model(env, &own);
         return result;

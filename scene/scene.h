@@ -3,6 +3,7 @@
 #define FCT_SCENE_SCENE_H
 
 #include "cluster/tree/coarse.h"
+#include "scene/attributes.h"
 #include "scene/texture/image.h"
 #include "scene/volume.h"
 
@@ -36,7 +37,8 @@ typedef struct fct_scene_model {
     fct_coarse coarse; /* of a large model in a scene of several resolutions; its tree is NULL otherwise */
     fct_bvh *coarse_bvh;
     uint32_t *source_faces, *source_vertices, *loose_vertices;
-    float *loose_positions, *texcoords, *normals;
+    float *loose_positions;
+    fct_attributes attributes;
     double origin[3];      /* the tree's positions are relative to it */
     bool colors_are_light; /* or may be: they do not paint */
 } fct_scene_model;

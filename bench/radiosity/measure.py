@@ -25,7 +25,7 @@ def run_json(command):
 
 
 def read_ply(path):
-    """Positions, radiosities and triangles of a baked PLY."""
+    """Positions, radiosities, triangles and shading normals of a baked PLY."""
     with open(path, "rb") as file:
         data = file.read()
     end = data.index(b"end_header\n") + 11
@@ -40,18 +40,14 @@ def read_ply(path):
     v = np.frombuffer(data, np.dtype(fields), vertices, end)
     f = np.frombuffer(data, np.dtype([("n", "u1"), ("v", "<u4", 3)]), faces, end + v.nbytes)
     return (np.stack([v[k] for k in "xyz"], 1).astype(float),
-            np.stack([v["radiosity_" + k] for k in "rgb"], 1).astype(float), f["v"])
+            np.stack([v["radiosity_" + k] for k in "rgb"], 1).astype(float), f["v"],
+            np.stack([v["n" + k] for k in "xyz"], 1).astype(float))
 
 
 def pick_points(path, count, random):
-    """Points by area: positions, normals (interpolated), shown radiosities; and the area."""
-    p, light, t = read_ply(path)
-    n = np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]])
-    area = np.linalg.norm(n, axis=1) / 2
-    smooth = np.zeros_like(p)
-    for k in range(3):
-        np.add.at(smooth, t[:, k], n)
-    smooth /= np.maximum(np.linalg.norm(smooth, axis=1), 1e-30)[:, None]
+    """Points by area: positions, interpolated shading normals, shown radiosities; and the area."""
+    p, light, t, smooth = read_ply(path)
+    area = np.linalg.norm(np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]]), axis=1) / 2
     face = random.choice(len(t), count, p=area / area.sum())
     u = np.sort(random.random((count, 2)), 1)
     w = np.stack([u[:, 0], u[:, 1] - u[:, 0], 1 - u[:, 1]], 1)
@@ -83,7 +79,8 @@ def measure_scene(tool, out, name, options):
     scene, baked = f"{folder}/scene.json", f"{out}/baked/{name}"
     subprocess.run(["rm", "-rf", baked], check=True)
     os.makedirs(baked)
-    stats = run_json([tool, "bake", scene, "-o", baked + "/", *options.bake.split()])
+    stats = run_json([tool, "bake", scene, "-o", baked + "/", "--light", "radiosity,normal",
+                      *options.bake.split()])
     with open(scene, encoding="ascii") as file:
         document = json.load(file)
     lit = {m for m, v in document["materials"].items() if max(np.ravel(v.get("emission", 0))) > 0}

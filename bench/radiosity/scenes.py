@@ -45,6 +45,29 @@ class Scene:
         self.models[name] = f"{name}.obj"
         return name
 
+    def patch(self, name, place, across, along, closed=(False, False)):
+        """A smooth surface as across x along rectangles with the exact normal at each vertex. place(u, v) for u and v in
+        [0, 1] is a point; the front is where d/du x d/dv points."""
+        step = 1e-5
+        rows, columns = along + (not closed[1]), across + (not closed[0])
+        with open(f"{self.folder}/{name}.obj", "w", encoding="ascii") as out:
+            for j in range(rows):
+                for i in range(columns):
+                    u, v = i / across, j / along
+                    a, b = ([q - p for p, q in zip(place(u - du, v - dv), place(u + du, v + dv))]
+                            for du, dv in ((step, 0), (0, step)))
+                    n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+                    size = math.hypot(*n)
+                    out.write("v %.9g %.9g %.9g\n" % tuple(place(u, v)))
+                    out.write("vn %.6f %.6f %.6f\n" % tuple(x / size for x in n))
+            for j in range(along):
+                for i in range(across):
+                    corners = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+                    out.write("f " + " ".join("%d//%d" % ((k + 1,) * 2) for k in (
+                        a % columns + b % rows * columns for a, b in corners)) + "\n")
+        self.models[name] = f"{name}.obj"
+        return name
+
     def cube(self):
         return self.obj("cube", [((0, 0, 0), (1, 1, 1))])
 
@@ -214,7 +237,37 @@ def make_library(s):
     s.save([41, 3.5, 29], [15, 1, 10])
 
 
-MAKERS = {"hall": make_hall, "lamps": make_lamps, "courtyard": make_courtyard, "classroom": make_classroom}
+def make_smooth(s):
+    """Round bodies of few triangles with normals: a ball, a ring, a vase and a wave."""
+    turn = 2 * math.pi
+
+    def ball(u, v):
+        low, a = .02 + .96 * v, turn * u
+        return [math.sin(math.pi * low) * math.sin(a), -math.cos(math.pi * low), math.sin(math.pi * low) * math.cos(a)]
+
+    def ring(u, v):
+        r = 1 + .4 * math.cos(turn * v)
+        return [r * math.sin(turn * u), .4 * math.sin(turn * v), r * math.cos(turn * u)]
+
+    def vase(u, v):
+        r = .35 + .15 * math.sin(turn * v)
+        return [r * math.sin(turn * u), 1.2 * v, r * math.cos(turn * u)]
+
+    def wave(u, v):
+        return [3 * u, .3 + .25 * math.sin(2 * turn * u), -1.2 * v]
+
+    s.room(8, 4, 6)
+    s.add("ball", s.patch("ball", ball, 12, 8, (True, False)), "white", (2, 1.2, 2), (.8,) * 3)
+    s.add("ring", s.patch("ring", ring, 14, 8, (True, True)), "red", (4.6, .5, 2.2))
+    s.add("vase", s.patch("vase", vase, 9, 10, (True, False)), "blue", (6.8, .05, 3), (1.2,) * 3)
+    s.add("wave", s.patch("wave", wave, 12, 1), "white", (2, .1, 5.2))
+    s.panel("lamp", [13, 12, 10], (4, 3.95, 3), (.7, .5))
+    s.lamp("small lamp", [120, 110, 90], (.6, 1.6, 4.6), (.08, .08, .08))
+    s.save([4, 2.2, 5.8], [4, .7, 1], 70)
+
+
+MAKERS = {"hall": make_hall, "lamps": make_lamps, "courtyard": make_courtyard, "classroom": make_classroom,
+          "smooth": make_smooth}
 DENSE = {  # scenes of many small parts, which are made on request
     "school": make_school, "school-mesh": lambda s: make_school(s, True), "boxes": make_boxes, "library": make_library}
 MADE = {"museum": 30000, "cornell": 1000}  # by the program alone: triangles

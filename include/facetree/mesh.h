@@ -18,16 +18,18 @@ extern "C" {
 typedef struct fct_mesh {
     uint32_t vertex_count;
     uint32_t face_count;
-    float *positions;       /* vertex_count x 3, finite */
-    uint32_t *triangles;    /* face_count x 3, each < vertex_count */
-    float *colors;          /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
-    float *irradiance;      /* vertex_count x 3: the light that arrives per area, or NULL */
-    float *direct;          /* vertex_count x 3: its part straight from the lamps, or NULL */
-    float *indirect;        /* vertex_count x 3: its other part, or NULL */
-    float *normals;         /* vertex_count x 3, or NULL */
-    float *texcoords;       /* face_count x 3 x 2, per corner, so seams need no extra vertices, or NULL */
-    float *face_colors;     /* face_count x 3, linear, or NULL */
-    uint32_t *materials;    /* face_count, index into material_names, or NULL */
+    float *positions;      /* vertex_count x 3, finite */
+    uint32_t *triangles;   /* face_count x 3, each < vertex_count */
+    float *colors;         /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
+    float *irradiance;     /* vertex_count x 3: the light that arrives per area, or NULL */
+    float *direct;         /* vertex_count x 3: its part straight from the lamps, or NULL */
+    float *indirect;       /* vertex_count x 3: its other part, or NULL */
+    float *normals;        /* vertex_count x 3, or NULL */
+    float *corner_normals; /* face_count x 3 x 3, per corner, or NULL: for vertices with several normals; then
+                              `normals` is NULL. fct_scene_add_object alone uses them */
+    float *texcoords;      /* face_count x 3 x 2, per corner, so seams need no extra vertices, or NULL */
+    float *face_colors;    /* face_count x 3, linear, or NULL */
+    uint32_t *materials;   /* face_count, index into material_names, or NULL */
     uint32_t *source_faces; /* face_count, polygon of each triangle, or NULL: the face number */
     uint32_t source_count;  /* polygons of the file, also those left out; 0 without source_faces */
     float *source_uv;       /* face_count x 3 x 2: where each corner lies in the triangle source_faces[f]: the
@@ -48,7 +50,8 @@ enum {
     FCT_MESH_SOURCE_UV = 64,
     FCT_MESH_IRRADIANCE = 128,
     FCT_MESH_DIRECT = 256,
-    FCT_MESH_INDIRECT = 512
+    FCT_MESH_INDIRECT = 512,
+    FCT_MESH_CORNER_NORMALS = 1024
 };
 
 /* Allocates the arrays (contents undefined). On failure *out is all zero. Errors: MEMORY. */

@@ -32,6 +32,17 @@ typedef enum fct_final { FCT_FINAL_NONE, FCT_FINAL_DIRECT, FCT_FINAL_GATHER } fc
  */
 typedef enum fct_keep { FCT_KEEP_NONE, FCT_KEEP_CORNER, FCT_KEEP_VERTEX, FCT_KEEP_FACE } fct_keep;
 
+/* The shading normals of the output: what they face decides how much light a vertex gets, while the geometry
+ * decides what it sees.
+ * FILE: those of the model's file, interpolated inside its triangles. Corners at one position are one vertex
+ * if they have the same normal, within a degree, at any angle between their faces. A normal that is zero or
+ * more than 88 degrees from that of its face is not usable; there, and for a model without normals, the rule
+ * is CREASE with 40 degrees.
+ * CREASE: the mean of the faces around a vertex, weighted by their angles. An edge at which the faces turn by
+ * more than fct_bake_def.crease is a crease; it has a vertex per side.
+ * FLAT: that of the face. Every face has vertices of its own. */
+typedef enum fct_normals { FCT_NORMALS_FILE, FCT_NORMALS_CREASE, FCT_NORMALS_FLAT } fct_normals;
+
 typedef struct fct_bake_def {
     uint32_t size;
     fct_bake_method method;
@@ -40,14 +51,17 @@ typedef struct fct_bake_def {
                      Numbers of rays and anchors of the output grow with 1 / sqrt(error) */
     uint32_t samples; /* REFERENCE: paths per vertex, default 256; FACE: gather rays per anchor; 0: default */
     uint64_t seed;    /* of all random numbers; equal seeds give equal results */
-    bool indirect_only; /* the output leaves out emission and direct light */
-    unsigned outputs;   /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
-                           FCT_MESH_INDIRECT; default 0. REFERENCE knows the irradiance alone, and NONE does not
-                           know its parts. indirect_only leaves the direct part out of the irradiance too */
-    fct_keep keep;      /* default NONE. FACE has no outputs beside the colours */
-    bool sources;       /* fct_bake_mesh also gives source_faces and source_uv; default false */
-    double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
-                           72nd of the diagonal of all surfaces that emit no light */
+    bool indirect_only;  /* the output leaves out emission and direct light */
+    unsigned outputs;    /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
+                            FCT_MESH_INDIRECT, FCT_MESH_NORMALS; default 0. REFERENCE knows the irradiance alone,
+                            and NONE does not    know its parts. indirect_only leaves the direct part out of the
+                            irradiance too */
+    fct_keep keep;       /* default NONE. FACE has no outputs beside the colours and the normals */
+    bool sources;        /* fct_bake_mesh also gives source_faces and source_uv; default false */
+    fct_normals normals; /* default FILE */
+    double crease;       /* CREASE: degrees, in (0, 180]; default 40 */
+    double max_edge;     /* longest edge of the output's triangles far from other instances, world units; 0: a
+                            72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);
 
@@ -61,6 +75,8 @@ typedef struct fct_bake_stats {
     double seconds_solve;       /* iterations and gathers */
     double seconds_push;        /* output so far */
     double seconds_total;       /* all of fct_bake_create, and the output so far */
+    uint64_t normals_unusable;  /* corners of models, with FCT_NORMALS_FILE; each model counts once */
+    uint64_t normals_given;     /* corners of models with normals */
     uint32_t sides_left_out;    /* lit sides of two-sided instances that keep has no place for, so far */
     uint64_t touched_bytes;     /* pages of the hierarchies that were read, without rays */
     /* The reference counts the power of the instances that it has written. */
@@ -87,8 +103,8 @@ typedef struct fct_bake_error {
 } fct_bake_error;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
- * (error <= 0, max_edge < 0, outputs that the method does not know, a scene or model with a diagonal outside
- * [1e-15, 1e18]), MEMORY, CANCELLED. */
+ * (error <= 0, max_edge < 0, a crease outside (0, 180], outputs that the method does not know, a scene or
+ * model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 /* NULL is allowed. */
@@ -96,6 +112,9 @@ FCT_API void fct_bake_destroy(fct_bake *bake);
 FCT_API fct_bake_stats fct_bake_get_stats(const fct_bake *bake);
 /* object < object_count of the scene. */
 FCT_API fct_bake_error fct_bake_get_error(const fct_bake *bake, uint32_t object);
+/* The rule that gives the shading normals of an object: def.normals, or CREASE for FILE where the object's
+ * file has no normals. object < object_count of the scene. */
+FCT_API fct_normals fct_bake_get_normals(const fct_bake *bake, uint32_t object);
 
 /* The lit mesh of one instance in world space, with the scene's origin; colours are radiosity per vertex.
  * Large flat triangles are tessellated, and vertices on creases are doubled; source_faces gives the face of

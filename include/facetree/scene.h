@@ -70,8 +70,9 @@ typedef struct fct_model {
     /* Of the mesh, in the order of the tree, which holds its colours; NULL if the mesh has none, or if the
      * model comes from a hierarchy file, which stores neither. v of a texture coordinate counts from the top
      * of the image, as in glTF; readers of other files turn it. */
-    const float *texcoords; /* faces x 3 x 2, per place and corner */
-    const float *normals;   /* vertices x 3, per tree vertex */
+    const float *texcoords;      /* faces x 3 x 2, per place and corner */
+    const float *normals;        /* vertices x 3, per tree vertex */
+    const float *corner_normals; /* faces x 3 x 3, per place and corner: instead of `normals` */
     bool inward; /* closed and wound inwards, as rooms are: the tree is, or the mesh before it was split */
 } fct_model;
 

@@ -98,10 +98,12 @@ static fct_result append_vertices(fct_glb_builder *b, const fct_glb_transform *t
     if (result == FCT_OK) result = grow_vertices(b, positions->count);
     if (result == FCT_OK) result = append_positions(b, t, positions);
     if (result != FCT_OK) return result;
-    if (b->has_normals) {
+    if (b->has_normals && p->normal >= 0) {
         result = get_array(b, p->normal, 3, 3, positions->count, &values);
         if (result != FCT_OK) return result;
         append_normals(b, t, values);
+    } else if (b->has_normals) {
+        memset(soup->normals + 3 * (size_t)soup->vertex_count, 0, positions->count * 3 * sizeof(float));
     }
     if (b->has_colors) {
         float *to = soup->colors + 3 * (size_t)soup->vertex_count;

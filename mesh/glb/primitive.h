@@ -14,7 +14,8 @@ typedef struct fct_glb_primitive {
 typedef struct fct_glb_builder {
     fct_glb *glb;
     fct_soup *soup;
-    /* The arrays that the soup gets. has_normals: every primitive has normals. */
+    /* The arrays that the soup gets. has_normals: primitives have normals; those
+     * without get zeros. */
     bool has_colors, has_normals, has_texcoords, has_materials;
     uint32_t unnamed; /* number of the material that primitives without one get */
     /* Faces get the number of their primitive of triangles instead of a material, and points are left out. */

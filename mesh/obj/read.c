@@ -407,6 +407,18 @@ static size_t count_bad_normals(const reader *r) {
     return bad;
 }
 
+/* A normal per corner, zero where the file gives none. */
+static fct_result spread_normals(reader *r) {
+    fct_soup *soup = r->soup;
+    soup->corner_normals = fct_allocate_zero(r->t.env, soup->corner_count, 3 * sizeof(float));
+    if (!soup->corner_normals) return fct_fail_memory(r->t.env, "normals");
+    for (size_t i = 0; i < soup->corner_count; ++i)
+        if (r->corner_normals[i] != FCT_NONE)
+            memcpy(soup->corner_normals + 3 * i, r->normals.values + 3 * (size_t)r->corner_normals[i],
+                   3 * sizeof(float));
+    return FCT_OK;
+}
+
 static fct_result collect_normals(reader *r) {
     fct_soup *soup = r->soup;
     if (is_unusable(r, "normals", &r->normals, count_bad_normals(r)) || !r->corner_normals ||
@@ -415,7 +427,9 @@ static fct_result collect_normals(reader *r) {
     uint32_t *numbers = fct_allocate(r->t.env, soup->vertex_count, sizeof(uint32_t));
     if (!numbers) return fct_fail_memory(r->t.env, "normals");
     fct_result result = FCT_OK;
-    if (!normals_agree(r, numbers)) {
+    if (!normals_agree(r, numbers) && soup->wants_corners) {
+        result = spread_normals(r);
+    } else if (!normals_agree(r, numbers)) {
         fct_note(r->t.env, FCT_MESSAGE_NOTE,
                  "%s: normals are left out, because the corners of a vertex do not share one", r->t.name);
     } else if ((soup->normals = fct_allocate_zero(r->t.env, soup->vertex_count, 3 * sizeof(float)))) {

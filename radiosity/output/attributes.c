@@ -5,14 +5,15 @@
 
 #include "base/env.h"
 
-#define KNOWN (FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT)
+#define KNOWN (FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_NORMALS)
 #define PARTS (FCT_MESH_DIRECT | FCT_MESH_INDIRECT)
 
 fct_result fct_attributes_check(const fct_env *env, const fct_bake_def *def) {
     if (def->outputs & ~(unsigned)KNOWN)
         return fct_fail(env, FCT_ERROR_DATA,
-                        "outputs are irradiance, direct and indirect light, found bits %#x", def->outputs);
-    if (def->outputs && def->keep == FCT_KEEP_FACE)
+                        "outputs are irradiance, direct and indirect light and normals, found bits %#x",
+                        def->outputs);
+    if (def->outputs & ~(unsigned)FCT_MESH_NORMALS && def->keep == FCT_KEEP_FACE)
         return fct_fail(env, FCT_ERROR_DATA, "faces have one colour, the radiosity; found other outputs");
     if (!(def->outputs & PARTS)) return FCT_OK;
     if (def->method == FCT_BAKE_REFERENCE)

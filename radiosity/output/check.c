@@ -76,7 +76,7 @@ static spot mix_spot(const checking *k, size_t face, const double weights[3]) {
         result.at.offset = fmaxf(result.at.offset, f->offsets[v]);
         for (int i = 0; i < 3; ++i) result.light[i] += weights[c] * k->light[3 * v + (size_t)i];
     }
-    v3_store(result.at.position, point);
+    v3_store(result.at.position, fct_shading_lift(&f->shading, result.place, point));
     v3_store(result.at.normal, v3_scale(v3_unit(normal), k->back ? -1 : 1));
     return result;
 }

@@ -18,7 +18,8 @@
 /* Weight of a corner of a face without area, against areas: it counts only where no other corner does. */
 #define LEAST_WEIGHT 1e-300
 
-enum { LIGHTS = 4 };
+/* The values of vertices that are joined: four kinds of light, and normals. */
+enum { LIGHTS = 5, NORMAL = 4 };
 
 /* Twice the area vector of a face. */
 static v3 measure_face(const fct_mesh *m, size_t f, v3 *centre) {
@@ -33,22 +34,33 @@ static void copy_floats(float *to, const float *from, size_t count) {
     if (count) memcpy(to, from, count * sizeof *to);
 }
 
+/* The shading normal at the centre of a face: that of the file if it has one there. */
+static v3 find_centre_normal(const fct_surface *s, size_t f, v3 face_normal) {
+    static const float centre[2] = {1.f / 3, 1.f / 3};
+    if (s->shading.rule != FCT_NORMALS_FILE) return face_normal;
+    fct_shaded_face face;
+    fct_shading_face(&s->shading, s->face_places[f], &face);
+    const v3 normal = fct_shaded_normal(&face, centre);
+    return v3_norm2(normal) > 0 ? normal : face_normal;
+}
+
 static void place_centre(const fct_surface *old, size_t f, fct_surface *s) {
     const uint32_t *t = old->mesh.triangles + 3 * f;
     const size_t v = old->mesh.vertex_count + f;
     v3 centre;
     const v3 cross = measure_face(&old->mesh, f, &centre);
     const double area = .5 * v3_norm(cross);
+    const v3 normal = find_centre_normal(old, f, v3_unit(cross));
     v3_store(s->mesh.positions + 3 * v, centre);
-    v3_store(s->sample_points + 3 * v, centre);
-    v3_store(s->normals + 3 * v, v3_unit(cross));
+    v3_store(s->sample_points + 3 * v, fct_shading_lift(&old->shading, old->face_places[f], centre));
+    v3_store(s->normals + 3 * v, normal);
     for (int k = 0; k < 3; ++k) {
         s->offsets[v] = fmaxf(s->offsets[v], old->offsets[t[k]]);
         s->areas[t[k]] += (float)(area * CORNER_SHARE);
     }
     s->areas[v] = (float)(area * CENTRE_SHARE);
     s->places[v] = old->face_places[f];
-    s->flat[v] = 1;
+    s->flat[v] = v3_dot(normal, v3_unit(cross)) >= FCT_FLAT_COSINE;
 }
 
 fct_result fct_keep_centres(const fct_env *env, fct_surface *surface) {
@@ -59,6 +71,7 @@ fct_result fct_keep_centres(const fct_env *env, fct_surface *surface) {
         return fct_fail(env, FCT_ERROR_MEMORY, "a surface has too many vertices and faces");
     fct_result result = fct_surface_allocate(env, (uint32_t)(vertices + faces), m->face_count, &s);
     if (result != FCT_OK) return result;
+    s.shading = surface->shading;
     copy_floats(s.mesh.positions, m->positions, 3 * vertices);
     copy_floats(s.normals, surface->normals, 3 * vertices);
     copy_floats(s.sample_points, surface->sample_points, 3 * vertices);
@@ -83,8 +96,8 @@ typedef struct merging {
     uint32_t first, count; /* instances */
     const fct_mesh *lit;
     fct_mesh *out;
-    double *sums;      /* FCT_KEEP_VERTEX: per vertex x LIGHTS x 3, weighted */
-    double *weights;   /* FCT_KEEP_VERTEX: per vertex */
+    double *sums;      /* except FCT_KEEP_CORNER: per vertex x LIGHTS x 3, weighted */
+    double *weights;   /* except FCT_KEEP_CORNER: per vertex */
     uint8_t *taken;    /* FCT_KEEP_CORNER: per vertex of the added mesh */
     uint32_t *numbers; /* FCT_KEEP_CORNER: per vertex of the part that is being added */
 } merging;
@@ -104,6 +117,7 @@ static uint32_t source_vertex(const fct_model *model, uint32_t v) {
 
 static void list_lights(const fct_mesh *mesh, float *out[LIGHTS]) {
     out[0] = mesh->colors, out[1] = mesh->irradiance, out[2] = mesh->direct, out[3] = mesh->indirect;
+    out[NORMAL] = mesh->normals;
 }
 
 /* Positions of the part's vertices, also of those without faces, and places of its faces. */
@@ -155,6 +169,10 @@ static void store_means(const merging *m) {
             for (size_t c = 0; lights[i] && c < 3; ++c)
                 lights[i][3 * v + c] =
                     m->weights[v] > 0 ? (float)(m->sums[3 * (LIGHTS * v + i) + c] / m->weights[v]) : 0;
+    for (size_t v = 0; v < m->out->vertex_count; ++v) {
+        float *n = m->out->normals + 3 * v;
+        v3_store(n, v3_unit(v3_load(n)));
+    }
 }
 
 /* The mean of each face by the rule of fct_keep_centres; of its corners if the face has no area. */
@@ -218,7 +236,8 @@ static fct_result create_out(merging *m, fct_keep keep) {
     if (vertices > FCT_MESH_LIMIT)
         return fct_fail(m->env, FCT_ERROR_MEMORY, "the lit mesh has more than 2^31 vertices");
     unsigned arrays = fct_mesh_bits(&m->lit[0]);
-    if (keep == FCT_KEEP_FACE) arrays = FCT_MESH_FACE_COLORS | FCT_MESH_SOURCE_FACES | FCT_MESH_SOURCE_UV;
+    if (keep == FCT_KEEP_FACE)
+        arrays = FCT_MESH_FACE_COLORS | FCT_MESH_NORMALS | FCT_MESH_SOURCE_FACES | FCT_MESH_SOURCE_UV;
     fct_result result = fct_mesh_create(m->env, (uint32_t)vertices, model->source_face_count, arrays, m->out);
     if (result != FCT_OK) return result;
     float *lights[LIGHTS];
@@ -239,10 +258,8 @@ static fct_result add_part(const merging *m, uint32_t part, fct_keep keep, uint6
     fct_mesh own;
     fct_result result = fct_tree_mesh(m->env, model_of(m, part)->tree, &own);
     if (result != FCT_OK) return result;
-    if (keep == FCT_KEEP_VERTEX)
-        add_corners(m, part, &own);
-    else
-        store_faces(m, part, &own);
+    add_corners(m, part, &own);
+    if (keep == FCT_KEEP_FACE) store_faces(m, part, &own);
     fct_mesh_release(m->env, &own);
     return FCT_OK;
 }
@@ -251,7 +268,7 @@ fct_result fct_keep_merge(const fct_env *env, const fct_scene_view *view, uint32
                           fct_keep keep, const fct_mesh *lit, fct_mesh *out) {
     merging m = {.env = env, .view = view, .first = first, .count = count, .lit = lit, .out = out};
     const size_t vertices = model_of(&m, 0)->source_vertex_count;
-    const bool means = keep == FCT_KEEP_VERTEX, sides = keep == FCT_KEEP_CORNER;
+    const bool sides = keep == FCT_KEEP_CORNER, means = !sides;
     size_t largest = 0;
     *out = (fct_mesh){0};
     for (uint32_t p = 0; p < count; ++p)

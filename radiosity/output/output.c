@@ -387,14 +387,24 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
     return fct_anchors_create(s->env, &source, l->surface, &def, anchors);
 }
 
-fct_result fct_output_surface(const fct_solution *s, uint32_t instance, fct_surface *out) {
+fct_result fct_output_surface(const fct_solution *s, uint32_t instance, bool back, fct_surface *out) {
     const bool kept = s->def.keep != FCT_KEEP_NONE;
-    fct_result result =
-        fct_surface_build(s->env, s->scene, instance, kept ? (double)INFINITY : s->max_edge, out);
+    const fct_shading shading = fct_solution_shading(s, instance, back);
+    fct_result result = fct_surface_build(s->env, &shading, kept ? (double)INFINITY : s->max_edge, out);
     if (result != FCT_OK || s->def.keep != FCT_KEEP_FACE) return result;
     result = fct_keep_centres(s->env, out);
     if (result != FCT_OK) fct_surface_release(s->env, out);
     return result;
+}
+
+void fct_output_take(const fct_solution *s, fct_surface *surface, bool back, fct_mesh *out) {
+    *out = surface->mesh;
+    out->normals = surface->normals;
+    surface->mesh = (fct_mesh){0};
+    surface->normals = NULL;
+    if (!back || s->def.keep != FCT_KEEP_NONE) return;
+    fct_mesh_turn_over(out);
+    for (size_t i = 0; i < 3 * (size_t)out->vertex_count; ++i) out->normals[i] = -out->normals[i];
 }
 
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
@@ -405,7 +415,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     const int rounds = kept ? 0 : BORDER_ROUNDS;
     fct_surface surface = {0};
     fct_anchors anchors = {0};
-    fct_result result = fct_output_surface(s, instance, &surface);
+    fct_result result = fct_output_surface(s, instance, back, &surface);
     if (result != FCT_OK) return result;
     lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
     result = cover_vertices(&l, rays);
@@ -424,11 +434,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     if (result == FCT_OK)
         result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);
     if (result == FCT_OK) result = check_light(&l, check, &counts->check);
-    if (result == FCT_OK) {
-        *out = surface.mesh;
-        surface.mesh = (fct_mesh){0};
-        if (back && !kept) fct_mesh_turn_over(out);
-    }
+    if (result == FCT_OK) fct_output_take(s, &surface, back, out);
     fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
     fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.again);
     fct_release(env, l.doubt), fct_release(env, l.sights);

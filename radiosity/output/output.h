@@ -15,8 +15,13 @@ typedef struct fct_output_rays {
 fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, fct_mesh *out,
                            fct_check *check, fct_output_rays *rays);
 
-/* The surface to light: with def.keep, the model's faces without splits. Errors: MEMORY, CANCELLED. */
-fct_result fct_output_surface(const fct_solution *s, uint32_t instance, fct_surface *out);
+/* The surface to light, for one of its sides: with def.keep, the model's faces without splits. Errors:
+ * MEMORY, CANCELLED. */
+fct_result fct_output_surface(const fct_solution *s, uint32_t instance, bool back, fct_surface *out);
+
+/* Moves the mesh out of a lit surface, with its shading normals, and winds it so that the lit side is in
+ * front. With def.keep it keeps the winding and the normals of the front. */
+void fct_output_take(const fct_solution *s, fct_surface *surface, bool back, fct_mesh *out);
 
 /* Share of the power of an instance's brighter side below which the other side counts as dark. */
 #define FCT_OUTPUT_DARK 1e-4

@@ -78,6 +78,12 @@ fct_site fct_probe_site(const fct_scene *scene, const float point[3], const floa
     return site;
 }
 
+void fct_probe_lift(const fct_solution *s, fct_site *site) {
+    if (site->instance == FCT_NONE) return;
+    const fct_shading shading = fct_solution_shading(s, site->instance, site->back);
+    v3_store(site->point, fct_shading_lift(&shading, site->place, v3_load(site->point)));
+}
+
 typedef struct probing {
     const fct_solution *s;
     const float *points, *normals;
@@ -108,6 +114,7 @@ static void probe_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
         float normal[3];
         v3_store(normal, v3_unit(v3_load(b->normals + 3 * i)));
         fct_site site = fct_probe_site(s->scene, b->points + 3 * i, normal);
+        fct_probe_lift(s, &site);
         double irradiance[3];
         if (s->def.final == FCT_FINAL_NONE && site.instance != FCT_NONE) {
             uint32_t leaf =

@@ -16,6 +16,9 @@ typedef struct fct_site {
 /* Finds the surface within 1e-3 of the scene's diagonal of the point that faces the unit normal. */
 fct_site fct_probe_site(const fct_scene *scene, const float point[3], const float normal[3]);
 
+/* Lifts the point of a site (shading.h). */
+void fct_probe_lift(const fct_solution *s, fct_site *site);
+
 /* Irradiance and radiosity at points with normals (count x 3 each, normals of any length). *rays grows.
  * Errors: MEMORY, CANCELLED. */
 fct_result fct_output_probe(const fct_solution *s, size_t count, const float *points, const float *normals,

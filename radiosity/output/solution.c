@@ -16,6 +16,10 @@ void fct_solution_direct(const fct_solution *s, const float point[3], const floa
     fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, doubt, sight, irradiance, rays);
 }
 
+fct_shading fct_solution_shading(const fct_solution *s, uint32_t instance, bool back) {
+    return fct_shading_make(s->scene, instance, s->def.normals, s->def.crease, back);
+}
+
 fct_source fct_solution_source(const fct_solution *s) {
     return (fct_source){&s->elements, &s->guides, s->transport.stored, s->longest_reach};
 }

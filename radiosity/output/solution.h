@@ -6,6 +6,7 @@
 #include "radiosity/output/anchor.h"
 #include "radiosity/solve/link.h"
 #include "radiosity/solve/transport.h"
+#include "radiosity/surface/shading.h"
 
 /* The longest reach of an anchor over the default edge of the scene: an eighth of the diagonal of most
  * scenes. */
@@ -34,6 +35,9 @@ uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least);
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
                          uint64_t seed, uint32_t rays_each, uint32_t doubt, fct_sight *sight,
                          double irradiance[3], uint64_t *rays);
+
+/* The shading of an instance by the rule of the def. */
+fct_shading fct_solution_shading(const fct_solution *s, uint32_t instance, bool back);
 
 /* The stored solution for gathers. */
 fct_source fct_solution_source(const fct_solution *s);

@@ -14,9 +14,6 @@
 
 #include <string.h>
 
-/* Cosine of 40 degrees between the normals of two faces: sharper edges are creases. Larger angles shade boxes
- * as if they were round; smaller ones break coarse spheres into facets. */
-#define CREASE_COSINE .766
 /* Positions per chunk. */
 #define GRAIN 4096
 
@@ -25,8 +22,12 @@ enum { BEGIN_VERTEX = 1, ADDED_VERTEX = 2, BEGIN_GROUP = 4, RIM_GROUP = 8 };
 
 typedef struct work {
     const fct_corners *mesh;
-    uint32_t *first;   /* vertex -> lowest vertex at its position */
-    float *normals;    /* per face */
+    const fct_shading *shading;
+    const uint32_t *source_faces, *places; /* per face */
+    const float *source_uv;                /* per corner x 2 */
+    uint32_t *first;                       /* vertex -> lowest vertex at its position */
+    float *normals;                        /* per face */
+    float *shades;     /* FILE: per corner, the file's normal; zero: not usable. Else NULL */
     size_t *begin;     /* position (by lowest vertex) -> its corners in `corners`; vertex_count + 1 */
     uint32_t *corners; /* 3 face_count */
     uint8_t *flags;    /* 3 face_count, as `corners` */
@@ -41,9 +42,30 @@ typedef struct work {
 } work;
 
 /* A degenerate face has no normal, so it is smooth with every neighbour. */
-static bool faces_are_smooth(const work *w, uint32_t corner_a, uint32_t corner_b) {
-    v3 a = v3_load(w->normals + corner_a / 3 * (size_t)3), b = v3_load(w->normals + corner_b / 3 * (size_t)3);
-    return v3_norm2(a) == 0 || v3_norm2(b) == 0 || v3_dot(a, b) > CREASE_COSINE;
+static bool corners_are_smooth(const work *w, uint32_t a, uint32_t b) {
+    if (w->shading->rule == FCT_NORMALS_FLAT) return w->source_faces[a / 3] == w->source_faces[b / 3];
+    v3 n = v3_load(w->normals + a / 3 * (size_t)3), m = v3_load(w->normals + b / 3 * (size_t)3);
+    if (v3_norm2(n) == 0 || v3_norm2(m) == 0) return true;
+    if (w->shades) {
+        v3 p = v3_load(w->shades + 3 * (size_t)a), q = v3_load(w->shades + 3 * (size_t)b);
+        if (v3_norm2(p) > 0 || v3_norm2(q) > 0) return fct_shading_same(p, q);
+    }
+    return v3_dot(n, m) > w->shading->crease_cosine;
+}
+
+/* Joins corners of one vertex that have the same normal of the file. Corners without one stay apart. */
+static void join_shared_normals(const work *w, const uint32_t *corners, size_t count, uint64_t *keys,
+                                uint32_t *values, uint32_t *parents) {
+    for (size_t i = 0; i < count; ++i) keys[i] = w->mesh->triangles[corners[i]], values[i] = (uint32_t)i;
+    fct_sort_in_place(keys, values, count);
+    for (size_t i = 1, head = 0; i < count; ++i) {
+        const v3 a = v3_load(w->shades + 3 * (size_t)corners[values[head]]);
+        const v3 b = v3_load(w->shades + 3 * (size_t)corners[values[i]]);
+        if (keys[i] == keys[head] && fct_shading_same(a, b))
+            fct_sets_join(parents, values[head], values[i]);
+        else if (keys[i] != keys[head] || v3_norm2(a) == 0)
+            head = i;
+    }
 }
 
 /* Joins the corners around a position across smooth edges. open[i]: corner i has an edge that is not joined;
@@ -62,15 +84,28 @@ static void join_corners(const work *w, const uint32_t *corners, size_t count, u
     for (size_t i = 0, end; i < 2 * count; i = end) {
         for (end = i + 1; end < 2 * count && keys[end] == keys[i];) ++end;
         uint32_t a = values[i], b = values[end - 1];
-        if (end - i != 2 || (a & 1) == (b & 1) || !faces_are_smooth(w, corners[a / 2], corners[b / 2]))
+        if (end - i != 2 || (a & 1) == (b & 1) || !corners_are_smooth(w, corners[a / 2], corners[b / 2]))
             continue;
         fct_sets_join(parents, a / 2, b / 2);
         --open[a / 2], --open[b / 2];
     }
+    if (w->shades) join_shared_normals(w, corners, count, keys, values, parents);
     for (size_t i = 0; i < count; ++i) {
         parents[i] = fct_sets_find(parents, (uint32_t)i);
         if (open[i]) open[parents[i]] = 1;
     }
+}
+
+/* The normal of a group: that of the file if it has one, else that of the faces. Returns false if it is not
+ * in front of all faces. */
+static bool find_group_normal(const work *w, size_t begin, size_t end, v3 *normal) {
+    const uint32_t *corners = w->corners + begin;
+    v3 sum = {0, 0, 0};
+    for (size_t i = begin; w->shades && i < end; ++i)
+        sum = v3_add(sum, v3_load(w->shades + 3 * (size_t)w->corners[i]));
+    *normal = v3_unit(sum);
+    return v3_norm2(sum) > 0 ? fct_corner_front(w->mesh, corners, end - begin, *normal)
+                             : fct_corner_normal(w->mesh, corners, end - begin, normal);
 }
 
 /* Sets the flags of the corners [begin, end) of one group. A group without a normal in front of all its faces
@@ -79,7 +114,7 @@ static uint32_t mark_group(const work *w, size_t begin, size_t end, bool rim) {
     const uint32_t *t = w->mesh->triangles;
     uint32_t added = 0;
     v3 normal;
-    bool whole = fct_corner_normal(w->mesh, w->corners + begin, end - begin, &normal);
+    bool whole = find_group_normal(w, begin, end, &normal);
     for (size_t i = begin; i < end; ++i) {
         uint32_t v = t[w->corners[i]];
         uint8_t flag = 0;
@@ -132,9 +167,10 @@ static double measure_corner_area(const fct_corners *mesh, uint32_t corner) {
 static void fill_group(const work *w, size_t begin, size_t end, uint32_t *next) {
     const fct_corners *mesh = w->mesh;
     v3 normal;
-    fct_corner_normal(mesh, w->corners + begin, end - begin, &normal);
+    find_group_normal(w, begin, end, &normal);
     bool rim = w->flags[begin] & RIM_GROUP;
     fct_foothold at = fct_corner_foothold(mesh, w->corners + begin, end - begin, normal, rim);
+    at.sample = fct_shading_lift(w->shading, w->places[at.face], at.sample);
     uint32_t v = FCT_NONE;
     double area = 0;
     for (size_t i = begin; i < end; ++i) {
@@ -165,6 +201,14 @@ static void fill_positions(void *user, size_t begin, size_t end, size_t chunk, u
     }
 }
 
+/* The file's normals at the corners of a face. */
+static void load_shades(const work *w, size_t f) {
+    fct_shaded_face face;
+    fct_shading_face(w->shading, w->places[f], &face);
+    for (size_t c = 3 * f; c < 3 * f + 3; ++c)
+        v3_store(w->shades + 3 * c, fct_shaded_normal(&face, w->source_uv + 2 * c));
+}
+
 static void compute_normals(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const work *w = user;
@@ -174,6 +218,7 @@ static void compute_normals(void *user, size_t begin, size_t end, size_t chunk, 
         v3 e1 = v3_sub(v3_load(w->mesh->positions + 3 * (size_t)t[1]), a);
         v3 e2 = v3_sub(v3_load(w->mesh->positions + 3 * (size_t)t[2]), a);
         v3_store(w->normals + 3 * f, v3_unit(v3_cross(e1, e2)));
+        if (w->shades) load_shades(w, f);
     }
 }
 
@@ -194,15 +239,16 @@ static void list_corners(work *w) {
     w->begin[0] = 0;
 }
 
-enum { ARRAYS = 7, SCRATCH = 4 };
+enum { ARRAYS = 8, SCRATCH = 4 };
 
 static void list_arrays(work *w, fct_array out[ARRAYS]) {
     size_t vertices = w->mesh->vertex_count, faces = w->mesh->face_count;
+    const bool given = w->shading->rule == FCT_NORMALS_FILE;
     const fct_array arrays[ARRAYS] = {
         FCT_ARRAY(w->first, vertices),     FCT_ARRAY(w->normals, 3 * faces),
         FCT_ARRAY(w->begin, vertices + 1), FCT_ARRAY(w->corners, 3 * faces),
         FCT_ARRAY(w->flags, 3 * faces),    FCT_ARRAY_ZERO(w->taken, vertices),
-        FCT_ARRAY(w->added, vertices),
+        FCT_ARRAY(w->added, vertices),     FCT_ARRAY_IF(given, w->shades, 9 * faces),
     };
     memcpy(out, arrays, sizeof arrays);
 }
@@ -219,8 +265,7 @@ static void list_scratch(work *w, size_t threads, fct_array out[SCRATCH]) {
 }
 
 /* Numbers the added vertices in the order of positions, and allocates the surface. */
-static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_faces, const float *source_uv,
-                            const uint32_t *face_places) {
+static fct_result make_room(const fct_env *env, work *w) {
     uint64_t total = w->mesh->vertex_count;
     for (size_t v = 0; v < w->mesh->vertex_count; ++v) {
         uint32_t added = w->added[v];
@@ -232,21 +277,28 @@ static fct_result make_room(const fct_env *env, work *w, const uint32_t *source_
     fct_result result = fct_surface_allocate(env, (uint32_t)total, w->mesh->face_count, w->out);
     if (result != FCT_OK) return result;
     size_t faces = w->mesh->face_count, vertices = w->mesh->vertex_count;
-    memcpy(w->out->mesh.source_faces, source_faces, faces * sizeof *source_faces);
-    memcpy(w->out->mesh.source_uv, source_uv, 6 * faces * sizeof *source_uv);
-    memcpy(w->out->face_places, face_places, faces * sizeof *face_places);
+    w->out->shading = *w->shading;
+    memcpy(w->out->mesh.source_faces, w->source_faces, faces * sizeof *w->source_faces);
+    memcpy(w->out->mesh.source_uv, w->source_uv, 6 * faces * sizeof *w->source_uv);
+    memcpy(w->out->face_places, w->places, faces * sizeof *w->places);
     memcpy(w->out->mesh.positions, w->mesh->positions, 3 * vertices * sizeof(float));
     memcpy(w->out->sample_points, w->mesh->positions, 3 * vertices * sizeof(float));
     return FCT_OK;
 }
 
 fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, const uint32_t *source_faces,
-                                const float *source_uv, const uint32_t *face_places, fct_surface *out) {
+                                const float *source_uv, const uint32_t *face_places,
+                                const fct_shading *shading, fct_surface *out) {
     *out = (fct_surface){0};
     if (mesh->face_count > UINT32_MAX / 3)
         return fct_fail(env, FCT_ERROR_MEMORY, "a surface of %u triangles has too many corners",
                         mesh->face_count);
-    work w = {.mesh = mesh, .out = out};
+    work w = {.mesh = mesh,
+              .shading = shading,
+              .source_faces = source_faces,
+              .places = face_places,
+              .source_uv = source_uv,
+              .out = out};
     fct_array arrays[ARRAYS], scratch[SCRATCH];
     list_arrays(&w, arrays);
     fct_result result = fct_allocate_all(env, arrays, ARRAYS, "the vertices of a surface");
@@ -259,7 +311,7 @@ fct_result fct_surface_vertices(const fct_env *env, const fct_corners *mesh, con
     result = fct_allocate_all(env, scratch, SCRATCH, "the vertices of a surface");
     if (result != FCT_OK) goto done;
     fct_parallel_for(env, mesh->vertex_count, GRAIN, group_positions, &w);
-    result = make_room(env, &w, source_faces, source_uv, face_places);
+    result = make_room(env, &w);
     if (result == FCT_OK) fct_parallel_for(env, mesh->vertex_count, GRAIN, fill_positions, &w);
     fct_release_all(env, scratch, SCRATCH);
 done:

@@ -11,8 +11,6 @@
 #define MIN_FRONT .02
 /* Steps of the search for a normal in front of all faces. */
 #define TURNS 64
-/* Faces with normals within .26 degrees lie in one plane. */
-#define FLAT_COSINE (1 - 1e-5)
 /* Part of the way from a vertex on the rim to the centroid of a face. With 0, a vertex in the corner of a
  * room sees into the neighbouring wall; larger values move the light visibly. */
 #define PULL .15
@@ -117,7 +115,7 @@ fct_foothold fct_corner_foothold(const fct_corners *mesh, const uint32_t *corner
         out.face = find_inward_corner(mesh, corners, count, mean, &centroid) / 3;
         out.sample = v3_mad(p[0], PULL, v3_sub(centroid, p[0]));
     }
-    out.flat = out.flat && least >= FLAT_COSINE;
+    out.flat = out.flat && least >= FCT_FLAT_COSINE;
     double largest = fct_max(fabs(p[0].x), fct_max(fabs(p[0].y), fabs(p[0].z)));
     out.offset = (EDGE_OFFSET * edges / (double)count + ROUNDING_OFFSET * FLT_EPSILON * largest) /
                  fct_max(least, LEAST_COSINE);

@@ -8,6 +8,9 @@
 
 #include "base/math/vec.h"
 
+/* Faces with normals within .26 degrees lie in one plane. */
+#define FCT_FLAT_COSINE (1 - 1e-5)
+
 /* A mesh before vertices on creases are doubled. Corner k of face f is number 3 f + k. */
 typedef struct fct_corners {
     uint32_t vertex_count, face_count;

@@ -89,6 +89,7 @@ static void copy_uv(const fct_surface *old, const fct_split *split, const cut_li
 static void copy_surface(const fct_surface *old, const fct_split *split, const cut_list *cuts,
                          fct_surface *out) {
     size_t count = old->mesh.vertex_count;
+    out->shading = old->shading;
     memcpy(out->mesh.positions, old->mesh.positions, 3 * count * sizeof(float));
     memcpy(out->mesh.colors, old->mesh.colors, 3 * count * sizeof(float));
     memcpy(out->normals, old->normals, 3 * count * sizeof(float));
@@ -125,6 +126,17 @@ static void add_areas(fct_surface *s) {
     }
 }
 
+/* The foothold of a new vertex from the corners around it: with the interpolated normal of the file where it
+ * has one, else with that of the faces. */
+static fct_foothold find_foothold(const fct_corners *mesh, const uint32_t *corners, size_t count, bool rim,
+                                  const fct_surface *s) {
+    v3 normal = fct_shading_mean(&s->shading, corners, count, s->face_places, s->mesh.source_uv);
+    if (!fct_corner_front(mesh, corners, count, normal)) fct_corner_normal(mesh, corners, count, &normal);
+    fct_foothold at = fct_corner_foothold(mesh, corners, count, normal, rim);
+    at.sample = fct_shading_lift(&s->shading, s->face_places[at.face], at.sample);
+    return at;
+}
+
 /* Sets the footholds of the new vertices from the corners around them. A new vertex is on the rim if only one
  * face of the old surface has its edge. */
 static fct_result place_cuts(const fct_env *env, const fct_split *split, uint32_t old_count, fct_surface *s) {
@@ -150,9 +162,7 @@ static fct_result place_cuts(const fct_env *env, const fct_split *split, uint32_
         uint32_t parent = split->parents[around[0] / 3];
         bool rim = true;
         for (size_t k = 1; k < count && rim; ++k) rim = split->parents[around[k] / 3] == parent;
-        v3 normal;
-        fct_corner_normal(&mesh, around, count, &normal);
-        fct_foothold at = fct_corner_foothold(&mesh, around, count, normal, rim);
+        const fct_foothold at = find_foothold(&mesh, around, count, rim, s);
         fct_surface_place(s, old_count + i, &at);
     }
 done:

@@ -11,13 +11,16 @@
 
 #include "facetree/scene.h"
 #include "radiosity/surface/foothold.h"
+#include "radiosity/surface/shading.h"
 
 typedef struct fct_surface {
-    fct_mesh mesh;  /* world positions, triangles, source_faces and source_uv (in the mesh as it was added),
-                       and colours, which are undefined until the output lights them */
-    float *normals; /* per vertex x 3: unit, n . n_f > 0 for all its faces; zero if all are degenerate */
+    fct_mesh mesh; /* world positions, triangles, source_faces and source_uv (in the mesh as it was added),
+                      and colours, which are undefined until the output lights them */
+    fct_shading shading;
+    float *normals; /* per vertex x 3: shading normals, unit, n . n_f > 0 for all its faces; zero if all are
+                       degenerate */
     float *sample_points; /* per vertex x 3: the vertex, or a point inside a face if the vertex is on the rim
-                             of its smooth group */
+                             of its smooth group; lifted (shading.h) */
     float *offsets;       /* per vertex: rays start at sample point + offset * normal */
     float *areas;         /* per vertex: a third of its faces' area */
     uint32_t *places;     /* per vertex: tree place of a face with the sample point; FCT_NONE without faces */

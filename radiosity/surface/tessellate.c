@@ -31,7 +31,7 @@
 /* The faces of the instance in their present state. */
 typedef struct patch {
     const fct_env *env;
-    const fct_scene *scene;
+    const fct_shading *shading;
     fct_scene_view view;
     uint32_t instance;
     double longest, shortest; /* edges: split above `longest`, never below `shortest` */
@@ -249,7 +249,7 @@ static fct_result store_surface(patch *c, fct_surface *out) {
         if (model->source_faces) c->faces[f] = model->source_faces[c->faces[f]];
     }
     fct_corners mesh = {c->vertex_count, c->face_count, c->positions, c->triangles};
-    result = fct_surface_vertices(env, &mesh, c->faces, c->uv, places, out);
+    result = fct_surface_vertices(env, &mesh, c->faces, c->uv, places, c->shading, out);
 done:
     fct_release(env, place_of);
     fct_release(env, places);
@@ -275,13 +275,13 @@ double fct_surface_default_edge(const fct_scene *scene) {
     return v3_norm(diagonal) / DIAGONAL_EDGES;
 }
 
-fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_t instance, double max_edge,
+fct_result fct_surface_build(const fct_env *env, const fct_shading *shading, double max_edge,
                              fct_surface *out) {
-    double longest = max_edge > 0 ? max_edge : fct_surface_default_edge(scene);
+    double longest = max_edge > 0 ? max_edge : fct_surface_default_edge(shading->scene);
     patch c = {.env = env,
-               .scene = scene,
-               .view = fct_scene_get(scene),
-               .instance = instance,
+               .shading = shading,
+               .view = fct_scene_get(shading->scene),
+               .instance = shading->instance,
                .longest = longest,
                .shortest = longest / GRADES};
     *out = (fct_surface){0};

@@ -8,10 +8,10 @@
  * all do. */
 double fct_surface_default_edge(const fct_scene *scene);
 
-/* Builds the surface of an instance. Splits edges longer than max_edge (world units; 0: the default) at their
- * midpoints, and edges down to a quarter of it near other instances. Errors: MEMORY (also if the result would
- * have 2^31 faces), CANCELLED. */
-fct_result fct_surface_build(const fct_env *env, const fct_scene *scene, uint32_t instance, double max_edge,
+/* Builds the surface of the shading's instance. Splits edges longer than max_edge (world units; 0: the
+ * default) at their midpoints, and edges down to a quarter of it near other instances. Errors: MEMORY (also
+ * if the result would have 2^31 faces), CANCELLED. */
+fct_result fct_surface_build(const fct_env *env, const fct_shading *shading, double max_edge,
                              fct_surface *out);
 
 #endif

@@ -134,7 +134,7 @@ static fct_result add_models(reader *r, json_t *mesh, int64_t index, fct_soup *s
  * surface. */
 static fct_result choose_arrays(reader *r, json_t *mesh) {
     json_t *object;
-    size_t i, count = 0, with_normals = 0, with_light = 0;
+    size_t i, with_light = 0;
     json_array_foreach(json_object_get(mesh, "primitives"), i, object) {
         fct_glb_primitive p;
         fct_result result = fct_glb_read_primitive(&r->glb, object, &p);
@@ -144,11 +144,11 @@ static fct_result choose_arrays(reader *r, json_t *mesh) {
         const bool textured = p.material >= 0 && p.material < r->material_count &&
                               r->scene->paints[p.material].pyramid != FCT_NONE;
         r->bare += textured && p.texcoord < 0;
-        ++count, with_normals += p.normal >= 0, with_light += p.light >= 0;
+        with_light += p.light >= 0;
+        r->builder.has_normals |= p.normal >= 0;
         r->builder.has_texcoords |= textured || p.texcoord >= 0;
         r->builder.has_colors |= p.color >= 0;
     }
-    r->builder.has_normals = with_normals && with_normals == count;
     r->builder.has_colors &= !with_light;
     return FCT_OK;
 }

@@ -27,7 +27,8 @@ static fct_result add_plain_model(fct_scene *scene, const char *path) {
         name[sizeof name - 1] = 0;
         fct_tree *tree = file.tree;
         file.tree = NULL;
-        result = fct_scene_add_object(scene, name, tree ? NULL : &file.mesh, tree, NULL, material, NULL);
+        const fct_mesh *mesh = file.mesh.face_count ? &file.mesh : NULL;
+        result = fct_scene_add_object(scene, name, mesh, tree, NULL, material, NULL);
     }
     fct_model_close(env, &file);
     return result;

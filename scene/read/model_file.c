@@ -1,4 +1,5 @@
 /* scene/read/model_file.c: opens the mesh or the hierarchy of a model. */
+#define _GNU_SOURCE
 #include "scene/read/model_file.h"
 
 #include <string.h>
@@ -7,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/io/file.h"
+#include "mesh/load.h"
 #include "mesh/ply/header.h"
 #include "scene/attributes.h"
 #include "scene/read/path.h"
@@ -41,7 +43,7 @@ static fct_result open_hierarchy_beside(const fct_env *env, const char *path, fc
 
 static fct_result load_mesh(const fct_env *env, const char *path, fct_mesh *out) {
     const char *format = fct_file_format(env, path);
-    fct_result result = fct_mesh_load(env, path, out);
+    fct_result result = fct_mesh_load_shaded(env, path, out);
     if (result == FCT_OK && strcasecmp(format, "glb") && strcasecmp(format, "gltf"))
         fct_attributes_count_from_top(out);
     return result;
@@ -62,14 +64,36 @@ static fct_result find_light(const fct_env *env, const char *path, bool *out) {
     return FCT_OK;
 }
 
+/* Whether a mesh file has normals. True in doubt: then the mesh is read. */
+static fct_result find_normals(const fct_env *env, const char *path, bool *out) {
+    static const struct {
+        const char *format, *sign;
+    } signs[] = {{"ply", " nx"}, {"obj", "vn"}, {"gltf", "\"NORMAL\""}, {"glb", "\"NORMAL\""}};
+    const char *format = fct_file_format(env, path);
+    fct_file file;
+    *out = strcasecmp(format, "stl") != 0;
+    for (size_t i = 0; i < FCT_LENGTH(signs); ++i) {
+        if (strcasecmp(format, signs[i].format)) continue;
+        fct_result result = fct_file_open(env, path, &file);
+        if (result != FCT_OK) return result;
+        const char *text = (const char *)file.data;
+        const char *end = i == 0 ? fct_ply_find_body(text, file.size) : text + file.size;
+        *out = end && memmem(text, (size_t)(end - text), signs[i].sign, strlen(signs[i].sign));
+        fct_file_close(env, &file);
+    }
+    return FCT_OK;
+}
+
 fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, bool want_paint,
                           fct_model_file *out) {
+    bool shaded = false;
     *out = (fct_model_file){0};
     out->light = true;
     if (!strcasecmp(fct_file_format(env, path), "fct")) return fct_tree_open(env, path, &out->tree);
     fct_result result = want_mesh || env->flip_inward ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
     if (result == FCT_OK && want_paint) result = find_light(env, path, &out->light);
-    if (result != FCT_OK || (out->tree && !want_paint)) return result;
+    if (result == FCT_OK && out->tree && !want_paint) result = find_normals(env, path, &shaded);
+    if (result != FCT_OK || (out->tree && !want_paint && !shaded)) return result;
     result = load_mesh(env, path, &out->mesh);
     if (result == FCT_OK && out->mesh.face_count == 0) {
         result = fct_fail(env, FCT_ERROR_DATA, "%s: a model needs at least one face, found none", path);

@@ -13,8 +13,9 @@ typedef struct fct_model_file {
 } fct_model_file;
 
 /* Opens NAME.fct, or a mesh file. Instead of mesh file NAME.ply it opens NAME.fct beside it if that file
- * records the hash of NAME.ply; want_mesh switches this off, and want_paint opens the mesh too. A file
- * without faces is an error. fct_model_close frees *out. Errors: INPUT, DATA, MEMORY, CANCELLED. */
+ * records the hash of NAME.ply; want_mesh switches this off. It opens the mesh too if the mesh has normals,
+ * which a hierarchy does not store, and with want_paint. A file without faces is an error. fct_model_close
+ * frees *out. Errors: INPUT, DATA, MEMORY, CANCELLED. */
 fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, bool want_paint,
                           fct_model_file *out);
 void fct_model_close(const fct_env *env, fct_model_file *file);

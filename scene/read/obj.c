@@ -284,7 +284,7 @@ static void release_reader(reader *r) {
 fct_result fct_scene_read_obj(fct_scene *scene, const char *name, const char *text, size_t size,
                               const char *base) {
     reader r = {.scene = scene, .env = scene->env, .name = name, .base = base};
-    fct_result result = fct_mesh_parse(r.env, name, text, size, "obj", &r.mesh);
+    fct_result result = fct_mesh_parse_shaded(r.env, name, text, size, "obj", &r.mesh);
     if (result != FCT_OK) return result;
     fct_attributes_count_from_top(&r.mesh);
     r.object_ids = json_object();

@@ -5,7 +5,12 @@
 #include "base/math/vec.h"
 #include "facetree/scene.h"
 #include "radiosity/sample.h"
+#include "radiosity/surface/shading.h"
 #include "support.h"
+
+/* The default shading of an instance: a pointer that is valid in the block. */
+#define SHADE(scene, instance)                                                                               \
+    ((const fct_shading[]){fct_shading_make(scene, instance, FCT_NORMALS_FILE, FCT_CREASE_DEGREES, false)})
 
 static inline uint32_t place_material(fct_scene *scene, double reflectance, double emission, bool two_sided) {
     fct_material material = {.two_sided = two_sided};

@@ -68,7 +68,7 @@ static void a_fold_with_wrong_winding_is_a_crease(void **state) {
     memcpy(mesh.positions, p, sizeof p), memcpy(mesh.triangles, t, sizeof t);
     place_mesh(scene, &mesh, place_material(scene, .5, 0, false), NULL);
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
-    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &s), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, &s), FCT_OK);
     assert_int_equal(s.mesh.vertex_count, 6);
     fct_surface_release(&plain, &s);
     fct_mesh_release(&plain, &mesh);
@@ -96,7 +96,7 @@ static void a_scaled_neighbour_is_as_near(void **state) {
             const float t[12] = {k, 0, 0, 0, 0, k, 0, 0, 0, 0, k, 0};
             place_mesh(scene, &ball, m, own ? NULL : t);
             assert_int_equal(fct_scene_commit(scene), FCT_OK);
-            assert_int_equal(fct_surface_build(&plain, scene, 0, .5, &s), FCT_OK);
+            assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), .5, &s), FCT_OK);
             counts[own] = s.mesh.vertex_count;
             fct_surface_release(&plain, &s);
             fct_mesh_release(&plain, &ball);

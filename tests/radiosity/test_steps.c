@@ -318,7 +318,7 @@ static double has_border(void *user, uint32_t a, uint32_t b) {
 static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     side x = {.s = s, .instance = instance, .back = back};
     uint32_t added = 0;
-    assert_int_equal(fct_surface_build(&plain, s->scene, instance, s->max_edge, &x.f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(s->scene, instance), s->max_edge, &x.f), FCT_OK);
     cover_by_steps(&x);
     cut_by_steps(&x);
     if (s->def.final != FCT_FINAL_NONE) {
@@ -427,7 +427,7 @@ static void bakes_equal_their_steps(void **state) {
         assert_true(def.method == FCT_BAKE_FACE && def.final == FCT_FINAL_GATHER && def.error == 2e-5 &&
                     def.seed == 1);
         assert_true(def.size == sizeof def && def.samples == 0 && !def.indirect_only && def.max_edge == 0);
-        other.size = def.size;
+        other.size = def.size, other.crease = def.crease;
         fct_bake *b;
         fct_bake_stats expected;
         watcher w = {.count = 0};
@@ -555,7 +555,7 @@ static void references_equal_their_steps(void **state) {
             assert_int_equal(fct_bake_instance(b, i, &mesh), FCT_OK);
             for (int k = 0; k < (m->two_sided ? 2 : 1); ++k) {
                 fct_surface *f = &sides[k].f;
-                assert_int_equal(fct_surface_build(&plain, scene, i, def.max_edge, f), FCT_OK);
+                assert_int_equal(fct_surface_build(&plain, SHADE(scene, i), def.max_edge, f), FCT_OK);
                 float *normals = malloc(12 * (size_t)f->mesh.vertex_count),
                       *lost = malloc(4 * (size_t)f->mesh.vertex_count);
                 for (size_t v = 0; v < 3 * (size_t)f->mesh.vertex_count; ++v)

@@ -253,7 +253,7 @@ static void vertices_are_filtered(void **state) {
     for (int k = 0; k < 2; ++k) {
         fct_surface f;
         double least = 1, most = 0;
-        assert_int_equal(fct_surface_build(&plain, scene, 0, edges[k], &f), FCT_OK);
+        assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), edges[k], &f), FCT_OK);
         for (size_t v = 0; v < f.mesh.vertex_count; ++v) {
             float rho[3];
             fct_surface_reflectance(scene, 0, &f, v, rho);
@@ -266,7 +266,7 @@ static void vertices_are_filtered(void **state) {
     }
     float rho[3];
     fct_surface f;
-    assert_int_equal(fct_surface_build(&plain, scene, 1, 1, &f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 1), 1, &f), FCT_OK);
     fct_surface_reflectance(scene, 1, &f, 0, rho);
     assert_true(rho[0] == .3F);
     fct_surface_release(&plain, &f);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "tools/bake/errors.h"
+#include "tools/bake/normals.h"
 #include "tools/bake/objects.h"
 #include "tools/bake/outputs.h"
 #include "tools/bake/probes.h"
@@ -56,7 +57,8 @@ enum {
     KEY_KEEP,
     KEY_MERGE,
     KEY_SOURCE,
-    KEY_NO_TEXTURES
+    KEY_NO_TEXTURES,
+    KEY_NORMALS
 };
 
 static const struct argp_option bake_options_table[] = {
@@ -95,7 +97,16 @@ static const struct argp_option bake_options_table[] = {
      "light that arrives, before the surface's own colour; direct and indirect, the two parts of the "
      "irradiance. All are per area, in the unit of the scene's emission. The first one makes the colours, "
      "and "
-     "all are written as floats. reference gives radiosity and irradiance",
+     "all are written as floats. reference gives radiosity and irradiance. Behind these, normal: the shading "
+     "normals, which a .glb always has",
+     0},
+    {"normals", KEY_NORMALS, "RULE", 0,
+     "What the light of a vertex faces. file (default): the normals of the file; corners with different "
+     "normals "
+     "are different vertices; a model without normals is as with crease=40. crease=DEG: the mean of the "
+     "faces "
+     "around, with a vertex per side of an edge at which the faces turn by more than DEG degrees (over 0, up "
+     "to 180). flat: the normal of the face",
      0},
     {"keep-mesh", KEY_KEEP, "HOW", 0,
      "Write the faces of the input in its order, and divide none. vertex: one colour per vertex, on a crease "
@@ -154,6 +165,8 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
         error = tool_parse_choice(state, "--keep-mesh", text, keeps, &index);
         o->def.keep = keep_values[index];
         return error;
+    case KEY_NORMALS:
+        return bake_parse_normals(state, text, &o->def);
     case KEY_SOURCE:
         o->def.sources = o->save.sources = true;
         return 0;
@@ -202,13 +215,20 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
 
 /* --- Outputs --- */
 
+/* Saves a mesh of all objects. Files other than .glb have normals on request, so that their layout stays. */
+static int save_merged(tool *t, const bake_options *o, const char *path, const fct_mesh *mesh) {
+    fct_mesh view = *mesh;
+    if (!tool_ends(path, "glb") && !(o->outputs.lights & FCT_MESH_NORMALS)) view.normals = NULL;
+    return bake_save_mesh(t, path, &view, &o->save);
+}
+
 static int write_file(tool *t, const bake_options *o, fct_bake *bake) {
     fct_mesh mesh;
     if (tool_ends(t->output, "glb") && !o->merge) return bake_write_scene(t, bake, o->also, &o->save);
     int code = tool_result(t, fct_bake_mesh(bake, &mesh, NULL));
     if (code != TOOL_DONE) return code;
-    code = bake_save_mesh(t, t->output, &mesh, &o->save);
-    if (code == TOOL_DONE && o->also) code = bake_save_mesh(t, o->also, &mesh, &o->save);
+    code = save_merged(t, o, t->output, &mesh);
+    if (code == TOOL_DONE && o->also) code = save_merged(t, o, o->also, &mesh);
     fct_mesh_release(&t->env, &mesh);
     return code;
 }
@@ -333,6 +353,7 @@ static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_sce
     if (code == TOOL_DONE) {
         stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
+        bake_warn_normals(t, &stats);
         answers->objects = bake_describe_errors(bake, &view);
         code = bake_print_errors(t, bake, &view);
         if (code == TOOL_DONE) code = report_bake(t, o, &stats, view.texture_count, load, answers);
@@ -414,6 +435,8 @@ static int run_bake(tool *t, void *options) {
     bake_probes set = {0};
     if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
     o->def.seed = t->seed;
+    if ((o->merge && t->output && tool_ends(t->output, "glb")) || (o->also && tool_ends(o->also, "glb")))
+        o->def.outputs |= FCT_MESH_NORMALS;
     int code = check_target(t, o);
     if (code == TOOL_DONE) code = check_bake_output(t, o);
     if (code == TOOL_DONE && o->probes) code = bake_read_probes(t, o->probes, &set);
@@ -469,7 +492,8 @@ int tool_bake(int argc, char **argv) {
             "error_estimate (RMS error over the mean of the light that surfaces without emission show, from "
             "a "
             "check at random points; of probes alone the noise of the solution), objects[]{object, "
-            "error_estimate, bias, area}, error (--error of the last bake), check_rays, outputs[] (the "
+            "normals (file, crease or flat), error_estimate, bias, area}, error (--error of the last bake), "
+            "check_rays, outputs[] (the "
             "quantities of --light), textures (how many images the "
             "materials have), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "

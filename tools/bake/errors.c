@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tools/bake/normals.h"
 #include "tools/kit/options.h"
 
 /* Bakes until a target is given up, and the share of the target that the next bake aims at. */
@@ -65,9 +66,13 @@ json_t *bake_describe_errors(const fct_bake *bake, const fct_scene_view *scene) 
     for (uint32_t k = 0; list && k < scene->object_count; ++k) {
         const fct_bake_error e = fct_bake_get_error(bake, k);
         const char *name = find_name(scene, k, &instance);
-        if (!(e.area > 0)) continue;
-        json_t *item = json_pack("{s:o, s:f, s:f, s:f}", "object", tool_json_text(name), "error_estimate",
-                                 e.error, "bias", e.bias, "area", e.area);
+        json_t *item = json_pack("{s:o, s:s}", "object", tool_json_text(name), "normals",
+                                 bake_name_normals(fct_bake_get_normals(bake, k)));
+        if (item && e.area > 0) {
+            json_object_set_new(item, "error_estimate", json_real(e.error));
+            json_object_set_new(item, "bias", json_real(e.bias));
+            json_object_set_new(item, "area", json_real(e.area));
+        }
         if (json_array_append_new(list, item)) {
             json_decref(list);
             return NULL;

@@ -11,7 +11,8 @@ static const struct output {
 } outputs_table[] = {{"radiosity", FCT_MESH_COLORS},
                      {"irradiance", FCT_MESH_IRRADIANCE},
                      {"direct", FCT_MESH_DIRECT},
-                     {"indirect", FCT_MESH_INDIRECT}};
+                     {"indirect", FCT_MESH_INDIRECT},
+                     {"normal", FCT_MESH_NORMALS}};
 
 enum { OUTPUTS = sizeof outputs_table / sizeof *outputs_table };
 
@@ -30,9 +31,11 @@ error_t bake_parse_outputs(struct argp_state *state, const char *text, bake_outp
         const unsigned light = find_light(name, length);
         if (!light || light & out->lights)
             return tool_usage(state,
-                              "--light: expected a list of radiosity, irradiance, direct and indirect, found "
-                              "'%.*s'%s",
+                              "--light: expected a list of radiosity, irradiance, direct, indirect and "
+                              "normal, found '%.*s'%s",
                               (int)length, name, light ? " twice" : "");
+        if (!out->first && light == FCT_MESH_NORMALS)
+            return tool_usage(state, "--light: the first quantity makes the colours, found 'normal'");
         if (!out->first) out->first = light;
         out->lights |= light;
         name += length;

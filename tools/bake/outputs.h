@@ -7,7 +7,7 @@
 #include "facetree/radiosity.h"
 #include "tools/kit/env.h"
 
-/* FCT_MESH_ bits; FCT_MESH_COLORS is the radiosity. */
+/* FCT_MESH_ bits; FCT_MESH_COLORS is the radiosity. Normals are never the first. */
 typedef struct bake_outputs {
     unsigned lights;
     unsigned first; /* the one that makes the colours */

@@ -18,13 +18,15 @@ static int spread_faces(tool *t, const fct_mesh *mesh, fct_mesh *out) {
     const size_t corners = 3 * (size_t)mesh->face_count;
     if (corners > INT32_MAX - 1)
         return tool_fail(t, TOOL_DATA, "%u faces with three vertices each are too many", mesh->face_count);
-    int code =
-        tool_result(t, fct_mesh_create(&t->env, (uint32_t)corners, mesh->face_count, FCT_MESH_COLORS, out));
+    const unsigned arrays = FCT_MESH_COLORS | (mesh->normals ? FCT_MESH_NORMALS : 0);
+    int code = tool_result(t, fct_mesh_create(&t->env, (uint32_t)corners, mesh->face_count, arrays, out));
     if (code != TOOL_DONE) return code;
     memcpy(out->origin, mesh->origin, sizeof out->origin);
     for (size_t c = 0; c < corners; ++c) {
         out->triangles[c] = (uint32_t)c;
-        memcpy(out->positions + 3 * c, mesh->positions + 3 * (size_t)mesh->triangles[c], 3 * sizeof(float));
+        const size_t v = 3 * (size_t)mesh->triangles[c];
+        memcpy(out->positions + 3 * c, mesh->positions + v, 3 * sizeof(float));
+        if (mesh->normals) memcpy(out->normals + 3 * c, mesh->normals + v, 3 * sizeof(float));
         memcpy(out->colors + 3 * c, mesh->face_colors + c / 3 * 3, 3 * sizeof(float));
     }
     return TOOL_DONE;

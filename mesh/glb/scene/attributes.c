@@ -197,7 +197,7 @@ static fct_result fill_all(filling *f, json_t *attributes, bool back, fct_glb_pi
     int64_t accessor;
     fct_glb *glb = &f->scene->document->glb;
     fct_result result = fct_glb_index(glb, attributes, "NORMAL", &accessor);
-    if (result == FCT_OK && accessor >= 0) {
+    if (result == FCT_OK && accessor >= 0 && !piece->lit.normals) {
         result = find_array(f, accessor, &array);
         if (result == FCT_OK && array && array->width == 3) result = add_normals(f, array, back, &piece->lit);
     }

@@ -43,8 +43,8 @@ typedef struct fct_glb_lit {
 } fct_glb_lit;
 /* Adds a lit mesh in the space of its node, with source_faces (faces of the mesh of the document) and
  * source_uv, and takes its arrays. In a given document it becomes one primitive per primitive of the mesh,
- * with the attributes of the file interpolated. Errors: DATA (the document is not that of the mesh), INPUT,
- * MEMORY; the mesh is released then. */
+ * with the attributes of the file interpolated, except normals that the lit mesh has. Errors: DATA (the
+ * document is not that of the mesh), INPUT, MEMORY; the mesh is released then. */
 fct_result fct_glb_scene_add_lit(fct_glb_scene *scene, const fct_glb_lit *lit, fct_mesh *mesh);
 
 /* Writes the document as a .glb. Nodes without a lit mesh have none. Errors: OUTPUT, DATA, INPUT, MEMORY,

@@ -2,7 +2,7 @@
 #include "mesh/mesh.h"
 #include "mesh/mesh_support.h"
 
-enum { VERTICES = 40, FACES = 30, FLOATS = 9 };
+enum { VERTICES = 40, FACES = 30, FLOATS = 10 };
 
 typedef struct floats {
     const char *what;
@@ -11,13 +11,13 @@ typedef struct floats {
 } floats;
 
 static const floats kinds[FLOATS] = {
-    {"positions", 3, false}, {"colors", 3, false},     {"irradiance", 3, false},
-    {"direct", 3, false},    {"indirect", 3, false},   {"normals", 3, false},
-    {"texcoords", 6, true},  {"face_colors", 3, true}, {"source_uv", 6, true}};
+    {"positions", 3, false}, {"colors", 3, false},       {"irradiance", 3, false}, {"direct", 3, false},
+    {"indirect", 3, false},  {"normals", 3, false},      {"texcoords", 6, true},   {"face_colors", 3, true},
+    {"source_uv", 6, true},  {"corner_normals", 9, true}};
 
 static void list_floats(const fct_mesh *m, const float *out[FLOATS]) {
-    const float *all[FLOATS] = {m->positions, m->colors,    m->irradiance,  m->direct,   m->indirect,
-                                m->normals,   m->texcoords, m->face_colors, m->source_uv};
+    const float *all[FLOATS] = {m->positions, m->colors,    m->irradiance,  m->direct,    m->indirect,
+                                m->normals,   m->texcoords, m->face_colors, m->source_uv, m->corner_normals};
     memcpy(out, all, sizeof all);
 }
 
@@ -116,6 +116,7 @@ static void turns_swap_corners(void **state) {
             assert_int_equal(m.triangles[corner], before.triangles[from]);
             assert_memory_equal(m.texcoords + 2 * corner, before.texcoords + 2 * from, 8);
             assert_memory_equal(m.source_uv + 2 * corner, before.source_uv + 2 * from, 8);
+            assert_memory_equal(m.corner_normals + 3 * corner, before.corner_normals + 3 * from, 12);
         }
     fct_mesh_release(&env, &m), fct_mesh_release(&env, &before);
 }
@@ -131,16 +132,18 @@ static void ply_keeps_lights(void **state) {
         fct_mesh_save_def def = fct_mesh_save_def_default();
         m.origin[1] = 0;
         m.material_count = 0;
+        r.text[0] = 0;
         def.ascii = ascii, def.sources = true;
         assert_int_equal(fct_mesh_save(&env, path, &m, &def), FCT_OK);
+        assert_non_null(strstr(r.text, "normals that differ by corner are left out"));
         assert_int_equal(fct_mesh_load(&env, path, &back), FCT_OK);
         const float *a[FLOATS], *b[FLOATS];
         list_floats(&m, a), list_floats(&back, b);
-        for (int k = 0; k < FLOATS - 1; ++k)
+        for (int k = 0; k < FLOATS - 2; ++k)
             assert_memory_equal(a[k], b[k],
                                 kinds[k].width * sizeof(float) * (kinds[k].of_faces ? FACES : VERTICES));
         assert_memory_equal(m.triangles, back.triangles, sizeof(uint32_t) * 3 * FACES);
-        assert_null(back.source_uv);
+        assert_true(!back.source_uv && !back.corner_normals);
         fct_mesh_release(&env, &back);
         def.no_radiosity = true, def.display = FCT_MESH_DIRECT;
         assert_int_equal(fct_mesh_save(&env, path, &m, &def), FCT_OK);

@@ -294,7 +294,7 @@ static void groups_respect_the_tolerance(void **state) {
     place_mesh(scene, &mesh, place_material(scene, .5, 0, false), NULL);
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
     fct_surface f;
-    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, &f), FCT_OK);
     uint32_t last = 0;
     for (int k = 0; k < 3; ++k) {
         const double tolerance = k == 0 ? .9 : .4;

@@ -99,7 +99,7 @@ static void others_know_the_irradiance(void **state) {
     }
     fct_bake *bake;
     fct_bake_def def = fct_bake_def_default();
-    def.outputs = FCT_MESH_NORMALS;
+    def.outputs = FCT_MESH_TEXCOORDS;
     assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_ERROR_DATA);
     def.outputs = FCT_MESH_DIRECT, def.indirect_only = true;
     assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_ERROR_DATA);

@@ -151,7 +151,8 @@ static void groups_follow_the_rules(void **state) {
         room r = make_room(seed);
         fct_surface f;
         uint32_t instance = seed % 2 ? r.ball : 0;
-        assert_int_equal(fct_surface_build(&plain, r.scene, instance, instance ? .4 : 1.5, &f), FCT_OK);
+        assert_int_equal(fct_surface_build(&plain, SHADE(r.scene, instance), instance ? .4 : 1.5, &f),
+                         FCT_OK);
         fct_anchors t;
         maker m = {.r = &r,
                    .f = &f,

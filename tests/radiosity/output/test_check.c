@@ -64,7 +64,7 @@ static void errors_are_those_of_the_light(void **state) {
     fct_scene *scene;
     fct_surface f;
     make_furnace(&s, &scene);
-    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, &f), FCT_OK);
     const size_t n = f.mesh.vertex_count;
     float *light = malloc(3 * n * sizeof *light);
     uint8_t *covered = calloc(n, 1);
@@ -126,7 +126,7 @@ static void noise_of_gathers_cancels(void **state) {
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
     solve_scene(&s, scene);
     fct_surface f;
-    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, &f), FCT_OK);
     const size_t n = f.mesh.vertex_count;
     float *light = malloc(3 * n * sizeof *light);
     uint8_t *covered = calloc(n, 1);

@@ -270,7 +270,7 @@ static void anchors_aim_from_their_side(void **state) {
     make_linked(2, true, &x);
     const fct_elements *set = &x.r.set;
     assert_int_equal(fct_guide_create(&x.guides, &guide), FCT_OK);
-    assert_int_equal(fct_surface_build(&plain, x.r.scene, x.r.ball, 10, &f), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(x.r.scene, x.r.ball), 10, &f), FCT_OK);
     const fct_source source = {set, &x.guides, x.r.stored, 1};
     const fct_anchors_def def = {.rays = 24, .tolerance = .4, .side = -1, .instance = x.r.ball, .seed = 7};
     assert_int_equal(fct_anchors_create(&plain, &source, &f, &def, &anchors), FCT_OK);

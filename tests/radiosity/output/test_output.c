@@ -58,7 +58,7 @@ static void noise_on_flat_surfaces_is_smoothed(void **state) {
                 v3_make(0, 1, 0));
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
     fct_surface s;
-    assert_int_equal(fct_surface_build(&plain, scene, 0, 10, &s), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, &s), FCT_OK);
     size_t n = s.mesh.vertex_count;
     double *expected = malloc(3 * n * sizeof *expected), before = 0, after = 0;
     for (size_t v = 0; v < n; ++v)

@@ -9,6 +9,9 @@
 #include "radiosity/surface/tessellate.h"
 #include "scene/transform.h"
 
+/* Of a mesh without a scene, with creases of 40 degrees. */
+#define SHADELESS ((const fct_shading[]){{.rule = FCT_NORMALS_CREASE, .crease_cosine = .766}})
+
 static fct_env plain; /* outlives every scene */
 
 static void assert_near(double value, double expected, double tolerance) {
@@ -129,7 +132,7 @@ static void corners_share_vertices_by_the_rules(void **state) {
         float *uv = malloc(6 * m.face_count * sizeof *uv);
         for (uint32_t i = 0; i < 6 * m.face_count; ++i) uv[i] = (float)i;
         fct_surface s;
-        assert_int_equal(fct_surface_vertices(&plain, &m, sources, uv, places, &s), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, sources, uv, places, SHADELESS, &s), FCT_OK);
         assert_memory_equal(s.mesh.source_uv, uv, 24 * (size_t)m.face_count);
         free(uv);
         assert_memory_equal(s.mesh.source_faces, sources, 4 * (size_t)m.face_count);
@@ -203,8 +206,8 @@ static void refinement_splits_the_chosen_edges(void **state) {
         for (uint32_t f = 0; f < m.face_count; ++f) numbers[f] = f + 9;
         float *uv = calloc(6 * m.face_count, sizeof *uv);
         fct_surface s, old;
-        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, &s), FCT_OK);
-        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, &old), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, SHADELESS, &s), FCT_OK);
+        assert_int_equal(fct_surface_vertices(&plain, &m, numbers, uv, numbers, SHADELESS, &old), FCT_OK);
         free(uv);
         uint32_t n = s.mesh.vertex_count;
         for (size_t i = 0; i < 3 * (size_t)n; ++i)
@@ -430,7 +433,7 @@ static void long_edges_are_split_and_no_others(void **state) {
         for (uint32_t i = 0; i < view.instance_count; ++i) {
             double longest = scale * (.5 + .5 * r[6 + i]);
             fct_surface s;
-            assert_int_equal(fct_surface_build(&plain, scene, i, longest, &s), FCT_OK);
+            assert_int_equal(fct_surface_build(&plain, SHADE(scene, i), longest, &s), FCT_OK);
             for (size_t c = 0; c < 3 * (size_t)s.mesh.face_count; ++c) {
                 v3 a = at(s.mesh.positions, s.mesh.triangles[c]),
                    b = at(s.mesh.positions, s.mesh.triangles[c % 3 == 2 ? c - 2 : c + 1]);

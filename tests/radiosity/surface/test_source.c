@@ -80,7 +80,8 @@ static void corners_know_their_place(void **state) {
         for (int round = 0; round < 3; ++round) { /* as built, then refined twice */
             for (uint32_t i = 0; i < count; ++i) {
                 uint64_t seed = (uint64_t)(10 * kind + round);
-                if (round == 0) assert_int_equal(fct_surface_build(&plain, scene, i, .3, &whole[i]), FCT_OK);
+                if (round == 0)
+                    assert_int_equal(fct_surface_build(&plain, SHADE(scene, i), .3, &whole[i]), FCT_OK);
                 if (round > 0)
                     assert_int_equal(fct_surface_refine(&plain, &whole[i], cut_some, &seed, &added), FCT_OK);
                 split += added;

@@ -15,7 +15,7 @@ static fct_scene *begin(void) {
 
 static fct_surface build(const fct_scene *scene, uint32_t instance, double max_edge) {
     fct_surface s;
-    assert_int_equal(fct_surface_build(&plain, scene, instance, max_edge, &s), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, instance), max_edge, &s), FCT_OK);
     return s;
 }
 
@@ -396,7 +396,7 @@ static void threads_do_not_matter(void **state) {
     for (uint32_t i = 0; i < 2; ++i) {
         fct_env env = plain;
         env.thread_count = 1 + 2 * i;
-        assert_int_equal(fct_surface_build(&env, scene, 0, .05, s + i), FCT_OK);
+        assert_int_equal(fct_surface_build(&env, SHADE(scene, 0), .05, s + i), FCT_OK);
     }
     size_t vertices = s[0].mesh.vertex_count, faces = s[0].mesh.face_count;
     assert_true(vertices == s[1].mesh.vertex_count && faces == s[1].mesh.face_count &&
@@ -421,7 +421,7 @@ static void memory_runs_out(void **state) {
         recorder r = {.fail_at = n};
         fct_env env = recorder_env(&r);
         fct_surface s;
-        result = fct_surface_build(&env, scene, 0, .4, &s);
+        result = fct_surface_build(&env, SHADE(scene, 0), .4, &s);
         assert_true(result == FCT_OK || (result == FCT_ERROR_MEMORY && r.messages && !s.normals));
         fct_surface_release(&env, &s);
         assert_int_equal(r.alive, 0);
@@ -430,7 +430,7 @@ static void memory_runs_out(void **state) {
     recorder r = {0};
     fct_env env = recorder_env(&r);
     fct_surface s;
-    assert_int_equal(fct_surface_build(&env, scene, 0, .4, &s), FCT_OK);
+    assert_int_equal(fct_surface_build(&env, SHADE(scene, 0), .4, &s), FCT_OK);
     memset(s.mesh.colors, 0, 12 * (size_t)s.mesh.vertex_count);
     long steps = 0;
     do {
