@@ -127,7 +127,7 @@ expect 64 bake cube.off
 says "expected -o OUT or --probe FILE"
 expect 64 bake cube.off -o x.stl
 expect 64 bake cube.off -o x.glb --method volume
-expect 64 bake cube.off -o x.glb --visibility multires
+expect 64 bake cube.off -o x.glb --visibility octree
 expect 64 bake cube.off -o x.glb --final best
 expect 64 bake cube.off -o x.glb --error 0
 expect 64 bake cube.off -o x.glb --samples 0
