@@ -34,7 +34,7 @@ enum { BORDER_ROUNDS = 4 };
 #define BORDER_LEVEL .04
 /* Rays per anchor, and first rays per lamp, at the default error. Two rays that agree often miss a penumbra,
  * but those of a vertex and its neighbours together seldom do. */
-enum { ANCHOR_RAYS = 32, LAMP_RAYS = 2 };
+enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
 /* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
 enum { DOUBT_ROUNDS = 2 };
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the

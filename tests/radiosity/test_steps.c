@@ -331,7 +331,7 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     cover_by_steps(&x);
     cut_by_steps(&x);
     if (s->def.final != FCT_FINAL_NONE) {
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(32 * s->fineness),
+        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(20 * s->fineness),
                                .tolerance =
                                    (s->def.final == FCT_FINAL_GATHER ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
                                .side = back ? -1 : 1,
