@@ -55,6 +55,8 @@ typedef struct query {
     float origin[3];
     uint64_t seed;
     uint32_t base_rays, doubt;
+    uint32_t slots;  /* of the lamps to measure: all, or those in doubt */
+    fct_sight known; /* of the earlier call, if lamps are in doubt */
     fct_sight sight;
     bool fixed;
     double total; /* sum of the lamps' estimates times strength */
@@ -70,6 +72,11 @@ static uint32_t find_slot(const query *q, const fct_lamp *lamp) {
 
 static void note_sight(query *q, uint32_t slot, bool visible) {
     *(visible ? &q->sight.open : &q->sight.blocked) |= slot;
+}
+
+/* The visible fraction that the earlier call added: 0 or 1, because its rays to lamps in doubt agreed. */
+static double known_fraction(const query *q, uint32_t slot) {
+    return q->known.open & slot ? 1 : 0;
 }
 
 static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
@@ -107,6 +114,7 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
     uint32_t sent = 0;
     const uint32_t slot = find_slot(q, lamp);
     uint32_t first = !q->fixed && power > BRIGHT_SHARE * q->total ? 2 * q->base_rays : q->base_rays;
+    const uint32_t known = q->doubt & slot ? first : 0; /* the rays of the earlier call: they agree */
     if (q->doubt & slot) {
         const uint32_t wanted = count_wanted_rays(q, .5, 1, power / q->scale);
         const uint32_t enough = wanted < DOUBT_RAYS ? wanted : DOUBT_RAYS;
@@ -118,7 +126,8 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
             fct_plane_point(sent, seed, u);
             fct_lamp_point point = fct_cut_point(lamp, rec, cut, u[0], u[1]);
             if (point.weight <= 0) continue;
-            const bool visible = point_is_visible(q, lamp, point.y);
+            const bool visible =
+                sent < known ? known_fraction(q, slot) > 0 : point_is_visible(q, lamp, point.y);
             all += point.weight;
             if (visible) seen += point.weight;
             note_sight(q, slot, visible);
@@ -173,25 +182,25 @@ static bool sample_minor_lamps(query *q, double sum, uint32_t count, double all[
 /* Adds the minor lamps' light times their common visible fraction. */
 static void add_minor_lamps(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
     double all[3], seen[3];
-    bool mixed = q->doubt >> MINOR_SLOT & 1;
-    mixed |= sample_minor_lamps(q, sum, q->base_rays, all, seen, cut);
-    if ((mixed || all[0] + all[1] + all[2] <= 0) && !q->fixed) {
-        /* Rays to different lamps are not stratified: n rays leave a standard error of at most 1/2 / sqrt(n).
-         */
-        const double ratio = .5 * sum / q->scale * q->base_rays / RAY_ERROR;
-        const double wanted = fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
-        if (wanted > q->base_rays) sample_minor_lamps(q, sum, (uint32_t)wanted, all, seen, cut);
-    }
+    /* Rays to different lamps are not stratified: n rays leave a standard error of at most 1/2 / sqrt(n). */
+    const double ratio = .5 * sum / q->scale * q->base_rays / RAY_ERROR;
+    const uint32_t wanted = (uint32_t)fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
+    const bool more = wanted > q->base_rays && !q->fixed;
+    bool mixed = more && q->doubt >> MINOR_SLOT & 1;
+    if (!mixed)
+        mixed = sample_minor_lamps(q, sum, q->base_rays, all, seen, cut) || !(all[0] + all[1] + all[2] > 0);
+    if (mixed && more) sample_minor_lamps(q, sum, wanted, all, seen, cut);
     double grey = all[0] + all[1] + all[2];
     grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
-    for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * (all[k] > 0 ? seen[k] / all[k] : grey);
+    const double known = known_fraction(q, 1u << MINOR_SLOT);
+    for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * ((all[k] > 0 ? seen[k] / all[k] : grey) - known);
 }
 
-/* Returns the light without blockers, summed over channels. */
+/* Adds the light of the lamps to measure, less what is known of it. Returns the light of all lamps without
+ * blockers, summed over channels. */
 static double add_lamps(query *q, double irradiance[3]) {
     double minor = 0, open = 0, minor_light[3] = {0, 0, 0};
     fct_cut cut;
-    for (int k = 0; k < 3; ++k) irradiance[k] = 0;
     for (uint32_t i = 0; i < q->lamps->count; ++i) q->total += estimate_lamp(q, q->lamps->lamps + i);
     q->scale = q->total;
     for (uint32_t i = 0; i < q->lamps->count; ++i) {
@@ -206,8 +215,11 @@ static double add_lamps(query *q, double irradiance[3]) {
         q->scale += light * lamp->strength - share;
         if (light <= 0) continue;
         open += light * lamp->strength;
+        const uint32_t slot = major ? find_slot(q, lamp) : 1u << MINOR_SLOT;
+        if (!(q->slots & slot)) continue;
         if (q->base_rays && major)
-            light *= measure_visible_fraction(q, lamp, &rec, &cut, light * lamp->strength);
+            light *= measure_visible_fraction(q, lamp, &rec, &cut, light * lamp->strength) -
+                     known_fraction(q, slot);
         double *to = q->base_rays && !major ? minor_light : irradiance;
         for (int k = 0; k < 3; ++k) to[k] += light * lamp->emission[k];
     }
@@ -218,7 +230,8 @@ static double add_lamps(query *q, double irradiance[3]) {
 
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]) {
-    query q = {.lamps = lamps, .point = point, .normal = normal};
+    query q = {.lamps = lamps, .point = point, .normal = normal, .slots = UINT32_MAX};
+    for (int k = 0; k < 3; ++k) irradiance[k] = 0;
     add_lamps(&q, irradiance);
 }
 
@@ -232,9 +245,13 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
                .seed = item_seed,
                .base_rays = base_rays & ~FCT_LAMPS_FIXED,
                .doubt = doubt,
+               .slots = doubt ? doubt : UINT32_MAX,
                .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)fct_round(point[k] + offset * normal[k]);
+    if (doubt) q.known = q.sight = *sight;
+    for (int k = 0; k < 3 && !doubt; ++k) irradiance[k] = 0;
     double open = add_lamps(&q, irradiance);
+    for (int k = 0; k < 3; ++k) irradiance[k] = fct_max(irradiance[k], 0); /* 1 - 1 after rounding */
     if (rays) *rays += q.rays;
     if (sight) *sight = q.sight;
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;

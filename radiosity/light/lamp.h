@@ -48,7 +48,9 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
  *
  * Few rays may agree by chance and miss a thin shadow. Neighbours tell: *sight (may be NULL) receives what
  * the rays met. If the sights of a receiver and its neighbours together are mixed for a lamp, and the
- * receiver's own sight is not, call again with these lamps in doubt: they get up to 32 rays at first. */
+ * receiver's own sight is not, call again with these lamps in doubt, the same seed, and irradiance and *sight
+ * as the first call left them: these lamps get up to 32 rays at first, and irradiance and *sight change as if
+ * the first call had sent these. Other lamps get no ray, and no ray is sent twice to a major lamp. */
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
                         uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays);

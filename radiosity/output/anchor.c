@@ -15,7 +15,7 @@
 /* World units per |n - n'| in the search for anchors, over the anchors' harmonic mean reach: as in the blend.
  */
 #define TURN_REACH .7
-/* An anchor sends rays * (1 + k / 4) rays, with k = log2 of its group's size, at most MOST_DOUBLINGS. */
+/* An anchor sends rays * (1 + k / 2) rays, with k = log2 of its group's size, at most MOST_DOUBLINGS. */
 #define MOST_DOUBLINGS 8
 /* Relative difference of distances up to which a ray has hit the point at which it aims. */
 #define SAME_POINT 1e-3
@@ -23,7 +23,8 @@ enum { GROUP_GRAIN = 4 }; /* groups per chunk */
 
 typedef struct group {
     uint32_t begin, end;
-    uint32_t anchor; /* its index */
+    uint32_t middle; /* its middle vertex */
+    bool gathers;    /* the middle vertex is not an anchor yet */
     bool halve;      /* a vertex is too far from the anchor */
 } group;
 
@@ -34,6 +35,7 @@ typedef struct grouping {
     uint32_t *vertices; /* each group has a range of these */
     group *groups, *next;
     uint32_t *scratch;
+    uint32_t *numbers; /* per vertex: of its anchor; FCT_NONE: it is not an anchor */
     fct_anchor *anchors;
     fct_guide *guides; /* per thread; NULL: none */
     uint64_t *chunk_rays;
@@ -107,7 +109,8 @@ void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_
     a->reach = sums.inverse > 0 ? (float)(sums.weight / sums.inverse) : INFINITY;
     for (int c = 0; c < 3; ++c) {
         a->irradiance[c] = (float)(sums.light[c] / sums.weight);
-        v3_store(a->gradient[c], v3_scale(sums.vector[c], 1 / sums.weight));
+        const v3 along = v3_mad(sums.vector[c], -v3_dot(sums.vector[c], n), n);
+        v3_store(a->gradient[c], v3_scale(along, 1 / sums.weight));
     }
 }
 
@@ -134,9 +137,9 @@ static uint32_t find_middle_vertex(const grouping *g, const group *k) {
 
 /* True if a vertex of the group is farther from the anchor than the tolerance allows, or turned too far to
  * use it. */
-static bool group_is_too_wide(const grouping *g, const group *k, const fct_anchor *a, uint32_t middle) {
+static bool group_is_too_wide(const grouping *g, const group *k, const fct_anchor *a) {
     const fct_surface *s = g->surface;
-    v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)middle);
+    v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)k->middle);
     double worst = 0, least_cosine = 1;
     bool hidden = false; /* a surface that the anchor may not see is in front of a vertex */
     for (uint32_t m = k->begin; m < k->end; ++m) {
@@ -151,16 +154,15 @@ static bool group_is_too_wide(const grouping *g, const group *k, const fct_ancho
     return k->end - k->begin > 1 && (turned || hidden || worst > g->def->tolerance);
 }
 
-/* Places the group's anchor on its middle vertex and gathers. Returns the number of rays. */
-static uint32_t gather_group(const grouping *g, fct_guide *guide, group *k) {
+/* Gathers at the middle vertex of a group. Returns the number of rays. */
+static uint32_t gather_group(const grouping *g, fct_guide *guide, const group *k, fct_anchor *a) {
     const fct_surface *s = g->surface;
-    fct_anchor *a = &g->anchors[k->anchor];
-    uint32_t size = k->end - k->begin, v = find_middle_vertex(g, k), doublings = 0;
+    uint32_t size = k->end - k->begin, v = k->middle, doublings = 0;
     memcpy(a->position, s->sample_points + 3 * (size_t)v, sizeof a->position);
     for (int c = 0; c < 3; ++c) a->normal[c] = (float)g->def->side * s->normals[3 * (size_t)v + (size_t)c];
     a->offset = s->offsets[v];
     while (doublings < MOST_DOUBLINGS && size >> doublings > 1) ++doublings;
-    uint32_t count = g->def->rays + g->def->rays * doublings / 4;
+    uint32_t count = g->def->rays + g->def->rays * doublings / 2;
     if (guide) {
         const v3 p = v3_load(a->position);
         const uint32_t leaf =
@@ -170,14 +172,24 @@ static uint32_t gather_group(const grouping *g, fct_guide *guide, group *k) {
     fct_anchor_gather(g->source, guide, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count), a);
     double least = SHORTEST_REACH * sqrt(s->areas[v]);
     a->reach = (float)fct_min(fct_max(a->reach, least), g->source->longest);
-    k->halve = group_is_too_wide(g, k, a, v);
     return count;
+}
+
+static void find_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    const grouping *g = user;
+    (void)chunk, (void)thread;
+    for (size_t i = begin; i < end; ++i) g->groups[i].middle = find_middle_vertex(g, &g->groups[i]);
 }
 
 static void gather_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     grouping *g = user;
     fct_guide *guide = g->guides ? &g->guides[thread] : NULL;
-    for (size_t i = begin; i < end; ++i) g->chunk_rays[chunk] += gather_group(g, guide, &g->groups[i]);
+    for (size_t i = begin; i < end; ++i) {
+        group *k = &g->groups[i];
+        fct_anchor *a = &g->anchors[g->numbers[k->middle]];
+        if (k->gathers) g->chunk_rays[chunk] += gather_group(g, guide, k, a);
+        k->halve = group_is_too_wide(g, k, a);
+    }
 }
 
 /* Coordinate 0..2 of the sample point, or 3..5 of the normal. */
@@ -231,11 +243,24 @@ static uint32_t list_vertices(const fct_surface *s, const uint8_t *covered, uint
     return n;
 }
 
-/* Gives each of the `pending` groups an anchor from number `anchors` on, and replaces too wide groups by
- * their halves. *count: the number of halves. */
-static fct_result anchor_groups(const fct_env *env, grouping *g, uint32_t pending, uint32_t anchors,
-                                uint32_t *count) {
-    for (uint32_t i = 0; i < pending; ++i) g->groups[i].anchor = anchors + i;
+/* Makes the middle vertices of the `pending` groups anchors, those that are not anchors yet. A vertex that is
+ * the middle of a group is often the middle of its half again. */
+static fct_result number_anchors(const fct_env *env, grouping *g, uint32_t pending, size_t *capacity,
+                                 fct_anchors *out) {
+    fct_parallel_for(env, pending, GROUP_GRAIN, find_chunk, g);
+    for (uint32_t i = 0; i < pending; ++i) {
+        group *k = &g->groups[i];
+        k->gathers = g->numbers[k->middle] == FCT_NONE;
+        if (k->gathers) g->numbers[k->middle] = out->count++;
+    }
+    fct_result result = fct_grow(env, (void **)&out->items, capacity, out->count, sizeof *out->items);
+    g->anchors = out->items;
+    return result;
+}
+
+/* Gathers for the `pending` groups, and replaces too wide groups by their halves. *count: the number of
+ * halves. */
+static fct_result anchor_groups(const fct_env *env, grouping *g, uint32_t pending, uint32_t *count) {
     *count = 0;
     fct_result result = fct_parallel_for_progress(env, "anchors", pending, GROUP_GRAIN, gather_chunk, g);
     if (result != FCT_OK) return result;
@@ -257,13 +282,8 @@ static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *ou
     size_t capacity = 0;
     g->groups[0] = (group){.begin = 0, .end = total};
     while (pending > 0) {
-        fct_result result =
-            fct_grow(env, (void **)&out->items, &capacity, out->count + pending, sizeof *out->items);
-        if (result != FCT_OK) return result;
-        g->anchors = out->items;
-        uint32_t first = out->count;
-        out->count += pending;
-        result = anchor_groups(env, g, pending, first, &pending);
+        fct_result result = number_anchors(env, g, pending, &capacity, out);
+        if (result == FCT_OK) result = anchor_groups(env, g, pending, &pending);
         if (result != FCT_OK) return result;
     }
     out->axes = fct_allocate_zero(env, out->count, 1);
@@ -287,11 +307,12 @@ fct_result fct_anchors_create(const fct_env *env, const fct_source *source, cons
     uint32_t most = surface->mesh.vertex_count;
     size_t chunks = fct_chunk_count(most, GROUP_GRAIN) + 1;
     grouping g = {.source = source, .surface = surface, .def = def};
-    const fct_array arrays[] = {FCT_ARRAY(g.scratch, most), FCT_ARRAY(g.next, most),
+    const fct_array arrays[] = {FCT_ARRAY(g.scratch, most),  FCT_ARRAY(g.next, most),
                                 FCT_ARRAY(g.vertices, most), FCT_ARRAY(g.groups, most),
-                                FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
+                                FCT_ARRAY(g.numbers, most),  FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "anchors");
     if (result != FCT_OK) return result;
+    for (uint32_t v = 0; v < most; ++v) g.numbers[v] = FCT_NONE;
     result = make_guides(env, &g);
     if (result == FCT_OK) result = place_anchors(env, &g, out);
     for (uint32_t t = 0; g.guides && t < fct_env_threads(env); ++t) fct_guide_release(env, &g.guides[t]);

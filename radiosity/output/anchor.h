@@ -1,7 +1,7 @@
 /* radiosity/output/anchor.h: gathers indirect light at a few vertices of a surface, its anchors.
  *
  * 1. All vertices form one group.
- * 2. The middle vertex of each group, its anchor, gathers stored radiosity.
+ * 2. The middle vertex of each group, its anchor, gathers stored radiosity, unless it already has.
  * 3. A group is halved if a vertex lies too far from its anchor, in units of the harmonic mean distance to
  * the hits (Ward, Rubinstein and Clear 1988), or turns too far from it. Back to 2 with the halves. So grooves
  * and contacts get an anchor per vertex, and open ground gets few. Anchors of halved groups stay.
@@ -23,7 +23,7 @@ typedef struct fct_source {
 } fct_source;
 
 typedef struct fct_anchors_def {
-    uint32_t rays;     /* least number per anchor; anchors of large groups send up to three times as many */
+    uint32_t rays;     /* least number per anchor; anchors of large groups send up to five times as many */
     double tolerance;  /* of distance / reach + sqrt(1 - n . n'), within a group */
     double side;       /* 1: front of the surface; -1: back */
     uint32_t instance; /* of the surface */
@@ -39,11 +39,13 @@ fct_result fct_anchors_create(const fct_env *env, const fct_source *source, cons
 
 /* Sends `rays` rays from position + offset * normal. Sets reach, irradiance and gradient as weighted means
  * over the rays' directions d, with hits at distance r whose surface has the cosine c' to the ray: E = sum w
- * b / sum w,  gradient = sum w b d / max(d . n, .15) / sum w,  1 / reach = sum w / r / sum w. Without a guide
- * all rays are cosine-distributed and w = 1. With an aimed guide, a third of them (rounded down) go to points
- * of its sources, with the density p_g per area; p_c = d . n c' / (pi r^2) is that of the others, and w = p_c
- * / (n_c p_c + n_g p_g), the balance heuristic of Veach and Guibas. A ray that does not reach its point has w
- * = 0. The sum of all w has the mean 1; division by it keeps rows at 1, so a furnace is exact. */
+ * b / sum w,  1 / reach = sum w / r / sum w, and the part of sum w b d / max(d . n, .15) / sum w across n is
+ * the gradient (Ward and Heckbert 1992). The part along n would make every turn darker, because it knows no
+ * light from below the horizon. Without a guide all rays are cosine-distributed and w = 1. With an aimed
+ * guide, a third of them (rounded down) go to points of its sources, with the density p_g per area; p_c = d .
+ * n c' / (pi r^2) is that of the others, and w = p_c / (n_c p_c + n_g p_g), the balance heuristic of Veach
+ * and Guibas. A ray that does not reach its point has w = 0. The sum of all w has the mean 1; division by it
+ * keeps rows at 1, so a furnace is exact. */
 void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
                        fct_anchor *anchor);
 

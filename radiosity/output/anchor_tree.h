@@ -13,7 +13,7 @@ typedef struct fct_anchor {
     float offset;                 /* rays start at position + offset * normal */
     float reach;          /* harmonic mean distance of the hits, clamped: how far the light is valid */
     float irradiance[3];  /* RGB */
-    float gradient[3][3]; /* per channel: dE/dn; E(n') is about E + gradient . (n' - n) */
+    float gradient[3][3]; /* per channel: dE/dn, across n; E(n') is about E + gradient . (n' - n) */
 } fct_anchor;
 
 typedef struct fct_anchors {
@@ -24,8 +24,8 @@ typedef struct fct_anchors {
     uint64_t rays;
 } fct_anchors;
 
-/* Anchors that a blend uses. Fewer make the borders between anchors visible. */
-enum { FCT_NEAREST_ANCHORS = 10 };
+/* Anchors that a blend uses. Fewer leave more noise, more blur contacts. */
+enum { FCT_NEAREST_ANCHORS = 24 };
 
 /* |n - n'|^2 = 2 - 2 cos beyond which an anchor is not used: 37 degrees. The vertices of one group are nearer
  * (anchor.c), so each vertex finds at least its own anchor. */

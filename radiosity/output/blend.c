@@ -1,20 +1,37 @@
 /* radiosity/output/blend.c: see blend.h.
  *
- * Irradiance caching after Ward, Rubinstein and Clear 1988, with weights that reach zero:
+ * Irradiance caching after Ward, Rubinstein and Clear 1988, with a local regression in place of their mean:
  *   x_i = |p - p_i| / reach_i + .7 |n - n_i|            (.7 |n - n_i| is about sqrt(1 - n . n_i))
- *   w_i = (1 / x_i - .98 / max x)^2
- *   E   = sum w_i E_i(n) / sum w_i,   E_i(n) = E_i + gradient_i . (n - n_i)
- * The weight of the farthest anchor is nearly zero, so the sum hardly changes where one anchor replaces
- * another among the ten nearest.
+ *   w_i = (1 - .98 x_i / max x)^2 / (x_i^2 + .2^2)
+ *   E_i(n) = E_i + gradient_i . (n - n_i)
+ * E is the value at p of the polynomial f over the tangent plane at p that minimizes
+ *   sum w_i (E_i(n) - f(p_i))^2 / sum w_i + .02 |linear terms|^2 + .1 |quadratic terms|^2,
+ * with the weighted RMS distance of the anchors as the unit of length. So E = sum v_i E_i(n), with sum v = 1.
+ * The weight of the farthest anchor is nearly zero, so E hardly changes where one anchor replaces another
+ * among the nearest ones.
  */
 #include "radiosity/output/blend.h"
 
+#include <string.h>
+
 /* Weight of |n - n'| against distance / reach. Smaller: bent surfaces show their anchors' light. */
 #define TURN_WEIGHT .7
-/* Least x, so that a point on an anchor has a finite weight. */
+/* Least x: max x is not zero. */
 #define LEAST_APART 1e-4
-/* Share of 1 / max x that is subtracted. With 1, all weights vanish where all anchors are equally far. */
+/* Share of max x at which a weight would vanish. With 1, all weights vanish where all anchors are equally
+ * far.
+ */
 #define FADE .98
+/* Anchors with x below this have equal weights, so that their noise averages out. With 0, a vertex on an
+ * anchor shows all of its noise. */
+#define NOISE_APART .2
+/* Penalties on the coefficients of the polynomial. Without them, anchors in a row or on one side give wild
+ * slopes. With a large one the polynomial becomes flatter: light is concave in the middle of walls, and a
+ * mean of anchors there is .2 to .3 % of all light too dark. */
+#define LINEAR_PENALTY    .02
+#define QUADRATIC_PENALTY .1
+/* Terms of the polynomial: 1, x, y, x^2, sqrt(2) x y, y^2. */
+enum { LINEAR_TERMS = 3, TERMS = 6 };
 /* Range of the corrected irradiance over the anchor's own. The gradient knows nothing below the anchor's
  * horizon, so larger corrections overshoot. */
 #define LEAST_CHANGE .5
@@ -64,8 +81,8 @@ static void weigh_anchors(const fct_anchors *t, v3 p, v3 n, blend *b) {
         }
     }
     for (int i = 0; i < b->near.count; ++i) {
-        double w = b->near.count == 1 ? 1 : 1 / x[i] - FADE / farthest;
-        b->weights[i] = w * w;
+        double w = 1 - FADE * x[i] / farthest;
+        b->weights[i] = w * w / (x[i] * x[i] + NOISE_APART * NOISE_APART);
     }
 }
 
@@ -86,18 +103,93 @@ static void drop_hidden_anchors(const fct_anchors *t, const fct_elements *set, c
     }
 }
 
+/* The terms of the polynomial at each anchor, over the tangent plane at p. Returns false if no anchor with a
+ * weight is beside p. */
+static bool list_terms(const fct_anchors *t, v3 p, v3 n, const blend *b,
+                       double terms[FCT_NEAREST_ANCHORS][TERMS]) {
+    double total = 0, spread = 0;
+    v3 axes[2];
+    v3_frame(n, &axes[0], &axes[1]);
+    for (int i = 0; i < b->near.count; ++i) {
+        v3 d = v3_sub(v3_load(t->items[b->near.ids[i]].position), p);
+        double x = v3_dot(d, axes[0]), y = v3_dot(d, axes[1]);
+        terms[i][1] = x, terms[i][2] = y;
+        total += b->weights[i], spread += b->weights[i] * (x * x + y * y);
+    }
+    if (!(spread > 0)) return false;
+    const double scale = sqrt(total / spread);
+    for (int i = 0; i < b->near.count; ++i) {
+        double x = scale * terms[i][1], y = scale * terms[i][2];
+        /* sqrt(2) x y makes the penalty the same in each frame. */
+        const double values[TERMS] = {1, x, y, x * x, sqrt(2) * x * y, y * y};
+        memcpy(terms[i], values, sizeof values);
+    }
+    return true;
+}
+
+/* Solves A z = (1, 0, ...). A is symmetric and positive definite, so elimination needs no pivots. */
+static void solve_first_column(double a[TERMS][TERMS], double z[TERMS]) {
+    for (int j = 0; j < TERMS; ++j) z[j] = j == 0;
+    for (int j = 0; j < TERMS; ++j)
+        for (int k = j + 1; k < TERMS; ++k) {
+            const double factor = a[k][j] / a[j][j];
+            for (int l = j; l < TERMS; ++l) a[k][l] -= factor * a[j][l];
+            z[k] -= factor * z[j];
+        }
+    for (int j = TERMS - 1; j >= 0; --j) {
+        for (int k = j + 1; k < TERMS; ++k) z[j] -= a[j][k] * z[k];
+        z[j] /= a[j][j];
+    }
+}
+
+/* Replaces the weights w by the v of the sum above: v_i = w_i f_i . z with (F^T W F + penalties) z = (1, 0,
+ * ...), where f_i are the terms at anchor i. */
+static void fit_weights(const fct_anchors *t, v3 p, v3 n, blend *b) {
+    double terms[FCT_NEAREST_ANCHORS][TERMS], a[TERMS][TERMS] = {{0}}, z[TERMS], total = 0;
+    if (!list_terms(t, p, n, b, terms)) return;
+    for (int i = 0; i < b->near.count; ++i) {
+        total += b->weights[i];
+        for (int j = 0; j < TERMS; ++j)
+            for (int k = 0; k < TERMS; ++k) a[j][k] += b->weights[i] * terms[i][j] * terms[i][k];
+    }
+    for (int j = 1; j < TERMS; ++j)
+        a[j][j] += total * (j < LINEAR_TERMS ? LINEAR_PENALTY : QUADRATIC_PENALTY);
+    solve_first_column(a, z);
+    for (int i = 0; i < b->near.count; ++i) {
+        double sum = 0;
+        for (int j = 0; j < TERMS; ++j) sum += terms[i][j] * z[j];
+        b->weights[i] *= sum;
+    }
+}
+
+/* The weighted sum of the anchors' values, within the range of those that count: the polynomial must not
+ * overshoot. */
+static void sum_values(const blend *b, double irradiance[3]) {
+    double total = 0;
+    for (int i = 0; i < b->near.count; ++i) total += b->weights[i];
+    for (int c = 0; c < 3; ++c) {
+        double sum = 0, lowest = HUGE_VAL, highest = 0;
+        for (int i = 0; i < b->near.count; ++i) {
+            if (b->weights[i] == 0) continue;
+            sum += b->weights[i] / total * b->values[i][c];
+            lowest = fct_min(lowest, b->values[i][c]), highest = fct_max(highest, b->values[i][c]);
+        }
+        irradiance[c] = fct_min(fct_max(sum, lowest), highest);
+    }
+}
+
 void fct_anchors_irradiance(const fct_anchors *t, const fct_elements *set, const float point[3],
-                            const float normal[3], float offset, bool near_wall, double irradiance[3],
+                            const float normal[3], float offset, bool flat, double irradiance[3],
                             uint64_t *rays) {
     blend b;
     irradiance[0] = irradiance[1] = irradiance[2] = 0;
     fct_anchors_nearest(t, point, normal, &b.near);
     if (b.near.count == 0) return;
     weigh_anchors(t, v3_load(point), v3_load(normal), &b);
-    if (near_wall && b.near.count > 1) drop_hidden_anchors(t, set, point, normal, offset, &b, rays);
+    if (flat && b.near.count > 1) drop_hidden_anchors(t, set, point, normal, offset, &b, rays);
     double total = 0;
     for (int i = 0; i < b.near.count; ++i) total += b.weights[i];
-    if (total <= 0) b.weights[0] = total = 1; /* all are hidden: the nearest one decides */
-    for (int i = 0; i < b.near.count; ++i)
-        for (int c = 0; c < 3; ++c) irradiance[c] += b.weights[i] / total * b.values[i][c];
+    if (total <= 0) b.weights[0] = 1; /* all are hidden: the nearest one decides */
+    fit_weights(t, v3_load(point), v3_load(normal), &b);
+    sum_values(&b, irradiance);
 }

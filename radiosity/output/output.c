@@ -34,7 +34,7 @@ enum { BORDER_ROUNDS = 4 };
 #define BORDER_LEVEL .04
 /* Rays per anchor, and first rays per lamp, at the default error. Two rays that agree often miss a penumbra,
  * but those of a vertex and its neighbours together seldom do. */
-enum { ANCHOR_RAYS = 32, LAMP_RAYS = 2 };
+enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
 /* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
 enum { DOUBT_ROUNDS = 2 };
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
@@ -59,7 +59,7 @@ typedef struct lighting {
     uint8_t *cut;             /* per vertex: it was made to cut an edge at the border of a cover */
     fct_sight *sights;        /* per vertex */
     uint32_t *doubt;          /* per vertex: lamps of which it or a neighbour sees a part */
-    uint8_t *again;           /* per vertex: it needs more rays */
+    uint32_t *again;          /* per vertex: those of them that need more rays now */
     float *nearest;           /* per vertex: see fct_point_is_covered */
     uint32_t known;           /* lower vertices have room in these arrays */
     uint32_t cut_first;       /* of the vertices before the border of a cover */
@@ -76,13 +76,14 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-static void gather_lamps(const lighting *l, size_t v, const float normal[3], double irradiance[3],
-                         uint64_t *rays) {
+/* doubt, irradiance: as in fct_lamps_direct. */
+static void gather_lamps(const lighting *l, size_t v, const float normal[3], uint32_t doubt,
+                         double irradiance[3], uint64_t *rays) {
     const fct_solution *s = l->s;
     const fct_surface *f = l->surface;
     uint32_t rays_each = fct_solution_lamp_rays(s, LAMP_RAYS);
     fct_solution_direct(s, f->sample_points + 3 * v, normal, f->offsets[v],
-                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, l->doubt[v], &l->sights[v],
+                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, doubt, &l->sights[v],
                         irradiance, rays);
 }
 
@@ -123,7 +124,7 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
             if (l->s->def.final == FCT_FINAL_NONE) {
                 gather_links(l, v, normal, indirect);
             } else {
-                gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
+                gather_lamps(l, v, normal, 0, direct, &l->chunk_rays[chunk]);
                 fct_anchors_irradiance(l->anchors, &l->s->elements, f->sample_points + 3 * v, normal,
                                        f->offsets[v], f->flat[v], indirect, &l->chunk_rays[chunk]);
             }
@@ -141,7 +142,8 @@ static void doubt_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
         float normal[3];
         double direct[3];
         load_normal(l, v, normal);
-        gather_lamps(l, v, normal, direct, &l->chunk_rays[chunk]);
+        for (size_t c = 0; c < 3; ++c) direct[c] = l->direct[3 * v + c];
+        gather_lamps(l, v, normal, l->again[v], direct, &l->chunk_rays[chunk]);
         for (size_t c = 0; c < 3; ++c) l->direct[3 * v + c] = (float)direct[c];
     }
 }
@@ -209,7 +211,7 @@ static fct_result grow_light(lighting *l, bool covered, bool cut) {
                   {(void **)&l->nearest, sizeof *l->nearest},
                   {(void **)&l->covered, 1},
                   {(void **)&l->cut, 1},
-                  {(void **)&l->again, 1},
+                  {(void **)&l->again, sizeof *l->again},
                   {(void **)&l->doubt, sizeof *l->doubt},
                   {(void **)&l->sights, sizeof *l->sights}};
     fct_result result = FCT_OK;
@@ -248,7 +250,7 @@ static fct_result find_doubt(lighting *l, uint32_t *count) {
         const uint32_t mixed = (own.open | around[v].open) & (own.blocked | around[v].blocked);
         const uint32_t more = mixed & (own.open | own.blocked) & ~fct_sight_mixed(own) & ~l->doubt[v];
         l->doubt[v] |= more;
-        l->again[v] = more != 0;
+        l->again[v] = more;
         *count += more != 0;
     }
     fct_release(l->s->env, around);

@@ -231,17 +231,17 @@ static void cut_by_steps(side *x) {
     grow_side(x, true, true);
 }
 
-/* Direct irradiance of a vertex from two rays per lamp or more. */
-static void light_directly(side *x, uint32_t v, double e[3]) {
+/* Direct irradiance of a vertex from two rays per lamp or more; with lamps in doubt, more to these. */
+static void light_directly(side *x, uint32_t v, uint32_t doubt, double e[3]) {
     const fct_solution *s = x->s;
     const float *point = x->f.sample_points + 3 * (size_t)v;
     const v3 n = find_normal(x, v);
     const double p[3] = {point[0], point[1], point[2]}, normal[3] = {n.x, n.y, n.z};
-    for (int c = 0; c < 3; ++c) e[c] = 0;
+    for (size_t c = 0; c < 3; ++c) e[c] = doubt ? x->direct[3 * (size_t)v + c] : 0;
     if (s->def.indirect_only) return;
     fct_lamps_direct(s->lamps, s->scene, p, normal, x->f.offsets[v],
                      fct_hash3(s->def.seed + 1, x->instance, v), (uint32_t)fmin(fmax(2 * s->fineness, 2), 64),
-                     x->doubt[v], &x->sights[v], e, &x->rays);
+                     doubt, &x->sights[v], e, &x->rays);
 }
 
 /* Twice: a vertex takes more rays to the lamps that it has looked at with rays that agree, if those of a
@@ -259,9 +259,10 @@ static void settle_doubts(side *x) {
             }
         for (uint32_t v = 0; v < m->vertex_count; ++v) {
             double e[3];
-            if ((more[v] & ~x->doubt[v]) == 0) continue;
-            x->doubt[v] |= more[v];
-            light_directly(x, v, e);
+            const uint32_t fresh = more[v] & ~x->doubt[v];
+            if (fresh == 0) continue;
+            x->doubt[v] |= fresh;
+            light_directly(x, v, fresh, e);
             for (size_t k = 0; k < 3; ++k) x->direct[3 * (size_t)v + k] = (float)e[k];
             ++x->shadows;
         }
@@ -269,12 +270,19 @@ static void settle_doubts(side *x) {
     }
 }
 
+/* Cuts may leave a vertex whose faces have no area. It is black. */
+static bool has_faces(const side *x, uint32_t v) {
+    return x->f.places[v] != FCT_NONE && v3_norm2(v3_load(x->f.normals + 3 * (size_t)v)) > 0;
+}
+
 static void color_side(side *x) {
     const fct_material *m = find_material(x->s, x->instance);
     for (size_t i = 0; i < 3 * (size_t)x->known; ++i)
         x->f.mesh.colors[i] =
-            (float)((x->s->def.indirect_only ? 0 : (double)m->emission[i % 3]) +
-                    (double)m->reflectance[i % 3] * ((double)x->direct[i] + (double)x->indirect[i]));
+            !has_faces(x, (uint32_t)(i / 3))
+                ? 0
+                : (float)((x->s->def.indirect_only ? 0 : (double)m->emission[i % 3]) +
+                          (double)m->reflectance[i % 3] * ((double)x->direct[i] + (double)x->indirect[i]));
 }
 
 static void light_by_steps(side *x, uint32_t first) {
@@ -284,11 +292,12 @@ static void light_by_steps(side *x, uint32_t first) {
         double e[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
         const float *point = x->f.sample_points + 3 * (size_t)v;
         v3_store(normal, find_normal(x, v));
-        if (s->def.final == FCT_FINAL_NONE && !x->covered[v]) {
+        const bool lit = !x->covered[v] && has_faces(x, v);
+        if (s->def.final == FCT_FINAL_NONE && lit) {
             uint32_t leaf = find_leaf(x, x->f.places[v], v3_load(point));
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), indirect);
-        } else if (!x->covered[v]) {
-            light_directly(x, v, e);
+        } else if (lit) {
+            light_directly(x, v, 0, e);
             fct_anchors_irradiance(&x->anchors, &s->elements, point, normal, x->f.offsets[v], x->f.flat[v],
                                    indirect, &x->rays);
         }
@@ -322,7 +331,7 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     cover_by_steps(&x);
     cut_by_steps(&x);
     if (s->def.final != FCT_FINAL_NONE) {
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(32 * s->fineness),
+        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(20 * s->fineness),
                                .tolerance =
                                    (s->def.final == FCT_FINAL_GATHER ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
                                .side = back ? -1 : 1,

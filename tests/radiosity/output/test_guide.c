@@ -182,7 +182,8 @@ static void gather_guided(const linked *x, const fct_guide *guide, double longes
     a->reach = (float)(all / inverse);
     for (int c = 0; c < 3; ++c) {
         a->irradiance[c] = (float)(e[c] / all);
-        for (int i = 0; i < 3; ++i) a->gradient[c][i] = (float)(g[c][i] / all);
+        const v3 whole = v3_scale(v3_make(g[c][0], g[c][1], g[c][2]), 1 / all);
+        v3_store(a->gradient[c], v3_sub(whole, v3_scale(n, v3_dot(n, whole))));
     }
 }
 
@@ -286,7 +287,7 @@ static void anchors_aim_from_their_side(void **state) {
             const bool lit = fct_guide_aim(&guide, leaf, p, n);
             for (uint32_t k = 0; k <= 8 && !same; ++k) {
                 fct_anchor b = *a;
-                fct_anchor_gather(&source, lit ? &guide : NULL, 24 + 24 * k / 4,
+                fct_anchor_gather(&source, lit ? &guide : NULL, 24 + 24 * k / 2,
                                   fct_hash3(7, v, f.mesh.vertex_count), &b);
                 same = fabs((double)b.irradiance[0] - (double)a->irradiance[0]) < 1e-6 &&
                        fabs((double)b.irradiance[2] - (double)a->irradiance[2]) < 1e-6;
