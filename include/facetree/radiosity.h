@@ -46,6 +46,9 @@ typedef struct fct_bake_def {
                            know its parts. indirect_only leaves the direct part out of the irradiance too */
     fct_keep keep;      /* default NONE. FACE has no outputs beside the colours */
     bool sources;       /* fct_bake_mesh also gives source_faces and source_uv; default false */
+    uint64_t max_links; /* links of the solution, up to 4e9; those with the largest errors are split first. 0:
+                           (1,000,000 + 30 per instance) sqrt(2e-5 / error), the root from 1/4 to 16. A link
+                           takes about 60 bytes */
     double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
                            72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
@@ -55,6 +58,10 @@ typedef struct fct_bake_stats {
     bool converged;             /* the iteration reached its tolerance */
     uint32_t passes;            /* sweeps of all iterations */
     uint64_t elements, links;   /* of the solution */
+    uint64_t max_links;         /* def.max_links, or the default for this scene and error */
+    bool links_limited;         /* max_links has left links coarser than error asks for */
+    double link_error;          /* share of the absorbed power that links carry as uncertainty: def.error, or
+                                   more if links_limited */
     uint64_t rays, output_rays; /* of the solution; of the output so far */
     uint64_t vertices, faces;   /* of the output so far */
     double seconds_open;        /* refinement of links and elements */
@@ -87,8 +94,8 @@ typedef struct fct_bake_error {
 } fct_bake_error;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
- * (error <= 0, max_edge < 0, outputs that the method does not know, a scene or model with a diagonal outside
- * [1e-15, 1e18]), MEMORY, CANCELLED. */
+ * (error <= 0, max_edge < 0, max_links > 4e9, outputs that the method does not know, a scene or model with a
+ * diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 /* NULL is allowed. */

@@ -40,15 +40,24 @@ uint64_t fct_elements_touched(const fct_elements *set) {
     return pages * PAGE;
 }
 
+static void transform_face(const fct_tree_view *t, const fct_instance *in, uint32_t place, v3 p[3]) {
+    for (size_t k = 0; k < 3; ++k)
+        p[k] = fct_transform_point(in->to_world,
+                                   v3_load(t->positions + 3 * (size_t)t->triangles[3 * (size_t)place + k]));
+}
+
+static void mark_face(const fct_elements *set, const fct_instance *in, const fct_tree_view *t,
+                      uint32_t place) {
+    mark_pages(set, in->model, 1, (size_t)place * 12, 12);
+    for (size_t k = 0; k < 3; ++k)
+        mark_pages(set, in->model, 2, (size_t)t->triangles[3 * (size_t)place + k] * 12, 12);
+}
+
 /* World-space corners of the face at `place`. */
 static void load_face(const fct_elements *set, const fct_instance *in, uint32_t place, v3 p[3]) {
-    fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
-    mark_pages(set, in->model, 1, (size_t)place * 12, 12);
-    for (int k = 0; k < 3; ++k) {
-        uint32_t v = t.triangles[3 * (size_t)place + (size_t)k];
-        mark_pages(set, in->model, 2, (size_t)v * 12, 12);
-        p[k] = fct_transform_point(in->to_world, v3_load(t.positions + 3 * (size_t)v));
-    }
+    const fct_tree_view t = fct_tree_get(set->view.models[in->model].tree);
+    mark_face(set, in, &t, place);
+    transform_face(&t, in, place, p);
 }
 
 /* sign: -1 if the corners wind against the element's side. */
@@ -121,6 +130,9 @@ static fct_result reserve_elements(fct_elements *set, size_t more) {
     if (r == FCT_OK)
         r = fct_grow(set->env, (void **)&set->ranges, &set->range_capacity, set->count + more,
                      sizeof *set->ranges);
+    if (r == FCT_OK)
+        r = fct_grow(set->env, (void **)&set->places, &set->place_capacity,
+                     (set->cluster_count + more) * FCT_ELEMENT_POINTS, sizeof *set->places);
     return r;
 }
 
@@ -144,27 +156,28 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     const fct_instance *in = &set->view.instances[instance];
     const fct_tree *tree = set->view.models[in->model].tree;
     const fct_material *material = &set->view.materials[in->material];
-    fct_cluster room;
-    const fct_cluster *c = fct_node_cluster(tree, node, &room);
+    const uint32_t face_count = fct_node_faces(tree, node), place = fct_node_first(tree, node);
     fct_element e = {
         .parent = parent, .instance = instance, .node = node, .back = back, .triangle = FCT_NONE};
     double sign = back ? -1 : 1;
-    if (c->count == 1) {
+    if (face_count == 1) {
         v3 p[3];
-        load_face(set, in, c->first, p);
+        load_face(set, in, place, p);
         set_triangle(&e, p, in->mirrored ? -sign : sign);
         fct_result r = add_corners(set, p, &e.triangle);
         if (r != FCT_OK) return r;
     } else {
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
-        set_cluster(set, in, c, sign, &e);
+        fct_cluster room;
+        set_cluster(set, in, fct_node_cluster(tree, node, &room), sign, &e);
+        e.triangle = (uint32_t)set->cluster_count++;
     }
     fct_paints_node(&set->paints, instance, node, e.reflectance);
     for (int k = 0; k < 3; ++k) {
         e.emission[k] = material->emission[k];
         e.radiosity[k] = e.emission[k];
     }
-    set->ranges[set->count] = (fct_element_range){.first = c->first, .count = c->count};
+    set->ranges[set->count] = (fct_element_range){.first = place, .count = face_count};
     set->items[set->count++] = e;
     return FCT_OK;
 }
@@ -333,8 +346,8 @@ void fct_elements_release(fct_elements *set) {
     fct_paints_release(&set->paints);
     for (uint32_t m = 0; set->touched && m < set->view.model_count; ++m)
         fct_release(set->env, set->touched[m]);
-    void *owned[] = {set->items,       set->ranges,  set->corners,      set->roots,
-                     set->root_counts, set->touched, set->touched_sizes};
+    void *owned[] = {set->items, set->ranges,      set->places,  set->corners,
+                     set->roots, set->root_counts, set->touched, set->touched_sizes};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; ++i) fct_release(set->env, owned[i]);
     *set = (fct_elements){0};
 }
@@ -346,10 +359,7 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
     while (node < view.node_count) {
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         double area[2];
-        for (int k = 0; k < 2; ++k) {
-            fct_cluster room;
-            area[k] = fct_node_cluster(tree, fct_node_child(tree, node, k), &room)->area;
-        }
+        for (int k = 0; k < 2; ++k) area[k] = fct_node_area(tree, fct_node_child(tree, node, k));
         double share = area[0] + area[1] > 0 ? area[0] / (area[0] + area[1]) : .5;
         int k = *t < share ? 0 : 1;
         *t = k == 0 ? *t / share : (*t - share) / (1 - share);
@@ -357,6 +367,21 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
         node = fct_node_child(tree, node, k);
     }
     return node - view.node_count;
+}
+
+/* The point of the triangle p that (a, b) in [0, 1)^2 chooses uniformly. */
+static void place_point(const fct_element *e, const fct_instance *in, const v3 p[3], double a, double b,
+                        fct_element_point *out) {
+    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v;
+    double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
+    v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
+    v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
+    out->u = (float)u, out->v = (float)v;
+    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger. */
+    double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
+    out->offset = (float)(1e-4 * size + 2e-7 * reach);
+    v3_store(out->position, x);
+    v3_store(out->normal, v3_unit(s));
 }
 
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
@@ -372,7 +397,6 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         e = &set->items[c];
     }
     const fct_instance *in = &set->view.instances[e->instance];
-    double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v;
     v3 p[3];
     if (e->kind == FCT_ELEMENT_TRIANGLE) {
         load_corners(set, e->triangle, p);
@@ -381,30 +405,63 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         out->place = find_face_by_area(set, in, e->node, &t);
         load_face(set, in, out->place, p);
     }
-    double sign = (e->back ? -1 : 1) * (in->mirrored ? -1 : 1);
-    v3 s = v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), sign);
-    v3 x = v3_add(v3_add(v3_scale(p[0], w), v3_scale(p[1], u)), v3_scale(p[2], v));
-    out->u = (float)u, out->v = (float)v;
-    /* 1e-4 of the local edge, or the rounding of a float coordinate where that is larger. */
-    double size = sqrt(v3_norm(s)), reach = fct_max(fct_max(fabs(x.x), fabs(x.y)), fabs(x.z));
-    out->offset = (float)(1e-4 * size + 2e-7 * reach);
-    v3_store(out->position, x);
-    v3_store(out->normal, v3_unit(s));
+    place_point(e, in, p, a, b, out);
+}
+
+/* The k-th point lies at the returned fraction of the area; r[1] and r[2] choose it in the triangle there. */
+static double draw_point(uint32_t id, uint32_t k, double r[3]) {
+    for (uint64_t d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(id, k, d));
+    return (k + r[0]) / FCT_ELEMENT_POINTS;
+}
+
+static void find_places_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    fct_elements *set = user;
+    (void)chunk, (void)thread;
+    for (size_t id = set->pointed + begin; id < set->pointed + end; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->kind != FCT_ELEMENT_CLUSTER) continue;
+        const fct_instance *in = &set->view.instances[e->instance];
+        const fct_tree_view view = fct_tree_get(set->view.models[in->model].tree);
+        for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
+            double r[3], t = draw_point((uint32_t)id, k, r);
+            const uint32_t place = find_face_by_area(set, in, e->node, &t);
+            set->places[FCT_ELEMENT_POINTS * (size_t)e->triangle + k] = place;
+            mark_face(set, in, &view, place);
+        }
+    }
+}
+
+void fct_elements_make_points(fct_elements *set) {
+    fct_parallel_for(set->env, set->count - set->pointed, 64, find_places_chunk, set);
+    set->pointed = set->count;
 }
 
 void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out) {
-    double r[3];
-    for (uint64_t d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(id, k, d));
-    fct_element_sample(set, id, (k + r[0]) / FCT_ELEMENT_POINTS, r[1], r[2], out);
+    const fct_element *e = &set->items[id];
+    double r[3], t = draw_point(id, k, r);
+    if (e->kind != FCT_ELEMENT_CLUSTER) {
+        fct_element_sample(set, id, t, r[1], r[2], out);
+        return;
+    }
+    const fct_instance *in = &set->view.instances[e->instance];
+    const fct_tree_view view = fct_tree_get(set->view.models[in->model].tree);
+    v3 p[3];
+    out->place = set->places[FCT_ELEMENT_POINTS * (size_t)e->triangle + k]; /* its pages are marked */
+    transform_face(&view, in, out->place, p);
+    place_point(e, in, p, r[1], r[2], out);
 }
 
-void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count) {
+void fct_elements_truncate(fct_elements *set, size_t count) {
+    for (size_t id = set->count; id-- > count;) { /* corners and places were added in this order */
+        const fct_element *e = &set->items[id];
+        if (e->kind == FCT_ELEMENT_TRIANGLE) set->corner_count = 9 * (size_t)e->triangle;
+        if (e->kind == FCT_ELEMENT_CLUSTER) set->cluster_count = e->triangle;
+    }
     set->count = count;
-    set->corner_count = corner_count;
+    if (set->pointed > count) set->pointed = count;
     for (size_t id = 0; id < count; ++id) {
-        fct_element *e = &set->items[id];
-        if (e->child_count == 0 || e->child < count) continue;
-        e->child = e->child_count = 0;
+        if (set->items[id].child_count == 0 || set->items[id].child < count) continue;
+        set->items[id].child = set->items[id].child_count = 0;
         set->ranges[id].child = set->ranges[id].child_count = 0;
     }
 }

@@ -68,9 +68,8 @@ static void sample_direct(const gathering *g, uint32_t id, uint64_t fresh, doubl
         fct_element_point_at(g->set, id, (uint32_t)((uint64_t)k * stride + turn), &p);
         double x[3], n[3];
         for (int c = 0; c < 3; ++c) x[c] = p.position[c], n[c] = p.normal[c];
-        fct_lamps_direct(g->lamps, g->set->scene, x, n, p.offset,
-                         fct_hash3(g->seed + fresh, id, (uint64_t)k), DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL,
-                         irradiance[k], rays);
+        fct_lamps_direct(g->lamps, g->set->scene, x, n, p.offset, fct_hash3(g->seed + fresh, id, (uint64_t)k),
+                         DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL, irradiance[k], rays);
     }
 }
 
@@ -286,10 +285,12 @@ static fct_result split_by_direct(gathering *g, double epsilon) {
     size_t from = 0;
     for (int round = 0; round < MOST_ROUNDS && result == FCT_OK && from < set->count; ++round) {
         if ((result = fct_progress(set->env, "direct light", round / (double)MOST_ROUNDS)) != FCT_OK) break;
+        fct_elements_make_points(set);
         size_t count = set->count;
         result = split_round(g, from, epsilon);
         from = count;
     }
+    fct_elements_make_points(set);
     return result;
 }
 

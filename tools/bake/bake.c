@@ -38,6 +38,10 @@ static const struct bake_quality {
     fct_final final;
 } qualities[] = {{5e-4, FCT_FINAL_DIRECT}, {2e-5, FCT_FINAL_GATHER}, {5e-6, FCT_FINAL_GATHER}};
 
+/* What --max-links takes. */
+#define LEAST_LINKS 1e3
+#define MOST_LINKS  4e9
+
 enum {
     KEY_METHOD = TOOL_KEY,
     KEY_QUALITY,
@@ -49,6 +53,7 @@ enum {
     KEY_PROBE,
     KEY_EXPOSURE,
     KEY_MAX_EDGE,
+    KEY_MAX_LINKS,
     KEY_ALSO,
     KEY_TWO_SIDED,
     KEY_LIGHT,
@@ -106,6 +111,11 @@ static const struct argp_option bake_options_table[] = {
      "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
      "scene)",
      0},
+    {"max-links", KEY_MAX_LINKS, "N", 0,
+     "Most links of the solution, from 1000 to 4e9: those with the largest errors are divided first "
+     "(default: 1000000 and 30 per object, more with a small --error). A warning tells if this leaves larger "
+     "errors than --error asks for",
+     0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
      "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
     {"no-textures", KEY_NO_TEXTURES, NULL, 0,
@@ -115,6 +125,16 @@ static const struct argp_option bake_options_table[] = {
     {"also", KEY_ALSO, "FILE", 0,
      "Also write all objects as one mesh to a second file, in the format of its name", 0},
     {0}};
+
+/* A whole number, which may be written as 2e6. */
+static error_t parse_links(struct argp_state *state, const char *text, uint64_t *out) {
+    double value = 0;
+    const error_t error = tool_parse_real(state, "--max-links", text, LEAST_LINKS, MOST_LINKS, &value);
+    if (!error && value != floor(value))
+        return tool_usage(state, "--max-links: expected a whole number, found '%s'", text);
+    *out = (uint64_t)value;
+    return error;
+}
 
 static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const char *const methods[] = {"face", "reference", NULL}, *const finals[] = {"none", "direct",
@@ -184,6 +204,8 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_NO_TEXTURES:
         o->no_textures = true;
         return 0;
+    case KEY_MAX_LINKS:
+        return parse_links(state, text, &o->def.max_links);
     case KEY_MAX_EDGE:
         return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
     default:
@@ -256,6 +278,9 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
     if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (object) json_object_set_new(object, "textures", json_integer(textures));
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
+    if (object) json_object_set_new(object, "max_links", json_integer((json_int_t)s->max_links));
+    if (object) json_object_set_new(object, "links_limited", json_boolean(s->links_limited));
+    if (object) json_object_set_new(object, "link_error", json_real(s->link_error));
     if (object) json_object_set_new(object, "check_rays", json_integer((json_int_t)s->check_rays));
     if (answers->objects && object) json_object_set(object, "objects", answers->objects);
     if (answers->probes && object) json_object_set(object, "probes", answers->probes);
@@ -280,6 +305,16 @@ static int check_light(tool *t, const fct_scene_view *scene) {
         "%s: nothing emits light; give a material an emission (\"emission\" in scene.json, Ke in "
         "an MTL file, emissiveFactor in glTF)",
         t->inputs[0]);
+}
+
+/* Errors of links that are above those that were asked for. */
+static void warn_links(tool *t, const bake_options *o, const fct_bake_stats *s) {
+    if (s->links_limited && s->link_error > o->def.error)
+        tool_warn(
+            t,
+            "%llu links are too few for this scene: they carry errors of up to %.2g of the absorbed power "
+            "instead of %.2g; more --max-links (60 bytes each) give finer ones",
+            (unsigned long long)s->max_links, s->link_error, o->def.error);
 }
 
 static void warn_sides(tool *t, const fct_bake_stats *s) {
@@ -322,6 +357,7 @@ static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_sce
     if (code == TOOL_DONE) {
         stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
+        warn_links(t, o, &stats);
         answers->objects = bake_describe_errors(bake, &view);
         code = bake_print_errors(t, bake, &view);
         if (code == TOOL_DONE) code = report_bake(t, o, &stats, view.texture_count, load, answers);
@@ -458,7 +494,10 @@ int tool_bake(int argc, char **argv) {
             "error_estimate (RMS error over the mean of the light that surfaces without emission show, from "
             "a "
             "check at random points; of probes alone the noise of the solution), objects[]{object, "
-            "error_estimate, bias, area}, error (--error of the last bake), check_rays, outputs[] (the "
+            "error_estimate, bias, area}, error (--error of the last bake), max_links, links_limited "
+            "(whether "
+            "max_links left some links coarser than they should be), link_error (the error that links carry, "
+            "as a share of the absorbed power), check_rays, outputs[] (the "
             "quantities of --light), textures (how many images the "
             "materials have), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "
