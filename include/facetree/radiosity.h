@@ -49,12 +49,20 @@ typedef struct fct_bake_def {
     uint64_t max_links; /* links of the solution, up to 4e9; those with the largest errors are split first. 0:
                            (1,000,000 + 30 per instance) sqrt(2e-5 / error), the root from 1/4 to 16. A link
                            takes about 60 bytes */
-    double max_edge;    /* longest edge of the output's triangles far from other instances, world units; 0: a
-                           72nd of the diagonal of all surfaces that emit no light */
+    /* Asked between steps, in the calling thread; true ends the bake early. If a pass of the links was
+     * solved, calls still succeed, with stats.interrupted: the solution is that of the last complete pass or
+     * gather, and further instances have the light of FCT_FINAL_NONE, without an error estimate. Otherwise
+     * fct_bake_create gives CANCELLED. NULL: not asked. Nor is it with REFERENCE, or with outputs DIRECT and
+     * INDIRECT, which the links do not tell apart. */
+    bool (*stop)(void *user);
+    void *stop_user;
+    double max_edge; /* longest edge of the output's triangles far from other instances, world units; 0: a
+                        72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);
 
 typedef struct fct_bake_stats {
+    bool interrupted;           /* def.stop has ended the solution or the output early */
     bool converged;             /* the iteration reached its tolerance */
     uint32_t passes;            /* sweeps of all iterations */
     uint64_t elements, links;   /* of the solution */
@@ -141,7 +149,7 @@ typedef struct fct_probe {
 } fct_probe;
 /* Light at points (count x 3) with normals (count x 3, any length). A probe belongs to the surface within
  * 1e-3 of the scene's diagonal that faces its normal; without such a surface it is in free space. Errors:
- * MEMORY, CANCELLED. */
+ * MEMORY, CANCELLED (also if the bake was stopped before its gather was complete). */
 FCT_API fct_result fct_bake_probe(fct_bake *bake, size_t count, const float *points, const float *normals,
                                   fct_probe *out);
 

@@ -423,7 +423,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     if (result == FCT_OK) result = finish_colors(&l);
     if (result == FCT_OK)
         result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);
-    if (result == FCT_OK) result = check_light(&l, check, &counts->check);
+    if (result == FCT_OK && !s->unchecked) result = check_light(&l, check, &counts->check);
     if (result == FCT_OK) {
         *out = surface.mesh;
         surface.mesh = (fct_mesh){0};

@@ -426,7 +426,12 @@ fct_result fct_links_refine(fct_elements *set, fct_links *links, const fct_refin
         kept.count = 0;
         result = refine_limited(set, &start, def, &kept, out, &links->rays);
     }
+    if (result != FCT_OK) { /* as before the call */
+        fct_release(set->env, kept.items);
+        fct_elements_truncate(set, count);
+        return result;
+    }
     fct_release(set->env, start.items);
     links->items = kept.items, links->count = kept.count, links->capacity = kept.capacity;
-    return result == FCT_OK ? fct_links_sort(set, links) : result;
+    return fct_links_sort(set, links);
 }

@@ -20,7 +20,7 @@ typedef struct fct_refine_result {
 /* Splits links, and elements where needed, until no link carries an error above def->epsilon that a split can
  * lower, or until there are def->most links. Then the links that stay coarse are those with the smallest
  * errors. Links that stay keep their rays. There are at least as many links as before. Errors: MEMORY,
- * CANCELLED. */
+ * CANCELLED; links and elements are those of before then. */
 fct_result fct_links_refine(fct_elements *set, fct_links *links, const fct_refine_def *def,
                             fct_refine_result *out);
 

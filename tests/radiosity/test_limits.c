@@ -5,9 +5,9 @@
 #include "facetree/radiosity.h"
 #include "radiosity/light/lamp.h"
 #include "radiosity/solve/oracle.h"
-#include "refining.h"
 #include "radiosity/solve/transport.h"
 #include "radiosity/surface/tessellate.h"
+#include "refining.h"
 
 static fct_env plain;
 /* A unit plate that emits upwards, and a black one-sided plate above it whose back it lights. */

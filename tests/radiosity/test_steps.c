@@ -8,10 +8,10 @@
 #include "radiosity/output/probe.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/rivals/reference.h"
-#include "refining.h"
 #include "radiosity/surface/cover.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/tessellate.h"
+#include "refining.h"
 #include "soup.h"
 
 static fct_env plain; /* outlives every scene */

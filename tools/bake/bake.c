@@ -14,6 +14,7 @@
 #include "tools/bake/save.h"
 #include "tools/bake/scene.h"
 #include "tools/commands.h"
+#include "tools/guard/signals.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -278,6 +279,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
     if (object) json_object_set_new(object, "outputs", bake_list_outputs(&o->outputs));
     if (object) json_object_set_new(object, "textures", json_integer(textures));
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
+    if (object) json_object_set_new(object, "interrupted", json_boolean(s->interrupted));
     if (object) json_object_set_new(object, "max_links", json_integer((json_int_t)s->max_links));
     if (object) json_object_set_new(object, "links_limited", json_boolean(s->links_limited));
     if (object) json_object_set_new(object, "link_error", json_real(s->link_error));
@@ -333,9 +335,44 @@ static int bake_once(tool *t, const bake_options *o, const fct_scene *scene, bak
     int code = tool_result(t, fct_bake_create(&t->env, scene, &o->def, bake));
     if (code != TOOL_DONE || !t->output) return code;
     if (!is_folder_output(t->output)) return write_file(t, o, *bake);
-    json_decref(*files);
-    *files = json_array();
-    return bake_write_objects(t, *bake, &view, objects, &o->save, *files);
+    json_t *list = json_array();
+    code = bake_write_objects(t, *bake, &view, objects, &o->save, list);
+    json_decref(code == TOOL_DONE ? *files : list);
+    if (code == TOOL_DONE) *files = list;
+    return code;
+}
+
+/* --- Interruption --- */
+
+static bool is_interrupted(void *user) {
+    (void)user;
+    return guard_signal() != 0;
+}
+
+/* The first bake ends early at a signal; another one of --error N% is given up for the one before. */
+static void prepare_interruption(tool *t, bake_options *o, bool first) {
+    const unsigned parts = FCT_MESH_DIRECT | FCT_MESH_INDIRECT;
+    const bool can = t->output && o->def.method == FCT_BAKE_FACE && !(o->def.outputs & parts);
+    o->def.stop = can && first ? is_interrupted : NULL;
+    t->soft = can && first;
+    if (can) guard_end_softly();
+}
+
+/* Says what a signal leaves behind. Returns whether there is a result to report. */
+static bool end_interrupted(tool *t, int code, bool complete, fct_bake_stats *stats) {
+    if (!guard_signal()) return false;
+    if (code == TOOL_DONE && !stats->interrupted) {
+        snprintf(t->ending, sizeof t->ending, "the outputs are complete");
+    } else if (code == TOOL_DONE) {
+        snprintf(t->ending, sizeof t->ending,
+                 "%.150s has the light of the last complete solution, as --final none", t->output);
+    } else if (code == TOOL_CANCELLED && complete) {
+        snprintf(t->ending, sizeof t->ending, "%.150s has the light of the last complete bake", t->output);
+        stats->interrupted = true;
+    } else {
+        return false;
+    }
+    return true;
 }
 
 static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_scene *scene, double load,
@@ -347,20 +384,29 @@ static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_sce
     int code = check_light(t, &view);
     if (code == TOOL_DONE && t->output && is_folder_output(t->output))
         code = bake_plan_objects(t, &view, &objects);
+    bool complete = false;
     do {
         fct_bake_destroy(bake);
         bake = NULL;
+        prepare_interruption(t, o, !complete);
         if (code == TOOL_DONE) code = bake_once(t, o, scene, &objects, &bake, &answers->files);
-        if (code == TOOL_DONE) stats = fct_bake_get_stats(bake);
-    } while (code == TOOL_DONE && bake_try_again(t, &o->target, &stats, &o->def));
-    if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
-    if (code == TOOL_DONE) {
+        if (code != TOOL_DONE) break;
+        complete = true;
         stats = fct_bake_get_stats(bake);
+        json_decref(answers->objects);
+        answers->objects = bake_describe_errors(bake, &view);
+    } while (!guard_signal() && bake_try_again(t, &o->target, &stats, &o->def));
+    const bool interrupted = end_interrupted(t, code, complete, &stats);
+    if (interrupted) code = TOOL_DONE;
+    if (code == TOOL_DONE && o->probes && !interrupted)
+        code = bake_run_probes(t, bake, &view, set, &answers->probes);
+    if (code == TOOL_DONE) {
+        if (!interrupted) stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
         warn_links(t, o, &stats);
-        answers->objects = bake_describe_errors(bake, &view);
-        code = bake_print_errors(t, bake, &view);
+        if (!interrupted) code = bake_print_errors(t, bake, &view);
         if (code == TOOL_DONE) code = report_bake(t, o, &stats, view.texture_count, load, answers);
+        if (interrupted) code = TOOL_CANCELLED;
     }
     bake_release_objects(t, &objects);
     fct_bake_destroy(bake);
@@ -439,6 +485,7 @@ static int run_bake(tool *t, void *options) {
     bake_probes set = {0};
     if (!t->output && !o->probes) return tool_fail(t, TOOL_USAGE, "expected -o OUT or --probe FILE");
     o->def.seed = t->seed;
+    snprintf(t->ending, sizeof t->ending, "no solution was complete, nothing is written");
     int code = check_target(t, o);
     if (code == TOOL_DONE) code = check_bake_output(t, o);
     if (code == TOOL_DONE && o->probes) code = bake_read_probes(t, o->probes, &set);
@@ -479,7 +526,14 @@ int tool_bake(int argc, char **argv) {
             "reflectance and the emission. --merge writes one unlit mesh instead.\n\n"
             "Large flat triangles are divided, so "
             "that they can carry shadows; --keep-mesh keeps the faces of the input instead. A scene in which "
-            "nothing emits light is an error. The exit code is "
+            "nothing emits light is an error. A first Ctrl-C (SIGINT, or SIGTERM) ends the bake early: if a "
+            "pass of "
+            "the solution was complete, the output is written from it, objects that were not lit yet as with "
+            "--final none, and without probes; then the program dies of the signal. With --error N% the last "
+            "complete bake stays; in a folder some files may be those of the bake that was interrupted. With "
+            "--light direct or "
+            "indirect, or --method reference, nothing is written. A second Ctrl-C ends it at once. The exit "
+            "code is "
             "1 if the solution has not converged or the error of --error N% is not reached.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
@@ -494,7 +548,8 @@ int tool_bake(int argc, char **argv) {
             "error_estimate (RMS error over the mean of the light that surfaces without emission show, from "
             "a "
             "check at random points; of probes alone the noise of the solution), objects[]{object, "
-            "error_estimate, bias, area}, error (--error of the last bake), max_links, links_limited "
+            "error_estimate, bias, area}, error (--error of the last bake), interrupted (a signal ended the "
+            "bake early), max_links, links_limited "
             "(whether "
             "max_links left some links coarser than they should be), link_error (the error that links carry, "
             "as a share of the absorbed power), check_rays, outputs[] (the "

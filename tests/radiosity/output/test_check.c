@@ -1,7 +1,7 @@
 /* The estimate of the error of shown light, against light that is wrong by a known amount. */
 #include "../place.h"
-#include "radiosity/output/check.h"
 #include "../refining.h"
+#include "radiosity/output/check.h"
 #include "radiosity/surface/tessellate.h"
 
 static fct_env plain; /* outlives every scene */

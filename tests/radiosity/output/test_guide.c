@@ -1,8 +1,8 @@
 /* Guides of gathers against their definition: the density of points over all leaves, what a pick returns, the
  * rays of a guided gather, and its mean against plain gathers. */
+#include "../refining.h"
 #include "radiosity/output/anchor.h"
 #include "radiosity/solve/oracle.h"
-#include "../refining.h"
 #include "radiosity/surface/tessellate.h"
 #include "room.h"
 
