@@ -44,4 +44,10 @@ static inline const fct_cluster *fct_node_cluster(const fct_tree *tree, uint32_t
     return room;
 }
 
+/* The area of any node. */
+static inline float fct_node_area(const fct_tree *tree, uint32_t node) {
+    if (!fct_node_is_leaf(tree, node)) return tree->nodes[node].area;
+    return fct_leaf_area(&tree->view, node - tree->view.node_count);
+}
+
 #endif

@@ -54,21 +54,36 @@ typedef struct fct_bake_def {
     bool indirect_only;  /* the output leaves out emission and direct light */
     unsigned outputs;    /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
                             FCT_MESH_INDIRECT, FCT_MESH_NORMALS; default 0. REFERENCE knows the irradiance alone,
-                            and NONE does not    know its parts. indirect_only leaves the direct part out of the
+                            and NONE does not know its parts. indirect_only leaves the direct part out of the
                             irradiance too */
     fct_keep keep;       /* default NONE. FACE has no outputs beside the colours and the normals */
     bool sources;        /* fct_bake_mesh also gives source_faces and source_uv; default false */
     fct_normals normals; /* default FILE */
     double crease;       /* CREASE: degrees, in (0, 180]; default 40 */
-    double max_edge;     /* longest edge of the output's triangles far from other instances, world units; 0: a
-                            72nd of the diagonal of all surfaces that emit no light */
+    uint64_t max_links; /* links of the solution, up to 4e9; those with the largest errors are split first. 0:
+                           (1,000,000 + 30 per instance) sqrt(2e-5 / error), the root from 1/4 to 16. A link
+                           takes about 60 bytes */
+    /* Asked between steps, in the calling thread; true ends the bake early. If a pass of the links was
+     * solved, calls still succeed, with stats.interrupted: the solution is that of the last complete pass or
+     * gather, and further instances have the light of FCT_FINAL_NONE, without an error estimate. Otherwise
+     * fct_bake_create gives CANCELLED. NULL: not asked. Nor is it with REFERENCE, or with outputs DIRECT and
+     * INDIRECT, which the links do not tell apart. */
+    bool (*stop)(void *user);
+    void *stop_user;
+    double max_edge; /* longest edge of the output's triangles far from other instances, world units; 0: a
+                        72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);
 
 typedef struct fct_bake_stats {
+    bool interrupted;           /* def.stop has ended the solution or the output early */
     bool converged;             /* the iteration reached its tolerance */
     uint32_t passes;            /* sweeps of all iterations */
     uint64_t elements, links;   /* of the solution */
+    uint64_t max_links;         /* def.max_links, or the default for this scene and error */
+    bool links_limited;         /* max_links has left links coarser than error asks for */
+    double link_error;          /* share of the absorbed power that links carry as uncertainty: def.error, or
+                                   more if links_limited */
     uint64_t rays, output_rays; /* of the solution; of the output so far */
     uint64_t vertices, faces;   /* of the output so far */
     double seconds_open;        /* refinement of links and elements */
@@ -103,8 +118,8 @@ typedef struct fct_bake_error {
 } fct_bake_error;
 
 /* Solves (FACE) or prepares (REFERENCE). The scene must be committed and must outlive the bake. Errors: DATA
- * (error <= 0, max_edge < 0, a crease outside (0, 180], outputs that the method does not know, a scene or
- * model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
+ * (error <= 0, max_edge < 0, a crease outside (0, 180], max_links > 4e9, outputs that the method does not
+ * know, a scene or model with a diagonal outside [1e-15, 1e18]), MEMORY, CANCELLED. */
 FCT_API fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct_bake_def *def,
                                    fct_bake **out);
 /* NULL is allowed. */
@@ -153,7 +168,7 @@ typedef struct fct_probe {
 } fct_probe;
 /* Light at points (count x 3) with normals (count x 3, any length). A probe belongs to the surface within
  * 1e-3 of the scene's diagonal that faces its normal; without such a surface it is in free space. Errors:
- * MEMORY, CANCELLED. */
+ * MEMORY, CANCELLED (also if the bake was stopped before its gather was complete). */
 FCT_API fct_result fct_bake_probe(fct_bake *bake, size_t count, const float *points, const float *normals,
                                   fct_probe *out);
 

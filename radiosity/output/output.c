@@ -435,7 +435,7 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     if (result == FCT_OK) result = finish_colors(&l);
     if (result == FCT_OK)
         result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);
-    if (result == FCT_OK) result = check_light(&l, check, &counts->check);
+    if (result == FCT_OK && !s->unchecked) result = check_light(&l, check, &counts->check);
     if (result == FCT_OK) fct_output_take(s, &surface, back, out);
     fct_release(env, l.direct), fct_release(env, l.indirect), fct_release(env, l.nearest);
     fct_release(env, l.covered), fct_release(env, l.cut), fct_release(env, l.again);

@@ -25,6 +25,7 @@ typedef struct fct_solution {
     double longest_reach;  /* of anchors: FCT_LONGEST_REACH times the default edge */
     double fineness;       /* sqrt(default error / error), in [.25, 16]: numbers of rays grow with it */
     double mean_radiosity; /* rho E over the scene's area and channels: the scale of visible differences */
+    bool unchecked;        /* no error estimate of the output: the bake was stopped */
 } fct_solution;
 
 /* Rays per lamp: `least` at the default error and above, more for smaller errors, at most 64. */

@@ -50,15 +50,24 @@ static const fct_coarse *coarse_form(const fct_elements *set, uint32_t instance)
     return fct_scene_coarse_model(set->scene, set->view.instances[instance].model);
 }
 
+static void transform_face(const fct_tree_view *t, const fct_instance *in, uint32_t place, v3 p[3]) {
+    for (size_t k = 0; k < 3; ++k)
+        p[k] = fct_transform_point(in->to_world,
+                                   v3_load(t->positions + 3 * (size_t)t->triangles[3 * (size_t)place + k]));
+}
+
+static void mark_face(const fct_elements *set, const fct_instance *in, const fct_tree_view *t,
+                      uint32_t place) {
+    mark_pages(set, in->model, 1, (size_t)place * 12, 12);
+    for (size_t k = 0; k < 3; ++k)
+        mark_pages(set, in->model, 2, (size_t)t->triangles[3 * (size_t)place + k] * 12, 12);
+}
+
 /* World-space corners of the face at `place`. */
 static void load_face(const fct_elements *set, const fct_instance *in, uint32_t place, v3 p[3]) {
     const fct_tree_view *t = &set->view.models[in->model].tree->view;
-    mark_pages(set, in->model, 1, (size_t)place * 12, 12);
-    for (int k = 0; k < 3; ++k) {
-        uint32_t v = t->triangles[3 * (size_t)place + (size_t)k];
-        mark_pages(set, in->model, 2, (size_t)v * 12, 12);
-        p[k] = fct_transform_point(in->to_world, v3_load(t->positions + 3 * (size_t)v));
-    }
+    mark_face(set, in, t, place);
+    transform_face(t, in, place, p);
 }
 
 /* sign: -1 if the corners wind against the element's side. */
@@ -133,7 +142,7 @@ static fct_result reserve_elements(fct_elements *set, size_t more) {
                      sizeof *set->ranges);
     if (r == FCT_OK)
         r = fct_grow(set->env, (void **)&set->places, &set->place_capacity,
-                     (set->count + more) * FCT_ELEMENT_POINTS, sizeof *set->places);
+                     (set->cluster_count + more) * FCT_ELEMENT_POINTS, sizeof *set->places);
     return r;
 }
 
@@ -157,27 +166,28 @@ static fct_result add_node(fct_elements *set, uint32_t parent, uint32_t instance
     const fct_instance *in = &set->view.instances[instance];
     const fct_tree *tree = set->view.models[in->model].tree;
     const fct_material *material = &set->view.materials[in->material];
-    fct_cluster room;
-    const fct_cluster *c = fct_node_cluster(tree, node, &room);
+    const uint32_t face_count = fct_node_faces(tree, node), place = fct_node_first(tree, node);
     fct_element e = {
         .parent = parent, .instance = instance, .node = node, .back = back, .triangle = FCT_NONE};
     double sign = back ? -1 : 1;
-    if (c->count == 1) {
+    if (face_count == 1) {
         v3 p[3];
-        load_face(set, in, c->first, p);
+        load_face(set, in, place, p);
         set_triangle(&e, p, in->mirrored ? -sign : sign);
         fct_result r = add_corners(set, p, &e.triangle);
         if (r != FCT_OK) return r;
     } else {
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
-        set_cluster(set, in, c, sign, &e);
+        fct_cluster room;
+        set_cluster(set, in, fct_node_cluster(tree, node, &room), sign, &e);
+        e.triangle = (uint32_t)set->cluster_count++;
     }
     fct_paints_node(&set->paints, instance, node, e.reflectance);
     for (int k = 0; k < 3; ++k) {
         e.emission[k] = material->emission[k];
         e.radiosity[k] = e.emission[k];
     }
-    set->ranges[set->count] = (fct_element_range){.first = c->first, .count = c->count};
+    set->ranges[set->count] = (fct_element_range){.first = place, .count = face_count};
     set->items[set->count++] = e;
     return FCT_OK;
 }
@@ -364,10 +374,7 @@ static uint32_t find_face_by_area(const fct_elements *set, const fct_instance *i
     while (node < inner) {
         mark_pages(set, in->model, 0, (size_t)node * sizeof(fct_cluster), sizeof(fct_cluster));
         double area[2];
-        for (int k = 0; k < 2; ++k) {
-            fct_cluster room;
-            area[k] = fct_node_cluster(tree, fct_node_child(tree, node, k), &room)->area;
-        }
+        for (int k = 0; k < 2; ++k) area[k] = fct_node_area(tree, fct_node_child(tree, node, k));
         double share = area[0] + area[1] > 0 ? area[0] / (area[0] + area[1]) : .5;
         int k = *t < share ? 0 : 1;
         *t = k == 0 ? *t / share : (*t - share) / (1 - share);
@@ -387,17 +394,12 @@ static void shrink_to_outline(const fct_coarse *coarse, uint32_t place, v3 p[3])
     for (int k = 0; k < 3; ++k) p[k] = v3_mad(v3_scale(p[k], s), 1 - s, middle);
 }
 
-/* The point of the face at out->place that (a, b) chooses; of the part of it that a triangle element is. */
-static void find_point(const fct_elements *set, const fct_element *e, double a, double b,
-                       fct_element_point *out) {
+/* The point of the triangle p, of the face at out->place, that (a, b) in [0, 1)^2 chooses uniformly. */
+static void place_point(const fct_elements *set, const fct_element *e, v3 p[3], double a, double b,
+                        fct_element_point *out) {
     const fct_instance *in = &set->view.instances[e->instance];
     const fct_coarse *coarse = coarse_form(set, e->instance);
     double w = 1 - sqrt(a), v = b * sqrt(a), u = 1 - w - v, height = 0;
-    v3 p[3];
-    if (e->kind == FCT_ELEMENT_TRIANGLE)
-        load_corners(set, e->triangle, p);
-    else
-        load_face(set, in, out->place, p);
     if (coarse) {
         shrink_to_outline(coarse, out->place, p);
         height = PATCH_LIFT * in->uniform_scale * coarse->height[coarse->patches[out->place]];
@@ -425,52 +427,71 @@ void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a
         t = area > 0 ? fct_min(fct_max((t * total - before) / area, 0), 1 - 1e-12) : .5;
         e = &set->items[c];
     }
-    out->place = e->kind == FCT_ELEMENT_TRIANGLE
-                     ? set->ranges[e - set->items].first
-                     : find_face_by_area(set, &set->view.instances[e->instance], e->node, &t);
-    find_point(set, e, a, b, out);
+    const fct_instance *in = &set->view.instances[e->instance];
+    v3 p[3];
+    if (e->kind == FCT_ELEMENT_TRIANGLE) {
+        load_corners(set, e->triangle, p);
+        out->place = set->ranges[e - set->items].first;
+    } else {
+        out->place = find_face_by_area(set, in, e->node, &t);
+        load_face(set, in, out->place, p);
+    }
+    place_point(set, e, p, a, b, out);
 }
 
-static double spread_point(uint64_t id, uint64_t k, uint64_t dimension) {
-    return fct_uniform(fct_hash3(id, k, dimension));
+/* The k-th point lies at the returned fraction of the area; r[1] and r[2] choose it in the triangle there. */
+static double draw_point(uint32_t id, uint32_t k, double r[3]) {
+    for (uint64_t d = 0; d < 3; ++d) r[d] = fct_uniform(fct_hash3(id, k, d));
+    return (k + r[0]) / FCT_ELEMENT_POINTS;
 }
 
-static void choose_places(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void find_places_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     fct_elements *set = user;
     (void)chunk, (void)thread;
-    for (size_t i = set->placed + begin; i < set->placed + end; ++i) {
-        const fct_element *e = &set->items[i];
-        for (size_t k = 0; k < FCT_ELEMENT_POINTS && e->kind == FCT_ELEMENT_CLUSTER; ++k) {
-            double t = ((double)k + spread_point(i, k, 0)) / FCT_ELEMENT_POINTS;
-            set->places[i * FCT_ELEMENT_POINTS + k] =
-                find_face_by_area(set, &set->view.instances[e->instance], e->node, &t);
+    for (size_t id = set->pointed + begin; id < set->pointed + end; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->kind != FCT_ELEMENT_CLUSTER) continue;
+        const fct_instance *in = &set->view.instances[e->instance];
+        const fct_tree_view *view = &set->view.models[in->model].tree->view;
+        for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
+            double r[3], t = draw_point((uint32_t)id, k, r);
+            const uint32_t place = find_face_by_area(set, in, e->node, &t);
+            set->places[FCT_ELEMENT_POINTS * (size_t)e->triangle + k] = place;
+            mark_face(set, in, view, place);
         }
     }
 }
 
-void fct_elements_place_points(fct_elements *set) {
-    fct_parallel_for(set->env, set->count - set->placed, 64, choose_places, set);
-    set->placed = set->count;
+void fct_elements_make_points(fct_elements *set) {
+    fct_parallel_for(set->env, set->count - set->pointed, 64, find_places_chunk, set);
+    set->pointed = set->count;
 }
 
 void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out) {
-    const double a = spread_point(id, k, 1), b = spread_point(id, k, 2);
-    if (set->items[id].kind != FCT_ELEMENT_CLUSTER) {
-        fct_element_sample(set, id, (k + spread_point(id, k, 0)) / FCT_ELEMENT_POINTS, a, b, out);
+    const fct_element *e = &set->items[id];
+    double r[3], t = draw_point(id, k, r);
+    if (e->kind != FCT_ELEMENT_CLUSTER) {
+        fct_element_sample(set, id, t, r[1], r[2], out);
         return;
     }
-    out->place = set->places[(size_t)id * FCT_ELEMENT_POINTS + k];
-    find_point(set, &set->items[id], a, b, out);
+    const fct_instance *in = &set->view.instances[e->instance];
+    v3 p[3];
+    out->place = set->places[FCT_ELEMENT_POINTS * (size_t)e->triangle + k]; /* its pages are marked */
+    transform_face(&set->view.models[in->model].tree->view, in, out->place, p);
+    place_point(set, e, p, r[1], r[2], out);
 }
 
-void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count) {
+void fct_elements_truncate(fct_elements *set, size_t count) {
+    for (size_t id = set->count; id-- > count;) { /* corners and places were added in this order */
+        const fct_element *e = &set->items[id];
+        if (e->kind == FCT_ELEMENT_TRIANGLE) set->corner_count = 9 * (size_t)e->triangle;
+        if (e->kind == FCT_ELEMENT_CLUSTER) set->cluster_count = e->triangle;
+    }
     set->count = count;
-    set->placed = set->placed < count ? set->placed : count;
-    set->corner_count = corner_count;
+    if (set->pointed > count) set->pointed = count;
     for (size_t id = 0; id < count; ++id) {
-        fct_element *e = &set->items[id];
-        if (e->child_count == 0 || e->child < count) continue;
-        e->child = e->child_count = 0;
+        if (set->items[id].child_count == 0 || set->items[id].child < count) continue;
+        set->items[id].child = set->items[id].child_count = 0;
         set->ranges[id].child = set->ranges[id].child_count = 0;
     }
 }

@@ -39,7 +39,8 @@ typedef struct fct_element {
     double cone;      /* radians; every normal is within this angle of S; pi: unknown */
     uint32_t parent, child, child_count;
     uint32_t instance, node;           /* of the tree; FCT_NONE in a volume */
-    uint32_t triangle;                 /* index of its corners; FCT_NONE unless kind is TRIANGLE */
+    uint32_t triangle;                 /* index of its corners, in a cluster of its places; FCT_NONE in a
+                                          volume */
     uint8_t kind, back;                /* fct_element_kind; 1: back side of a two-sided material */
     float reflectance[3], emission[3]; /* reflectance: the mean over the surface */
     double irradiance[3];              /* leaf: mean E over the surface */
@@ -67,9 +68,12 @@ typedef struct fct_elements {
     fct_scene_view view;
     fct_element *items;
     fct_element_range *ranges;
-    uint32_t *places; /* FCT_ELEMENT_POINTS per element: of its points, if it is a cluster */
-    size_t count, capacity, range_capacity, place_capacity;
-    size_t placed;  /* elements whose points have places */
+    size_t count, capacity, range_capacity;
+    uint32_t *places; /* FCT_ELEMENT_POINTS per cluster: the faces of its points. The points themselves would
+                         take two thirds of the memory of the elements, and finding the faces each time would
+                         double the time of refinement */
+    size_t cluster_count, place_capacity;
+    size_t pointed; /* elements that have their places */
     float *corners; /* 3 x 3 per triangle element */
     size_t corner_count, corner_capacity;
     fct_paints paints;
@@ -98,15 +102,14 @@ fct_result fct_elements_split(fct_elements *set, uint32_t id);
  * there, uniformly. Stratified t gives points that are stratified over the surface. */
 void fct_element_sample(const fct_elements *set, uint32_t id, double t, double a, double b,
                         fct_element_point *out);
-/* Chooses the faces of the points of all elements that have none. */
-void fct_elements_place_points(fct_elements *set);
+/* Finds the places of all clusters that have none. */
+void fct_elements_make_points(fct_elements *set);
 /* Point k < FCT_ELEMENT_POINTS of an element: it lies in the k-th sixteenth of the area, and is the same in
- * each call. Only the places of points are stored: whole points would take most of the memory of the
- * elements, and the way down to a face takes most of the time of a point. */
+ * each call. A cluster needs its places. */
 void fct_element_point_at(const fct_elements *set, uint32_t id, uint32_t k, fct_element_point *out);
-/* Removes the elements from number `count` on, and the corners from `corner_count` on: the elements whose
- * children are among them are leaves again. Both numbers are those of an earlier moment. */
-void fct_elements_truncate(fct_elements *set, size_t count, size_t corner_count);
+/* Removes the elements from number `count` on, which set->count was at an earlier moment. The elements whose
+ * children are among them are leaves again. */
+void fct_elements_truncate(fct_elements *set, size_t count);
 /* The leaf that contains barycentrics (u, v) of the face at `place`; FCT_NONE on the back of a one-sided
  * material. */
 uint32_t fct_elements_locate(const fct_elements *set, uint32_t instance, bool back, uint32_t place, float u,

@@ -291,12 +291,12 @@ static fct_result split_by_direct(gathering *g, double epsilon) {
     size_t from = 0;
     for (int round = 0; round < MOST_ROUNDS && result == FCT_OK && from < set->count; ++round) {
         if ((result = fct_progress(set->env, "direct light", round / (double)MOST_ROUNDS)) != FCT_OK) break;
-        fct_elements_place_points(set);
+        fct_elements_make_points(set);
         size_t count = set->count;
         result = split_round(g, from, epsilon);
         from = count;
     }
-    fct_elements_place_points(set);
+    fct_elements_make_points(set);
     return result;
 }
 

@@ -203,11 +203,105 @@ static void sizes_that_floats_cannot_tell_are_refused(void **state) {
     }
 }
 
+/* Answers true from the n-th question on. */
+typedef struct stopper {
+    long questions, at;
+} stopper;
+
+static bool stop_at(void *user) {
+    stopper *s = user;
+    return ++s->questions >= s->at;
+}
+
+static double sum_colors(const fct_mesh *mesh) {
+    double sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; ++i) sum += mesh->colors[i];
+    return sum / mesh->vertex_count;
+}
+
+/* Bakes, and stops at the n-th question. Returns false if nothing was complete. */
+static bool bake_stopped(const fct_scene *scene, fct_bake_def def, uint32_t threads, long n, fct_mesh *mesh,
+                         fct_bake_stats *stats) {
+    static const float point[3] = {.2F, .2F, 0}, normal[3] = {0, 0, 1};
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_bake *bake;
+    fct_probe probe;
+    stopper s = {.at = n};
+    env.thread_count = threads;
+    def.stop = stop_at, def.stop_user = &s;
+    *mesh = (fct_mesh){0};
+    const fct_result result = fct_bake_create(&env, scene, &def, &bake);
+    if (result == FCT_OK) {
+        const bool early = fct_bake_get_stats(bake).interrupted;
+        fct_mesh lit;
+        assert_int_equal(fct_bake_mesh(bake, &lit, NULL), FCT_OK);
+        assert_int_equal(fct_mesh_copy(&plain, &lit, mesh), FCT_OK);
+        fct_mesh_release(&env, &lit);
+        *stats = fct_bake_get_stats(bake);
+        assert_int_equal(stats->interrupted, s.questions >= n);
+        assert_int_equal(fct_bake_probe(bake, 1, point, normal, &probe),
+                         early ? FCT_ERROR_CANCELLED : FCT_OK);
+        if (stats->interrupted) assert_int_equal(s.questions, n); /* it is not asked again */
+    } else {
+        assert_int_equal(result, FCT_ERROR_CANCELLED);
+        assert_null(bake);
+    }
+    fct_bake_destroy(bake);
+    assert_int_equal(r.alive, 0);
+    return result == FCT_OK;
+}
+
+/* Wherever a bake is stopped, it gives nothing before the first pass, and light that is nearly right later;
+ * the number of threads does not matter. */
+static void a_stopped_bake_keeps_its_light(void **state) {
+    (void)state;
+    fct_scene *scene = small_scene();
+    fct_bake_stats stats = {.interrupted = true}, other;
+    fct_mesh whole, mesh;
+    long nothing = 0, early = 0;
+    fct_bake_def def = coarse();
+    def.error = 1e-4; /* the first pass has 16 times that */
+    assert_true(bake_stopped(scene, def, 1, 1000000, &whole, &stats));
+    assert_true(!stats.interrupted && stats.error_estimate > 0);
+    stats.interrupted = true;
+    for (long n = 1; stats.interrupted; n += 1 + n / 16) {
+        if (!bake_stopped(scene, def, 1, n, &mesh, &stats)) {
+            assert_int_equal(early, 0);
+            ++nothing;
+            continue;
+        }
+        early += stats.interrupted;
+        const double share = sum_colors(&mesh) / sum_colors(&whole);
+        const double most = stats.power_escaped > 0 ? 1.2 : 2; /* the gather was complete, or a pass */
+        if (!(share > 1 / most && share < most))
+            fail_msg("stopped at question %ld: %g of the light", n, share);
+        assert_true(stats.power_emitted > 0 && stats.power_absorbed > 0);
+        if (early % 5 == 0) {
+            fct_mesh same;
+            assert_true(bake_stopped(scene, def, 3, n, &same, &other));
+            assert_int_equal(same.vertex_count, mesh.vertex_count);
+            assert_memory_equal(same.colors, mesh.colors, 12 * (size_t)mesh.vertex_count);
+            fct_mesh_release(&plain, &same);
+        }
+        fct_mesh_release(&plain, &mesh);
+    }
+    printf("    nothing %ld times, early light %ld times\n", nothing, early);
+    assert_true(nothing >= 2 && early > 20);
+    /* The links do not tell direct from indirect light: it is not asked. */
+    def.outputs = FCT_MESH_DIRECT;
+    assert_true(bake_stopped(scene, def, 1, 1, &mesh, &stats) && !stats.interrupted && mesh.direct);
+    fct_mesh_release(&plain, &mesh);
+    fct_mesh_release(&plain, &whole);
+    fct_scene_destroy(scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sizes_that_floats_cannot_tell_are_refused),
         cmocka_unit_test(every_allocation_may_fail),
         cmocka_unit_test(a_cancelled_bake_leaves_nothing),
+        cmocka_unit_test(a_stopped_bake_keeps_its_light),
         cmocka_unit_test(threads_do_not_show),
         cmocka_unit_test(darkness_is_a_result),
         cmocka_unit_test(senseless_options_are_refused),

@@ -5,9 +5,9 @@
 #include "facetree/radiosity.h"
 #include "radiosity/light/lamp.h"
 #include "radiosity/solve/oracle.h"
-#include "radiosity/solve/refine.h"
 #include "radiosity/solve/transport.h"
 #include "radiosity/surface/tessellate.h"
+#include "refining.h"
 
 static fct_env plain;
 /* A unit plate that emits upwards, and a black one-sided plate above it whose back it lights. */
@@ -159,7 +159,7 @@ static void uncertain_links_stay_below_epsilon(void **state) {
     assert_int_equal(fct_elements_create(&plain, scene, .001, &set), FCT_OK);
     assert_int_equal(fct_links_create(&plain, &links), FCT_OK);
     const double epsilon = 5e-4;
-    assert_int_equal(fct_links_refine(&set, &links, epsilon, "links", 0), FCT_OK);
+    assert_int_equal(refine_links(&set, &links, epsilon), FCT_OK);
     uint32_t mixed = 0, above = 0;
     for (size_t i = 0; i < links.count; ++i) {
         const fct_link *l = &links.items[i];

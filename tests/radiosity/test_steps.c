@@ -8,10 +8,10 @@
 #include "radiosity/output/probe.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/rivals/reference.h"
-#include "radiosity/solve/refine.h"
 #include "radiosity/surface/cover.h"
 #include "radiosity/surface/refine.h"
 #include "radiosity/surface/tessellate.h"
+#include "refining.h"
 #include "soup.h"
 
 static fct_env plain; /* outlives every scene */
@@ -92,7 +92,7 @@ static fct_solution solve_by_steps(const fct_scene *scene, const fct_bake_def *d
     for (int pass = 0; pass < 5 && emitted > 0; ++pass) {
         if (pass > 0) power = fmax(fmin(measure_absorption(&s.elements), emitted), power / 8);
         double epsilon = def->error * power * pow(2, 4 - pass);
-        assert_int_equal(fct_links_refine(&s.elements, &s.links, epsilon, "links", 0), FCT_OK);
+        assert_int_equal(refine_links(&s.elements, &s.links, epsilon), FCT_OK);
         assert_int_equal(fct_links_solve(&s.elements, &s.links, 1e-3, pass < 4 ? 4 : 100, &stats->passes),
                          FCT_OK);
     }

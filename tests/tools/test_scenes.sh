@@ -68,6 +68,21 @@ holds "$(value error_estimate) > 0 && $(value error_estimate) <= .015"
 holds "$(value error) < 2e-5 && $(value check_rays) > 1000"
 check "objects have errors" grep -q '"object": "tall_block"' out
 expect 64 bake cornell/scene.json --probe probes.txt --error 2%
+
+# A limit on the links: the same bytes for any number of threads, a warning, and the power balance within .5 %.
+expect 0 bake cornell/scene.json -o full.ply --final none --json
+check "no limit by default" test "$(value links_limited)" = false
+links=$(value links)
+expect 0 bake cornell/scene.json -o half.ply --final none --max-links $((links / 2)) --threads 1 --json
+says "links are too few for this scene"
+check "the limit is named" test "$(value max_links)" = $((links / 2)) -a "$(value links_limited)" = true
+holds "$(value links) <= $links / 2 && $(value links) > $links / 2 - 16 && $(value link_error) > 2e-5"
+holds "$(value link_error) < 8e-5"
+holds "($(value absorbed) + $(value escaped)) / $(value emitted) > .995 && ($(value absorbed) + $(value escaped)) / $(value emitted) < 1.005"
+expect 0 bake cornell/scene.json -o half2.ply --final none --max-links $((links / 2)) --threads 2 --quiet
+check "threads do not matter" cmp half.ply half2.ply
+expect 64 bake cornell/scene.json -o x.ply --max-links 999
+expect 64 bake cornell/scene.json -o x.ply --max-links 1000.5
 expect 64 bake cornell/scene.json -o lit.ply --method reference --error 2%
 expect 64 bake cornell/scene.json -o lit.ply --error 0%
 expect 64 bake cornell/scene.json -o - --error 2%

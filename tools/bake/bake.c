@@ -15,6 +15,7 @@
 #include "tools/bake/save.h"
 #include "tools/bake/scene.h"
 #include "tools/commands.h"
+#include "tools/guard/signals.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -40,6 +41,10 @@ static const struct bake_quality {
     fct_final final;
 } qualities[] = {{5e-4, FCT_FINAL_DIRECT}, {2e-5, FCT_FINAL_GATHER}, {5e-6, FCT_FINAL_GATHER}};
 
+/* What --max-links takes. */
+#define LEAST_LINKS 1e3
+#define MOST_LINKS  4e9
+
 enum {
     KEY_METHOD = TOOL_KEY,
     KEY_QUALITY,
@@ -51,6 +56,7 @@ enum {
     KEY_PROBE,
     KEY_EXPOSURE,
     KEY_MAX_EDGE,
+    KEY_MAX_LINKS,
     KEY_ALSO,
     KEY_TWO_SIDED,
     KEY_LIGHT,
@@ -122,6 +128,11 @@ static const struct argp_option bake_options_table[] = {
      "Longest edge of an output triangle on flat ground, in the scene's unit (default: chosen from the "
      "scene)",
      0},
+    {"max-links", KEY_MAX_LINKS, "N", 0,
+     "Most links of the solution, from 1000 to 4e9: those with the largest errors are divided first "
+     "(default: 1000000 and 30 per object, more with a small --error). A warning tells if this leaves larger "
+     "errors than --error asks for",
+     0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
      "Let every material that emits no light reflect on both sides, as models of single sheets need", 0},
     {"no-textures", KEY_NO_TEXTURES, NULL, 0,
@@ -131,6 +142,16 @@ static const struct argp_option bake_options_table[] = {
     {"also", KEY_ALSO, "FILE", 0,
      "Also write all objects as one mesh to a second file, in the format of its name", 0},
     {0}};
+
+/* A whole number, which may be written as 2e6. */
+static error_t parse_links(struct argp_state *state, const char *text, uint64_t *out) {
+    double value = 0;
+    const error_t error = tool_parse_real(state, "--max-links", text, LEAST_LINKS, MOST_LINKS, &value);
+    if (!error && value != floor(value))
+        return tool_usage(state, "--max-links: expected a whole number, found '%s'", text);
+    *out = (uint64_t)value;
+    return error;
+}
 
 static error_t parse_bake(int key, char *text, struct argp_state *state) {
     static const char *const methods[] = {"face", "reference", NULL}, *const finals[] = {"none", "direct",
@@ -206,6 +227,8 @@ static error_t parse_bake(int key, char *text, struct argp_state *state) {
     case KEY_NO_TEXTURES:
         o->no_textures = true;
         return 0;
+    case KEY_MAX_LINKS:
+        return parse_links(state, text, &o->def.max_links);
     case KEY_MAX_EDGE:
         return tool_parse_real(state, "--max-edge", text, 1e-30, 1e30, &o->def.max_edge);
     default:
@@ -286,6 +309,10 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
     if (object) json_object_set_new(object, "textures", json_integer(textures));
     if (object) json_object_set_new(object, "solve_peak_bytes", json_integer((json_int_t)o->solve_peak));
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
+    if (object) json_object_set_new(object, "interrupted", json_boolean(s->interrupted));
+    if (object) json_object_set_new(object, "max_links", json_integer((json_int_t)s->max_links));
+    if (object) json_object_set_new(object, "links_limited", json_boolean(s->links_limited));
+    if (object) json_object_set_new(object, "link_error", json_real(s->link_error));
     if (object) json_object_set_new(object, "check_rays", json_integer((json_int_t)s->check_rays));
     if (answers->objects && object) json_object_set(object, "objects", answers->objects);
     if (answers->probes && object) json_object_set(object, "probes", answers->probes);
@@ -312,6 +339,16 @@ static int check_light(tool *t, const fct_scene_view *scene) {
         t->inputs[0]);
 }
 
+/* Errors of links that are above those that were asked for. */
+static void warn_links(tool *t, const bake_options *o, const fct_bake_stats *s) {
+    if (s->links_limited && s->link_error > o->def.error)
+        tool_warn(
+            t,
+            "%llu links are too few for this scene: they carry errors of up to %.2g of the absorbed power "
+            "instead of %.2g; more --max-links (60 bytes each) give finer ones",
+            (unsigned long long)s->max_links, s->link_error, o->def.error);
+}
+
 static void warn_sides(tool *t, const fct_bake_stats *s) {
     const bool one = s->sides_left_out == 1;
     if (s->sides_left_out)
@@ -329,9 +366,44 @@ static int bake_once(tool *t, bake_options *o, const fct_scene *scene, bake_obje
     o->solve_peak = tool_peak_bytes();
     if (code != TOOL_DONE || !t->output) return code;
     if (!is_folder_output(t->output)) return write_file(t, o, *bake);
-    json_decref(*files);
-    *files = json_array();
-    return bake_write_objects(t, *bake, &view, objects, &o->save, *files);
+    json_t *list = json_array();
+    code = bake_write_objects(t, *bake, &view, objects, &o->save, list);
+    json_decref(code == TOOL_DONE ? *files : list);
+    if (code == TOOL_DONE) *files = list;
+    return code;
+}
+
+/* --- Interruption --- */
+
+static bool is_interrupted(void *user) {
+    (void)user;
+    return guard_signal() != 0;
+}
+
+/* The first bake ends early at a signal; another one of --error N% is given up for the one before. */
+static void prepare_interruption(tool *t, bake_options *o, bool first) {
+    const unsigned parts = FCT_MESH_DIRECT | FCT_MESH_INDIRECT;
+    const bool can = t->output && o->def.method == FCT_BAKE_FACE && !(o->def.outputs & parts);
+    o->def.stop = can && first ? is_interrupted : NULL;
+    t->soft = can && first;
+    if (can) guard_end_softly();
+}
+
+/* Says what a signal leaves behind. Returns whether there is a result to report. */
+static bool end_interrupted(tool *t, int code, bool complete, fct_bake_stats *stats) {
+    if (!guard_signal()) return false;
+    if (code == TOOL_DONE && !stats->interrupted) {
+        snprintf(t->ending, sizeof t->ending, "the outputs are complete");
+    } else if (code == TOOL_DONE) {
+        snprintf(t->ending, sizeof t->ending,
+                 "%.150s has the light of the last complete solution, as --final none", t->output);
+    } else if (code == TOOL_CANCELLED && complete) {
+        snprintf(t->ending, sizeof t->ending, "%.150s has the light of the last complete bake", t->output);
+        stats->interrupted = true;
+    } else {
+        return false;
+    }
+    return true;
 }
 
 static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_scene *scene, double load,
@@ -343,20 +415,30 @@ static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_sce
     int code = check_light(t, &view);
     if (code == TOOL_DONE && t->output && is_folder_output(t->output))
         code = bake_plan_objects(t, &view, &objects);
+    bool complete = false;
     do {
         fct_bake_destroy(bake);
         bake = NULL;
+        prepare_interruption(t, o, !complete);
         if (code == TOOL_DONE) code = bake_once(t, o, scene, &objects, &bake, &answers->files);
-        if (code == TOOL_DONE) stats = fct_bake_get_stats(bake);
-    } while (code == TOOL_DONE && bake_try_again(t, &o->target, &stats, &o->def));
-    if (code == TOOL_DONE && o->probes) code = bake_run_probes(t, bake, &view, set, &answers->probes);
-    if (code == TOOL_DONE) {
+        if (code != TOOL_DONE) break;
+        complete = true;
         stats = fct_bake_get_stats(bake);
+        json_decref(answers->objects);
+        answers->objects = bake_describe_errors(bake, &view);
+    } while (!guard_signal() && bake_try_again(t, &o->target, &stats, &o->def));
+    const bool interrupted = end_interrupted(t, code, complete, &stats);
+    if (interrupted) code = TOOL_DONE;
+    if (code == TOOL_DONE && o->probes && !interrupted)
+        code = bake_run_probes(t, bake, &view, set, &answers->probes);
+    if (code == TOOL_DONE) {
+        if (!interrupted) stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);
         bake_warn_normals(t, &stats);
-        answers->objects = bake_describe_errors(bake, &view);
-        code = bake_print_errors(t, bake, &view);
+        warn_links(t, o, &stats);
+        if (!interrupted) code = bake_print_errors(t, bake, &view);
         if (code == TOOL_DONE) code = report_bake(t, o, &stats, view.texture_count, load, answers);
+        if (interrupted) code = TOOL_CANCELLED;
     }
     bake_release_objects(t, &objects);
     fct_bake_destroy(bake);
@@ -437,6 +519,7 @@ static int run_bake(tool *t, void *options) {
     o->def.seed = t->seed;
     if ((o->merge && t->output && tool_ends(t->output, "glb")) || (o->also && tool_ends(o->also, "glb")))
         o->def.outputs |= FCT_MESH_NORMALS;
+    snprintf(t->ending, sizeof t->ending, "no solution was complete, nothing is written");
     int code = check_target(t, o);
     if (code == TOOL_DONE) code = check_bake_output(t, o);
     if (code == TOOL_DONE && o->probes) code = bake_read_probes(t, o->probes, &set);
@@ -477,7 +560,14 @@ int tool_bake(int argc, char **argv) {
             "reflectance and the emission. --merge writes one unlit mesh instead.\n\n"
             "Large flat triangles are divided, so "
             "that they can carry shadows; --keep-mesh keeps the faces of the input instead. A scene in which "
-            "nothing emits light is an error. The exit code is "
+            "nothing emits light is an error. A first Ctrl-C (SIGINT, or SIGTERM) ends the bake early: if a "
+            "pass of "
+            "the solution was complete, the output is written from it, objects that were not lit yet as with "
+            "--final none, and without probes; then the program dies of the signal. With --error N% the last "
+            "complete bake stays; in a folder some files may be those of the bake that was interrupted. With "
+            "--light direct or "
+            "indirect, or --method reference, nothing is written. A second Ctrl-C ends it at once. The exit "
+            "code is "
             "1 if the solution has not converged or the error of --error N% is not reached.\n\n"
             "A surface has light on its front, to which its corners run counterclockwise. A two-sided "
             "surface "
@@ -493,7 +583,10 @@ int tool_bake(int argc, char **argv) {
             "a "
             "check at random points; of probes alone the noise of the solution), objects[]{object, "
             "normals (file, crease or flat), error_estimate, bias, area}, error (--error of the last bake), "
-            "check_rays, outputs[] (the "
+            "interrupted (a signal ended the bake early), max_links, links_limited (whether max_links left "
+            "some "
+            "links coarser than they should be), link_error (the error that links carry, as a share of the "
+            "absorbed power), check_rays, outputs[] (the "
             "quantities of --light), textures (how many images the "
             "materials have), "
             "probes[]{position, radiosity, irradiance, instance, object, face}, and for a folder "

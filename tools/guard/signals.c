@@ -14,7 +14,7 @@
 
 enum { GRACE = 300, FOLDERS = 8 }; /* GRACE: milliseconds */
 
-static volatile sig_atomic_t received;
+static volatile sig_atomic_t received, soft;
 static char folders[FOLDERS][PATH_MAX];
 static volatile sig_atomic_t folder_count;
 static const char *program_name = "facetree";
@@ -53,6 +53,7 @@ void guard_die(int signal_number) {
 static void note_signal(int signal_number) {
     if (received) guard_die(received);
     received = signal_number;
+    if (soft && signal_number != SIGHUP) return;
     const struct itimerval timer = {.it_value = {.tv_usec = 1000 * GRACE}};
     setitimer(ITIMER_REAL, &timer, NULL);
 }
@@ -103,6 +104,10 @@ void guard_note_output(const char *path) {
     for (int i = 0; i < folder_count; ++i)
         if (strcmp(folders[i], folder) == 0) return;
     ++folder_count;
+}
+
+void guard_end_softly(void) {
+    soft = 1;
 }
 
 int guard_signal(void) {

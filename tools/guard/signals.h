@@ -1,8 +1,9 @@
 /* tools/guard/signals.h: the end of the process by a signal, and its standard streams.
  *
  * The first SIGHUP, SIGINT or SIGTERM cancels the library call and lets the command clean up. A second one,
- * or GRACE milliseconds, ends the process at once. In both cases the process removes its temporary files and
- * dies of the signal, so that the exit status is 128 + signal for a shell.
+ * or GRACE milliseconds, ends the process at once. A command may do without the limit of time. In both cases
+ * the process removes its temporary files and dies of the signal, so that the exit status is 128 + signal for
+ * a shell.
  */
 #ifndef FCT_TOOLS_GUARD_SIGNALS_H
 #define FCT_TOOLS_GUARD_SIGNALS_H
@@ -21,8 +22,10 @@ bool guard_stdout_was_closed(void);
 void guard_install_signals(const char *program, const guard_inputs *inputs, int exit_code);
 /* Notes that temporary files may lie in the folder of `path`. The first FOLDERS different folders count. */
 void guard_note_output(const char *path);
-/* The signal that cancels the run, or 0. */
+/* The first signal, or 0. */
 int guard_signal(void);
+/* Lets a first SIGINT or SIGTERM end the run without a limit of time, so that it can write what it has. */
+void guard_end_softly(void);
 /* Ends the process by the signal. */
 void guard_die(int signal_number);
 

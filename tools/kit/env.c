@@ -10,6 +10,7 @@
 
 #include <malloc.h>
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -104,7 +105,7 @@ size_t tool_peak_bytes(void) {
 /* The progress hook. False cancels the library call. */
 static bool show_progress(void *user, const char *phase, double done) {
     tool *t = user;
-    if (guard_signal() || t->refused) return false;
+    if (t->refused || guard_signal() == SIGHUP || (guard_signal() && !t->soft)) return false;
     tool_progress_show(&t->bar, phase, done, tool_seconds());
     return true;
 }
@@ -399,7 +400,8 @@ int tool_env_close(tool *t, int code) {
     t->warnings = NULL;
     if (code == TOOL_DONE || code == TOOL_NO || t->error_told) return code;
     if (guard_signal()) {
-        fprintf(stderr, "%s: ended by signal %d (%s)\n", t->label, guard_signal(), strsignal(guard_signal()));
+        fprintf(stderr, "%s: ended by signal %d (%s)%s%s\n", t->label, guard_signal(),
+                strsignal(guard_signal()), t->ending[0] ? "; " : "", t->ending);
         fflush(NULL);
         guard_die(guard_signal());
     }

@@ -35,6 +35,8 @@ typedef struct tool {
     bool in_place;    /* an output may replace an input */
     bool flip_inward; /* loaded meshes turn closed bodies that are wound inwards */
     bool no_weld;     /* trees keep vertices of equal position apart */
+    bool soft;        /* SIGINT and SIGTERM do not cancel library calls: the command looks for them */
+    char ending[256]; /* what a message about a signal says of the outputs, or empty */
     bool wrote;       /* an output is complete and has its name */
     uint32_t threads; /* 0: all cores */
     uint64_t seed;

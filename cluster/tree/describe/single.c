@@ -2,6 +2,7 @@
  * blocks, so that a cluster gets the same bits from both. */
 #include "cluster/tree/describe/single.h"
 
+#include <float.h>
 #include <string.h>
 
 void fct_points_describe(const fct_octet_row *points, uint32_t point_count, const float *normals,
@@ -33,4 +34,10 @@ void fct_leaf_describe(const fct_tree_view *view, uint32_t place, fct_cluster *o
     fct_points_describe(rows, 3, normals[0], 1, sums, out);
     out->child[0] = out->child[1] = FCT_NONE;
     out->first = place, out->count = 1;
+}
+
+float fct_leaf_area(const fct_tree_view *view, uint32_t place) {
+    fct_sums sums;
+    fct_sums_face(view->positions, view->triangles + 3 * (size_t)place, &sums);
+    return (float)(sums.area < (double)FLT_MAX ? sums.area : (double)FLT_MAX);
 }

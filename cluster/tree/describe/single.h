@@ -12,5 +12,7 @@ void fct_points_describe(const fct_octet_row *points, uint32_t point_count, cons
 
 /* The whole record of the leaf at a place; its cost is 0. */
 void fct_leaf_describe(const fct_tree_view *view, uint32_t place, fct_cluster *out);
+/* The area in that record. It takes a hundredth of the time. */
+float fct_leaf_area(const fct_tree_view *view, uint32_t place);
 
 #endif

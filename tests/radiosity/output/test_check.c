@@ -1,7 +1,7 @@
 /* The estimate of the error of shown light, against light that is wrong by a known amount. */
 #include "../place.h"
+#include "../refining.h"
 #include "radiosity/output/check.h"
-#include "radiosity/solve/refine.h"
 #include "radiosity/surface/tessellate.h"
 
 static fct_env plain; /* outlives every scene */
@@ -19,7 +19,7 @@ static void solve_scene(fct_solution *s, const fct_scene *scene) {
     assert_int_equal(fct_lamps_create(&plain, scene, &s->lamps), FCT_OK);
     assert_int_equal(fct_elements_create(&plain, scene, 1, &s->elements), FCT_OK);
     assert_int_equal(fct_links_create(&plain, &s->links), FCT_OK);
-    assert_int_equal(fct_links_refine(&s->elements, &s->links, .5, "links", 0), FCT_OK);
+    assert_int_equal(refine_links(&s->elements, &s->links, .5), FCT_OK);
     assert_int_equal(fct_transport_solve(&s->elements, s->lamps, &t, &s->transport), FCT_OK);
     assert_int_equal(fct_guides_create(&s->elements, &s->links, s->transport.stored, &s->guides), FCT_OK);
 }

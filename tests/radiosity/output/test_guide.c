@@ -1,8 +1,8 @@
 /* Guides of gathers against their definition: the density of points over all leaves, what a pick returns, the
  * rays of a guided gather, and its mean against plain gathers. */
+#include "../refining.h"
 #include "radiosity/output/anchor.h"
 #include "radiosity/solve/oracle.h"
-#include "radiosity/solve/refine.h"
 #include "radiosity/surface/tessellate.h"
 #include "room.h"
 
@@ -20,7 +20,7 @@ static void make_linked(uint64_t seed, bool hot, linked *x) {
         for (size_t c = 0; c < 3; ++c) set->items[id].radiosity[c] = .2 + pick(seed, id, c);
     fct_elements_pull(set);
     assert_int_equal(fct_links_create(&plain, &x->links), FCT_OK);
-    assert_int_equal(fct_links_refine(set, &x->links, .02, "links", 0), FCT_OK);
+    assert_int_equal(refine_links(set, &x->links, .02), FCT_OK);
     /* New elements that no link knows. */
     for (uint32_t id = 0, count = (uint32_t)set->count; id < count; id += 5)
         if (fct_elements_can_split(set, id)) assert_int_equal(fct_elements_split(set, id), FCT_OK);

@@ -224,8 +224,9 @@ static void points_are_stratified(void **state) {
     fct_scene *scene = make_scene(true);
     fct_elements set;
     assert_int_equal(fct_elements_create(&plain, scene, 100, &set), FCT_OK);
-    fct_elements_place_points(&set);
+    fct_elements_make_points(&set);
     int first = 0;
+    fct_elements_make_points(&set);
     for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
         fct_element_point p;
         fct_element_point_at(&set, set.roots[4], k, &p);
@@ -278,7 +279,7 @@ static void touched_pages_are_few(void **state) {
     assert_int_equal(fct_elements_touched(&set), 4096);
     assert_int_equal(fct_elements_split(&set, set.roots[0]), FCT_OK);
     assert_true(fct_elements_touched(&set) <= 4 * 4096);
-    fct_elements_place_points(&set);
+    fct_elements_make_points(&set);
     for (uint32_t id = 0; id < set.count; ++id)
         for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
             fct_element_point p;
@@ -360,7 +361,7 @@ static void samples_equal_the_face_at_their_fraction(void **state) {
         }
     assert_true(tested > 10 * set.count);
     /* The points are those of the sixteenths. */
-    fct_elements_place_points(&set);
+    fct_elements_make_points(&set);
     for (uint32_t id = 0; id < set.count; id += 3)
         for (uint32_t k = 0; k < FCT_ELEMENT_POINTS; ++k) {
             fct_element_point p;

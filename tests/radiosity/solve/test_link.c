@@ -1,8 +1,8 @@
 /* Links and iteration: form factors against integrals, visible fractions, and solutions against a dense
  * solve. */
 #include "../place.h"
+#include "../refining.h"
 #include "radiosity/solve/iterate.h"
-#include "radiosity/solve/refine.h"
 
 static fct_env plain; /* outlives every scene */
 
@@ -30,7 +30,7 @@ static void refine(fixture *f, double epsilon, double min_edge) {
     assert_int_equal(fct_scene_commit(f->scene), FCT_OK);
     assert_int_equal(fct_elements_create(&plain, f->scene, min_edge, &f->set), FCT_OK);
     assert_int_equal(fct_links_create(&plain, &f->links), FCT_OK);
-    assert_int_equal(fct_links_refine(&f->set, &f->links, epsilon, "links", 0), FCT_OK);
+    assert_int_equal(refine_links(&f->set, &f->links, epsilon), FCT_OK);
 }
 
 static void end(fixture *f) {

@@ -3,8 +3,8 @@
  * it keeps, and the opened elements exactly those that it opens. Then each leaf's irradiance must be the sum
  * over all links of its ancestors. */
 #include "../place.h"
+#include "../refining.h"
 #include "../soup.h"
-#include "radiosity/solve/refine.h"
 
 static const double pi = 3.14159265358979323846;
 static fct_env plain; /* outlives every scene */
@@ -73,6 +73,7 @@ typedef struct judge {
     const fct_elements *set;
     const soup *triangles;
     double epsilon;
+    double error; /* of the last pair that should be split */
     uint64_t rays;
     bool *opened; /* per element */
     tally met;
@@ -162,7 +163,8 @@ static outcome judge_pair(judge *g, fct_link *l) {
     bool splits = (split_i || split_j) && !(self && !split_i);
     outcome larger = split_i && (!split_j || i->radius >= j->radius) ? RECEIVER_OPENED : SOURCE_OPENED;
     double from = pow(.55 * j->radius / distance, 2), to = .25 * .55 * i->radius / distance;
-    if (splits && flow * (overlap ? 1 : fmin(from + to, 1)) > g->epsilon) {
+    g->error = flow * (overlap ? 1 : fmin(from + to, 1));
+    if (splits && g->error > g->epsilon) {
         if (overlap || !split_i || !split_j) return ++g->met.overlap, larger;
         return ++g->met.by_size, from > to ? SOURCE_OPENED : RECEIVER_OPENED;
     }
@@ -170,6 +172,7 @@ static outcome judge_pair(judge *g, fct_link *l) {
     if (l->rays == 0) measure_link(g, l, distance, radii);
     if (!splits) return ++g->met.stuck, KEPT;
     if (l->near || flow * sqrt(l->weight * (1 - (double)l->weight)) <= g->epsilon) return KEPT;
+    g->error = flow * sqrt(l->weight * (1 - (double)l->weight));
     return ++g->met.by_shadow, larger;
 }
 
@@ -302,7 +305,7 @@ static void links_follow_the_rules(void **state) {
             for (size_t id = 0; id < old; ++id) was_open[id] = set.items[id].child_count > 0;
             judge g = {
                 .set = &set, .triangles = &triangles, .epsilon = 2. / (1 << (2 * pass)), .rays = links.rays};
-            assert_int_equal(fct_links_refine(&set, &links, g.epsilon, "links", 0), FCT_OK);
+            assert_int_equal(refine_links(&set, &links, g.epsilon), FCT_OK);
             g.opened = calloc(set.count, sizeof *g.opened);
             for (size_t k = 0; k < count; ++k) kept += follow_pair(&g, before[k], &links);
             assert_int_equal(kept, links.count);
@@ -335,6 +338,117 @@ static void links_follow_the_rules(void **state) {
     for (size_t k = 0; k < sizeof all / sizeof(int); ++k) assert_true(met[k] > 0);
 }
 
+/* Links of a scene after a first pass, solved. */
+typedef struct refined {
+    fct_elements set;
+    fct_links links;
+} refined;
+
+static void open_refined(fct_scene *scene, refined *r) {
+    assert_int_equal(fct_elements_create(&plain, scene, .4, &r->set), FCT_OK);
+    assert_int_equal(fct_links_create(&plain, &r->links), FCT_OK);
+    assert_int_equal(refine_links(&r->set, &r->links, 2), FCT_OK);
+    uint32_t sweeps = 0;
+    assert_int_equal(fct_links_solve(&r->set, &r->links, 1e-9, 4, &sweeps), FCT_OK);
+}
+
+static void close_refined(refined *r) {
+    fct_links_release(&plain, &r->links);
+    fct_elements_release(&r->set);
+}
+
+/* Refines a new copy, and returns the number of links. */
+static size_t count_links(fct_scene *scene, double epsilon, size_t most, bool limited,
+                          fct_refine_result *done) {
+    refined r;
+    open_refined(scene, &r);
+    const fct_refine_def def = {.epsilon = epsilon, .most = most, .limited = limited, .phase = "links"};
+    assert_int_equal(fct_links_refine(&r.set, &r.links, &def, done), FCT_OK);
+    const size_t count = r.links.count;
+    close_refined(&r);
+    return count;
+}
+
+/* The largest error that the oracle finds among the links that should be split. */
+static double find_left_error(const soup *triangles, refined *r, double epsilon) {
+    judge g = {.set = &r->set, .triangles = triangles, .epsilon = epsilon};
+    double most = epsilon;
+    for (size_t k = 0; k < r->links.count; ++k) {
+        fct_link l = r->links.items[k];
+        const fct_element *i = &r->set.items[l.receiver];
+        const bool sampled = l.rays > 0;
+        const int dark = g.met.dark;
+        outcome o = judge_pair(&g, &l);
+        assert_true(sampled || g.met.dark > dark);
+        if (o == KEPT || o == DROPPED) continue;
+        /* Volumes that overlap are split at any error. */
+        if (g.error > most) most = g.error;
+        assert_true(g.error > epsilon || i->kind == FCT_ELEMENT_VOLUME);
+    }
+    return most;
+}
+
+/* With a limit: the links fill it, epsilon is the largest error that is left, and a refinement to that
+ * epsilon needs nearly as many links. A limit that is just large enough changes nothing, and the order of
+ * errors leads to the same links. */
+static void a_limit_leaves_small_errors(void **state) {
+    (void)state;
+    const double epsilon = .002;
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+        fct_scene *scene = make_scene(seed);
+        soup triangles = list_triangles(scene);
+        fct_refine_result done;
+        const size_t all = count_links(scene, epsilon, SIZE_MAX, false, &done);
+        assert_true(!done.limited && done.epsilon == epsilon);
+        assert_near((double)count_links(scene, epsilon, SIZE_MAX, true, &done), (double)all,
+                    .01 * (double)all);
+        assert_true(!done.limited && done.epsilon == epsilon);
+        for (size_t part = 2; part <= 8; part *= 2) {
+            refined r;
+            open_refined(scene, &r);
+            const size_t most = all / part;
+            const fct_refine_def def = {.epsilon = epsilon, .most = most, .phase = "links"};
+            assert_true(r.links.count < most);
+            assert_int_equal(fct_links_refine(&r.set, &r.links, &def, &done), FCT_OK);
+            assert_true(done.limited && r.links.count <= most && r.links.count > most - 16);
+            assert_near(done.epsilon, find_left_error(&triangles, &r, epsilon), 1e-5 * done.epsilon);
+            close_refined(&r);
+            fct_refine_result other;
+            const size_t same = count_links(scene, done.epsilon, SIZE_MAX, false, &other);
+            printf("    %zu of %zu links: epsilon %.3g, which needs %zu\n", most, all, done.epsilon, same);
+            assert_true(3 * same > most);
+        }
+        free(triangles.corners);
+        fct_scene_destroy(scene);
+    }
+}
+
+/* Elements that were added since an earlier moment leave no trace. */
+static void truncated_elements_can_be_split_again(void **state) {
+    (void)state;
+    fct_scene *scene = make_scene(3);
+    fct_elements set;
+    assert_int_equal(fct_elements_create(&plain, scene, .4, &set), FCT_OK);
+    fct_elements_make_points(&set);
+    const size_t count = set.count, corners = set.corner_count, clusters = set.cluster_count;
+    fct_element first[64];
+    for (int round = 0; round < 2; ++round) {
+        for (size_t id = 0; id < count + 40; ++id)
+            if (fct_elements_can_split(&set, (uint32_t)id))
+                assert_int_equal(fct_elements_split(&set, (uint32_t)id), FCT_OK);
+        fct_elements_make_points(&set);
+        assert_true(set.count > count + 64 && set.corner_count > corners && set.cluster_count > clusters);
+        if (round == 0) memcpy(first, set.items + count, sizeof first);
+        assert_memory_equal(first, set.items + count, sizeof first);
+        fct_elements_truncate(&set, count);
+        assert_true(set.count == count && set.corner_count == corners && set.cluster_count == clusters);
+        for (size_t id = set.view.volume_count; id < count; ++id)
+            assert_true(set.items[id].child_count == 0 && set.ranges[id].child_count == 0);
+    }
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
 /* Sorting keeps the order of links with one receiver. */
 static void links_are_sorted_stably(void **state) {
     (void)state;
@@ -364,6 +478,8 @@ static void links_are_sorted_stably(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(links_follow_the_rules),
+        cmocka_unit_test(a_limit_leaves_small_errors),
+        cmocka_unit_test(truncated_elements_can_be_split_again),
         cmocka_unit_test(links_are_sorted_stably),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

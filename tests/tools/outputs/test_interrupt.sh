@@ -1,0 +1,71 @@
+# tests/tools/outputs/test_interrupt.sh: a first SIGINT or SIGTERM makes a bake write its last complete solution, a second one ends it
+# at once.
+source "$(dirname "$0")/../support.sh"
+expect 0 make cornell -o cornell --triangles 1000 --quiet
+
+# interrupted "PHASES" "SIGNALS" ARGUMENTS...: sends the signals once a line of the progress names a phase.
+interrupted() {
+    local phases=$1 signals=$2 name
+    shift 2
+    rm -rf lit.ply lit.glb lit
+    env --default-signal=INT "$program" bake "$@" --progress --json >out 2>err &
+    child=$!
+    for _ in $(seq 1200); do
+        grep -qsE "^($phases) " err && break
+        sleep .05
+    done
+    for name in $signals; do # one after the other, because of two that wait the later one may come first
+        kill -"$name" $child
+        sleep .05
+    done
+    wait $child
+    code=$?
+    checks=$((checks + 1))
+    name=${signals%% *}
+    [ $code = $((128 + $(kill -l "$name"))) ] || fail "status $code: bake $*"
+    check "no temporary file: bake $*" test -z "$(find . -name '.facetree*')"
+}
+
+interrupted 'direct light' INT cornell/scene.json -o lit.ply
+says 'lit.ply has the light of the last complete solution'
+check "the answer tells it" test "$(value interrupted)" = true
+holds "$(value vertices) > 1000 && $(value absorbed) > .2 * $(value emitted)"
+expect 0 info lit.ply --json
+check "the output is whole" test "$(value vertex_colors)" = true
+interrupted gathering TERM cornell/scene.json -o lit.glb
+says 'lit.glb has the light of the last complete solution'
+expect 0 info lit.glb
+interrupted 'covers|anchors|vertices|objects' INT cornell/scene.json -o lit/
+says 'lit/ has the light of the last complete solution'
+check "all objects are there" test "$(find lit -name "*.ply" | wc -l)" -gt 4
+
+# The links do not tell the parts of the light, and paths have no passes. (test_bake_failure.c stops before the first pass.)
+interrupted reference INT cornell/scene.json -o lit.ply --method reference --samples 4000
+check "nothing is written" test ! -e lit.ply -a ! -s out
+interrupted gathering INT cornell/scene.json -o lit.ply --light indirect
+says 'nothing is written'
+check "nothing is written" test ! -e lit.ply
+
+# A second signal, and one that no output shall follow.
+interrupted gathering 'INT TERM' cornell/scene.json -o lit.ply --error 1e-6
+check "the second signal leaves no output" test ! -e lit.ply -a ! -s out
+interrupted gathering HUP cornell/scene.json -o lit.ply --error 1e-6
+check "nor does SIGHUP" test ! -e lit.ply -a ! -s out
+
+# Of several bakes, the last complete one stays.
+expect 0 bake cornell/scene.json -o first.ply --quiet
+rm -f lit.ply
+env --default-signal=INT "$program" bake cornell/scene.json -o lit.ply --error .1% --progress --json >out 2>err &
+child=$!
+for _ in $(seq 2400); do
+    [ -e lit.ply ] && break
+    sleep .05
+done
+sleep .2
+kill -INT $child
+wait $child
+check "the status of the signal" test $? = 130
+says 'lit.ply has the light of the last complete bake'
+check "the answer tells it" test "$(value interrupted)" = true
+check "the first bake" cmp first.ply lit.ply
+finish
