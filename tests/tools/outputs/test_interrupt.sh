@@ -35,7 +35,7 @@ check "the output is whole" test "$(value vertex_colors)" = true
 interrupted gathering TERM cornell/scene.json -o lit.glb
 says 'lit.glb has the light of the last complete solution'
 expect 0 info lit.glb
-interrupted 'covers|anchors|vertices|objects' INT cornell/scene.json -o lit/
+interrupted 'surface|covers|anchors|vertices|objects' INT cornell/scene.json -o lit/
 says 'lit/ has the light of the last complete solution'
 check "all objects are there" test "$(find lit -name "*.ply" | wc -l)" -gt 4
 
