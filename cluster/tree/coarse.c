@@ -45,7 +45,7 @@ static uint64_t measure_touched(const fct_env *env, const fct_tree *tree, uint32
 static fct_result walk_to_cut(const fct_env *env, const fct_tree *tree, uint32_t top, cut *c,
                               fct_cluster *records) {
     const fct_tree_view *view = &tree->view;
-    uint32_t height = 0, opened = 0, most = c->count;
+    uint32_t height = 0, opened = 0;
     uint32_t *stack = fct_allocate(env, (size_t)view->depth + view->root_count + 2, sizeof *stack);
     if (!stack) return fct_fail_memory(env, "a coarse tree");
     fct_result result = fct_tree_check_roots(env, tree);
@@ -58,18 +58,19 @@ static fct_result walk_to_cut(const fct_env *env, const fct_tree *tree, uint32_t
         if (result != FCT_OK) break;
         if (node < top) {
             /* In a damaged file a path may be longer than the header says. */
-            if (++opened > top || height + 2 > view->depth + view->root_count + 2) break;
+            if (height + 2 > view->depth + view->root_count + 2) break;
+            ++opened;
             result = fct_tree_children(tree, node, children);
             records[node] = record;
             stack[height++] = record.child[1];
             stack[height++] = record.child[0];
-        } else if (c->count < most) {
+        } else { /* the walk visits no node twice (walk.h), so at most root_count + top of them */
             c->nodes[c->count] = node;
             c->records[c->count++] = record;
         }
     }
     fct_release(env, stack);
-    if (result == FCT_OK && (opened != top || c->count != most))
+    if (result == FCT_OK && opened != top)
         result = fct_fail(env, FCT_ERROR_DATA, "%s: the nodes are not in the order of their costs",
                           tree->path ? tree->path : "a tree");
     return result;

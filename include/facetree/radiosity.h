@@ -70,7 +70,7 @@ typedef struct fct_bake_def {
      * INDIRECT, which the links do not tell apart. */
     bool (*stop)(void *user);
     void *stop_user;
-    double max_edge; /* longest edge of the output's triangles far from other instances, world units; 0: a
+    double max_edge; /* longest edge of the output's triangles far from other surfaces, world units; 0: a
                         72nd of the diagonal of all surfaces that emit no light */
 } fct_bake_def;
 FCT_API fct_bake_def fct_bake_def_default(void);

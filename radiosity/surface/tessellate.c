@@ -1,9 +1,10 @@
 /* radiosity/surface/tessellate.c: see tessellate.h.
  *
  * Rounds of splits until no edge is too long. An edge is too long above max_edge, and near another instance
- * above the distance to it, but never below max_edge / 4: light changes fastest where surfaces meet. The test
- * reads only the end points and the scene, so both faces at an edge agree, and so do coinciding edges of
- * unwelded meshes. The oriented boxes of the other instance's tree give the distance.
+ * or another part of its own model above the distance to it, but never below max_edge / 4: light changes
+ * fastest where surfaces meet. A part in whose plane the edge lies continues the surface and does not count.
+ * The test reads only the end points, the part and the scene, so both faces at an edge agree, and so do
+ * coinciding edges of unwelded meshes. The oriented boxes of the other tree give the distance.
  */
 #include "radiosity/surface/tessellate.h"
 
@@ -11,6 +12,7 @@
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
 #include "radiosity/surface/creases.h"
+#include "radiosity/surface/parts.h"
 #include "radiosity/surface/split.h"
 #include "scene/transform.h"
 
@@ -23,7 +25,9 @@
 #define GRADES 4
 /* A box with a half diagonal below this share of its distance counts as the surface itself. The distance then
  * errs by at most about a third. */
-#define SMALL_BOX  .35
+#define SMALL_BOX .35
+/* Distance of an edge from a plane, over its length, up to which it lies in the plane. */
+#define SAME_PLANE 1e-3
 #define STACK_SIZE 288
 /* Faces per chunk. */
 #define GRAIN 1024
@@ -35,6 +39,7 @@ typedef struct patch {
     fct_scene_view view;
     uint32_t instance;
     double longest, shortest; /* edges: split above `longest`, never below `shortest` */
+    fct_parts parts;          /* of the model */
     double *shrinks;          /* per instance: lower bound of world over model distance */
     uint32_t vertex_count, face_count;
     float *positions;
@@ -57,8 +62,26 @@ static double measure_box_distance2(const fct_cluster *cluster, v3 p) {
     return sum;
 }
 
-/* True if the tree comes within `distance` of p (model space), to about a third of the distance. */
-static bool tree_is_near(const fct_tree *tree, v3 p, double distance) {
+/* The parts of a model beside that of an edge (model space). */
+typedef struct other_parts {
+    const uint32_t *labels; /* fct_parts.nodes */
+    uint32_t own;
+    v3 ends[2];
+} other_parts;
+
+/* Whether a cluster is flat and its plane holds the edge. */
+static bool continues_surface(const fct_cluster *c, const v3 ends[2]) {
+    const double most = SAME_PLANE * v3_norm(v3_sub(ends[1], ends[0]));
+    const float *h = c->box_half;
+    if (fct_min(h[0], fct_min(h[1], h[2])) > most) return false;
+    for (int k = 0; k < 2; ++k)
+        if (fabs(v3_dot(v3_load(c->plane), ends[k]) + c->plane[3]) > most) return false;
+    return true;
+}
+
+/* True if the tree comes within `distance` of p (model space), to about a third of the distance. others:
+ * NULL, or the tree is that of the edge itself. */
+static bool tree_is_near(const fct_tree *tree, v3 p, double distance, const other_parts *others) {
     fct_tree_view view = fct_tree_get(tree);
     uint32_t stack[STACK_SIZE];
     double d2 = distance * distance, small2 = SMALL_BOX * SMALL_BOX * d2;
@@ -67,11 +90,14 @@ static bool tree_is_near(const fct_tree *tree, v3 p, double distance) {
         stack[0] = view.roots[r];
         while (top) {
             uint32_t node = stack[--top];
+            if (others && others->labels[node] == others->own) continue;
             fct_cluster room;
             const fct_cluster *c = fct_node_cluster(tree, node, &room);
             if (measure_box_distance2(c, p) > d2) continue;
-            if (node >= view.node_count || v3_norm2(v3_load(c->box_half)) < small2 || top + 2 > STACK_SIZE)
-                return true;
+            bool small = node >= view.node_count || v3_norm2(v3_load(c->box_half)) < small2;
+            if (others && others->labels[node] == FCT_NONE) small = false;
+            if (others && small && continues_surface(c, others->ends)) continue;
+            if (small || top + 2 > STACK_SIZE) return true;
             stack[top++] = fct_node_child(tree, node, 1);
             stack[top++] = fct_node_child(tree, node, 0);
         }
@@ -105,20 +131,34 @@ static bool others_are_near(const patch *c, v3 point, double distance) {
         const fct_instance *other = c->view.instances + volume->instance;
         v3 local = fct_transform_point(other->to_model, point);
         double shrink = c->shrinks[volume->instance];
-        if (tree_is_near(c->view.models[other->model].tree, local, shrink > 0 ? distance / shrink : INFINITY))
+        if (tree_is_near(c->view.models[other->model].tree, local, shrink > 0 ? distance / shrink : INFINITY,
+                         NULL))
             return true;
     }
     return false;
 }
 
-static bool edge_is_too_long(const patch *c, uint32_t va, uint32_t vb) {
+/* True if another part of the model comes within `distance` of the middle of the edge a, b of `part`. */
+static bool parts_are_near(const patch *c, uint32_t part, v3 a, v3 b, double distance) {
+    if (!c->parts.nodes) return false;
+    const fct_instance *own = c->view.instances + c->instance;
+    const other_parts others = {
+        c->parts.nodes, part, {fct_transform_point(own->to_model, a), fct_transform_point(own->to_model, b)}};
+    const v3 middle = v3_scale(v3_add(others.ends[0], others.ends[1]), .5);
+    const double shrink = c->shrinks[c->instance];
+    return tree_is_near(c->view.models[own->model].tree, middle, shrink > 0 ? distance / shrink : INFINITY,
+                        &others);
+}
+
+/* part: of the face, if the model has several. */
+static bool edge_is_too_long(const patch *c, uint32_t part, uint32_t va, uint32_t vb) {
     v3 a = v3_load(c->positions + 3 * (size_t)va), b = v3_load(c->positions + 3 * (size_t)vb);
     double length = v3_norm(v3_sub(b, a));
     if (!(length > c->shortest)) return false;
     v3 middle = v3_scale(v3_add(a, b), .5);
     v3 rounded = v3_round(middle); /* a midpoint that rounds to an end cannot split the edge */
     if (v3_norm2(v3_sub(rounded, a)) == 0 || v3_norm2(v3_sub(rounded, b)) == 0) return false;
-    return length > c->longest || others_are_near(c, middle, length);
+    return length > c->longest || others_are_near(c, middle, length) || parts_are_near(c, part, a, b, length);
 }
 
 static void mark_faces(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -127,9 +167,9 @@ static void mark_faces(void *user, size_t begin, size_t end, size_t chunk, uint3
     for (size_t f = begin; f < end; ++f) {
         c->marks[f] = 0;
         if (c->settled[f]) continue;
-        const uint32_t *t = c->triangles + 3 * f;
+        const uint32_t *t = c->triangles + 3 * f, part = c->parts.faces ? c->parts.faces[c->faces[f]] : 0;
         for (int k = 0; k < 3; ++k)
-            if (edge_is_too_long(c, t[k], t[k == 2 ? 0 : k + 1])) c->marks[f] |= (uint8_t)(1 << k);
+            if (edge_is_too_long(c, part, t[k], t[k == 2 ? 0 : k + 1])) c->marks[f] |= (uint8_t)(1 << k);
         c->settled[f] = c->marks[f] == 0;
     }
 }
@@ -286,6 +326,8 @@ fct_result fct_surface_build(const fct_env *env, const fct_shading *shading, dou
                .shortest = longest / GRADES};
     *out = (fct_surface){0};
     fct_result result = place_model(&c);
+    if (result == FCT_OK && isfinite(longest))
+        result = fct_parts_create(env, c.view.models[c.view.instances[c.instance].model].tree, &c.parts);
     if (result == FCT_OK) result = split_long_edges(&c);
     if (result == FCT_OK) result = store_surface(&c, out);
     fct_release(env, c.positions);
@@ -295,5 +337,6 @@ fct_result fct_surface_build(const fct_env *env, const fct_shading *shading, dou
     fct_release(env, c.marks);
     fct_release(env, c.settled);
     fct_release(env, c.shrinks);
+    fct_parts_release(env, &c.parts);
     return result;
 }

@@ -449,8 +449,73 @@ static void memory_runs_out(void **state) {
     fct_mesh_release(&plain, &cube);
 }
 
+/* Copies a rectangle (two triangles) into the mesh from vertex and face on. */
+static void put_rectangle(fct_mesh *mesh, uint32_t vertex, uint32_t face, v3 o, v3 u, v3 v) {
+    const v3 corners[4] = {o, v3_add(o, u), v3_add(v3_add(o, u), v), v3_add(o, v)};
+    const uint32_t faces[6] = {0, 1, 2, 0, 2, 3};
+    for (uint32_t k = 0; k < 4; ++k) v3_store(mesh->positions + 3 * (size_t)(vertex + k), corners[k]);
+    for (uint32_t k = 0; k < 6; ++k) mesh->triangles[3 * (size_t)face + k] = vertex + faces[k];
+}
+
+static double box_distance(v3 p, v3 low, v3 high) {
+    const double x = fmax(fmax(low.x - p.x, p.x - high.x), 0), y = fmax(fmax(low.y - p.y, p.y - high.y), 0),
+                 z = fmax(fmax(low.z - p.z, p.z - high.z), 0);
+    return sqrt(x * x + y * y + z * z);
+}
+
+/* A plate, a cube that lies on it, and a tile that continues it, in one mesh: the plate is split near the
+ * cube as if the cube were another instance, and nowhere else. */
+static void parts_refine_each_other(void **state) {
+    (void)state;
+    const double longest = 1, shortest = longest / 4;
+    const v3 low = v3_make(.9, -.1, .01), high = v3_make(1.1, .1, .21);
+    for (int turned = 0; turned < 2; ++turned) {
+        fct_mesh mesh;
+        fct_scene *scene = begin();
+        assert_int_equal(fct_mesh_create(&plain, 16, 16, 0, &mesh), FCT_OK);
+        put_rectangle(&mesh, 0, 0, v3_make(-2, -2, 0), v3_make(4, 0, 0), v3_make(0, 4, 0));
+        put_rectangle(&mesh, 4, 2, v3_make(2.02, -2, 0), v3_make(1, 0, 0), v3_make(0, 4, 0));
+        fct_mesh cube = make_cube();
+        for (uint32_t v = 0; v < 8; ++v)
+            v3_store(mesh.positions + 3 * (size_t)(8 + v),
+                     v3_add(low, v3_scale(v3_load(cube.positions + 3 * (size_t)v), .2)));
+        for (uint32_t c = 0; c < 36; ++c) mesh.triangles[12 + c] = 8 + cube.triangles[c];
+        const float transform[12] = {0, -2, 0, 5, 2, 0, 0, 1, 0, 0, 2, -3};
+        place_mesh(scene, &mesh, place_material(scene, .5, 0, false), turned ? transform : NULL);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        const double scale = turned ? 2 : 1;
+        fct_surface s = build(scene, 0, scale * longest);
+        assert_sound(scene, 0, &s);
+        uint32_t near = 0, coarse = 0;
+        for (size_t f = 0; f < s.mesh.face_count; ++f) {
+            if (s.mesh.source_faces[f] >= 4) continue;
+            for (size_t k = 0; k < 3; ++k) {
+                v3 ends[2];
+                for (size_t i = 0; i < 2; ++i) {
+                    v3 p = at(&s, s.mesh.triangles[3 * f + (k + i) % 3]);
+                    if (turned) p = v3_make((p.y - 1) / 2, -(p.x - 5) / 2, (p.z + 3) / 2);
+                    ends[i] = p;
+                }
+                const double length = v3_norm(v3_sub(ends[1], ends[0]));
+                const double distance = box_distance(v3_scale(v3_add(ends[0], ends[1]), .5), low, high);
+                /* The boxes of small clusters stand for their surfaces: the distance errs by a third. */
+                if (length > shortest * 1.01 && distance < .6 * length)
+                    fail_msg("%g long at %g", length, distance);
+                if (distance < shortest / 2) ++near;
+                if (distance > 1.5 && length > .4 * longest) ++coarse;
+            }
+        }
+        assert_true(near > 10 && coarse > 100);
+        assert_true(s.mesh.face_count < 400);
+        fct_surface_release(&plain, &s);
+        fct_mesh_release(&plain, &mesh), fct_mesh_release(&plain, &cube);
+        fct_scene_destroy(scene);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parts_refine_each_other),
         cmocka_unit_test(cube_is_split_evenly),
         cmocka_unit_test(splits_conform),
         cmocka_unit_test(dense_models_pass),
