@@ -127,8 +127,8 @@ static fct_result solve_links(fct_bake *bake, double *last, int *solved) {
     fct_bake_stats *stats = &bake->stats;
     fct_result result = fct_links_create(s->env, &s->links);
     const double emitted = sum_emitted_power(&s->elements);
-    fct_refine_result done = {0};
-    bool limited = false;
+    bool limited = false; /* by the limit, in some pass */
+    double reached = 1;   /* epsilon of the last complete pass over the one that it was to reach */
     *last = s->def.error * emitted;
     *solved = 0;
     for (int pass = 0; pass < PASSES && emitted > 0 && result == FCT_OK; ++pass) {
@@ -141,19 +141,21 @@ static fct_result solve_links(fct_bake *bake, double *last, int *solved) {
                                     .limited = limited,
                                     .phase = "links",
                                     .done = pass / (double)PASSES};
+        fct_refine_result done;
         double start = fct_seconds();
         result = fct_links_refine(&s->elements, &s->links, &def, &done);
-        limited = limited || done.limited;
         stats->seconds_open += fct_seconds() - start;
         if (result != FCT_OK) break;
+        limited = limited || done.limited;
+        stats->links_limited = done.limited;
+        reached = fct_max(done.epsilon / *last, 1);
         start = fct_seconds();
         uint32_t most = pass + 1 < PASSES ? EARLY_SWEEPS : LAST_SWEEPS;
         result = fct_links_solve(&s->elements, &s->links, LINK_TOLERANCE, most, &stats->passes);
         stats->seconds_solve += fct_seconds() - start;
         ++*solved;
     }
-    stats->links_limited = done.limited;
-    stats->link_error = s->def.error * (done.epsilon > *last ? done.epsilon / *last : 1);
+    stats->link_error = s->def.error * reached;
     return result;
 }
 
@@ -298,7 +300,8 @@ fct_result fct_bake_create(const fct_env *env, const fct_scene *scene, const fct
     bake->stats.max_links =
         def->max_links
             ? def->max_links
-            : (uint64_t)(s->fineness * (SCENE_LINKS + INSTANCE_LINKS * (double)view.instance_count));
+            : (uint64_t)fct_min(s->fineness * (SCENE_LINKS + INSTANCE_LINKS * (double)view.instance_count),
+                                MOST_LINKS);
     bake->checks = fct_allocate_zero(env, view.object_count, sizeof *bake->checks);
     if (!bake->checks) {
         result = fct_fail_memory(env, "a bake");
@@ -502,7 +505,9 @@ fct_result fct_bake_sides(fct_bake *bake, uint32_t instance, fct_mesh sides[2], 
     bake->stats.seconds_push += fct_seconds() - start;
     if (result == FCT_OK) {
         bake->lit_work += estimate_work(&bake->solution.elements.view, instance, bake->solution.max_edge);
-        result = fct_progress(env, "objects", fct_min(bake->lit_work / bake->whole_work, 1));
+        const double done = fct_min(bake->lit_work / bake->whole_work, 1);
+        bake->listening = bake->listening && done < 1 - 1e-9; /* all instances have their light */
+        result = fct_progress(env, "objects", done);
         if (go_on_early(bake, result)) result = FCT_OK;
     }
     bake->listening = false;

@@ -147,11 +147,6 @@ static uint32_t *list_corners(const saving *w, uint32_t instance, const fct_mesh
     return corners;
 }
 
-static void drop_normals(const fct_env *env, fct_mesh *mesh) {
-    fct_release(env, mesh->normals);
-    mesh->normals = NULL;
-}
-
 /* Adds the lit mesh of an instance and takes it. both: the other side has its own mesh. */
 static fct_result add_lit(const saving *w, uint32_t instance, const place *at, bool both, bool back,
                           fct_mesh *mesh) {
@@ -164,8 +159,6 @@ static fct_result add_lit(const saving *w, uint32_t instance, const place *at, b
         move_to_node(w, instance, at, &own, mesh);
         turn_to_node(w, instance, mesh);
     }
-    if (w->document && fct_solution_shading(w->s, instance, back).rule == FCT_NORMALS_FILE)
-        drop_normals(env, mesh); /* the file keeps its own, bit for bit */
     if (result == FCT_OK && w->document && !(corners = list_corners(w, instance, &own, mesh)))
         result = fct_fail_memory(env, "a lit mesh");
     fct_mesh_release(env, &own);
@@ -175,6 +168,8 @@ static fct_result add_lit(const saving *w, uint32_t instance, const place *at, b
                              .material = i->material,
                              .one_sided = both,
                              .back = back,
+                             .file_normals = /* bit for bit */
+                             fct_solution_shading(w->s, instance, back).rule == FCT_NORMALS_FILE,
                              .corners = corners};
     if (result == FCT_OK) result = fct_glb_scene_add_lit(w->out, &lit, mesh);
     fct_mesh_release(env, mesh);

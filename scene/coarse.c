@@ -6,9 +6,10 @@
 /* A model becomes coarse if it has more faces than this multiple of its patches. */
 #define LARGE 2
 
-/* Whether a model may become coarse; see coarse.h. */
+/* Whether a model may become coarse; see coarse.h. Models without instances stay as they are. */
 static void find_fit_models(const fct_scene *scene, bool *fit) {
-    memset(fit, true, scene->model_count * sizeof *fit);
+    memset(fit, false, scene->model_count * sizeof *fit);
+    for (uint32_t i = 0; i < scene->instance_count; ++i) fit[scene->instances[i].model] = true;
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         const fct_instance *in = &scene->instances[i];
         if (scene->frames[i].emits || scene->paints[in->material].painted || !(in->uniform_scale > 0))
@@ -22,7 +23,7 @@ static uint32_t choose_share(const fct_scene *scene, const bool *fit) {
     uint32_t share = all / (scene->model_count < all ? scene->model_count : all), large = 0;
     for (uint32_t m = 0; m < scene->model_count; ++m)
         large += fit[m] && fct_tree_get(scene->own[m].tree).face_count / LARGE > share;
-    return large ? all / large : all;
+    return large == 0 ? all : large < all ? all / large : 1;
 }
 
 static fct_result coarsen_model(const fct_env *env, fct_scene_model *own, uint32_t patches) {
@@ -38,9 +39,12 @@ fct_result fct_scene_coarsen_models(fct_scene *scene) {
     find_fit_models(scene, fit);
     const uint32_t share = choose_share(scene, fit);
     fct_result result = FCT_OK;
-    for (uint32_t m = 0; m < scene->model_count && result == FCT_OK; ++m)
-        if (fit[m] && fct_tree_get(scene->own[m].tree).face_count / LARGE > share)
-            result = coarsen_model(scene->env, scene->own + m, share);
+    for (uint32_t m = 0; m < scene->model_count && result == FCT_OK; ++m) {
+        const fct_tree_view view = fct_tree_get(scene->own[m].tree);
+        const uint32_t patches = share > view.root_count ? share : view.root_count;
+        if (fit[m] && view.face_count / LARGE > patches)
+            result = coarsen_model(scene->env, scene->own + m, patches);
+    }
     fct_release(scene->env, fit);
     return result;
 }
@@ -83,7 +87,7 @@ fct_result fct_scene_complete(const fct_scene *scene) {
         whole->models[m].bvh = own->bvh;
     }
     for (uint32_t i = 0; i < scene->instance_count; ++i)
-        whole->frames[i].bvh = scene->own[scene->instances[i].model].bvh;
+        if (!scene->frames[i].bvh) whole->frames[i].bvh = scene->own[scene->instances[i].model].bvh;
     return FCT_OK;
 }
 

@@ -2,8 +2,9 @@
  *
  * The clusters of a cut become patches. A patch is the rectangle in the cluster's plane (cluster.h) that its
  * box covers, two triangles that face along the area vector. It is larger than the cluster's outline, so
- * neighbouring patches overlap and rays do not pass between them. A cluster of one face keeps its triangle.
- * The records of all clusters are those of the large tree, so areas, moments and boxes are exact.
+ * neighbouring patches overlap; those of bent ground are shrunk (coarse.c), and few rays pass between them. A
+ * cluster of one face keeps its triangle. The records of all clusters are those of the large tree, so areas,
+ * moments and boxes are exact.
  */
 #ifndef FCT_CLUSTER_COARSE_H
 #define FCT_CLUSTER_COARSE_H
@@ -18,9 +19,8 @@ typedef struct fct_coarse {
     uint32_t *patches; /* place -> patch; ascending */
     float *fill;       /* per patch: area of the cluster's outline over that of the rectangle, at most 1 */
     float *height;     /* per patch: half of the box's extent across the plane; 0 for a triangle */
-    uint64_t
-        touched_bytes; /* pages of 4 KiB of the large tree's records that were read, if it is in a file */
-    bool closed;       /* the large tree's mesh has no edge with one face, or with three or more */
+    uint64_t touched_bytes; /* about: pages of 4 KiB of the large tree's records that were read; 0: no file */
+    bool closed;            /* the large tree's mesh has no edge with one face, or with three or more */
 } fct_coarse;
 
 /* The coarse tree of the partition of `tree` into patch_count clusters, from root_count to face_count. Reads

@@ -62,6 +62,7 @@ static const char *read_unchecked(const fct_tree *tree, uint32_t node, fct_clust
     if (record) {
         *out = *record;
         fault = fct_tree_node_fault(&tree->view, node, out);
+        if (!fault && node >= tree->view.node_count) fault = corners_fault(&tree->view, out->first);
     } else {
         uint32_t place = node - tree->view.node_count;
         fault = corners_fault(&tree->view, place);

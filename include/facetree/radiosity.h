@@ -96,9 +96,11 @@ typedef struct fct_bake_stats {
     uint64_t touched_bytes;     /* pages of the hierarchies that were read, without rays */
     /* The reference counts the power of the instances that it has written. */
     double power_emitted;                 /* area times emission, summed over RGB */
-    double power_absorbed, power_escaped; /* their sum equals power_emitted up to the noise of the rays */
+    double power_absorbed, power_escaped; /* their sum equals power_emitted up to the noise of the rays. Of
+                                             an interrupted bake: absorbed over the links, escaped unknown */
     /* RMS error over the mean of the light that the surfaces without emission show between their vertices,
-     * for the output so far (see fct_bake_error). Before any output: the noise of the stored solution. */
+     * for the output so far (see fct_bake_error). Before any output: the noise of the stored solution.
+     * Without meaning if the bake was interrupted. */
     double error_estimate;
     uint64_t check_rays; /* of the error estimate, not in output_rays */
     double max_edge;     /* def.max_edge, or the default for this scene */

@@ -57,7 +57,7 @@ FCT_API fct_paint fct_paint_default(void);
 typedef struct fct_model {
     char name[128];
     const fct_tree *tree;
-    const fct_bvh *bvh;
+    const fct_bvh *bvh; /* NULL for a large model of a FCT_BACKEND_MULTIRES scene until fct_scene_complete */
     /* Input face of the tree -> face of the mesh that was added; NULL if they are the same. */
     const uint32_t *source_faces;
     const uint32_t *source_vertices;                 /* likewise for vertices */
@@ -165,8 +165,8 @@ FCT_API fct_result fct_scene_commit(fct_scene *scene);
 
 /* In a scene of FCT_BACKEND_MULTIRES, large models have no ray structure after fct_scene_commit: a bake needs
  * none until its output. Builds them; the scene then answers queries like any other. Does nothing if they
- * exist. No other function may use the scene meanwhile. Errors: DATA (a damaged hierarchy file), MEMORY,
- * CANCELLED. */
+ * exist. No other function may use the scene meanwhile. The first output of a bake calls it; bakes in several
+ * threads need a call before them. Errors: DATA (a damaged hierarchy file), MEMORY, CANCELLED. */
 FCT_API fct_result fct_scene_complete(const fct_scene *scene);
 
 /* Makes every material that emits no light reflect on both sides. Allowed before and after

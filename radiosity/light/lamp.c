@@ -186,6 +186,7 @@ static void add_minor_lamps(query *q, const double light[3], double sum, double 
     const double ratio = .5 * sum / q->scale * q->base_rays / RAY_ERROR;
     const uint32_t wanted = (uint32_t)fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
     const bool more = wanted > q->base_rays && !q->fixed;
+    if (q->doubt && !more) return; /* the same rays again */
     bool mixed = more && q->doubt >> MINOR_SLOT & 1;
     if (!mixed)
         mixed = sample_minor_lamps(q, sum, q->base_rays, all, seen, cut) || !(all[0] + all[1] + all[2] > 0);

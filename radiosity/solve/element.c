@@ -14,7 +14,7 @@
 #include "scene/transform.h"
 
 enum { PAGE = 4096 };
-/* Distance of points above their patches, over the height of the patch: neighbouring rectangles, which
+/* Distance of points above their patches, over half the height of its box: neighbouring rectangles, which
  * overlap at an angle, would hide lower points. With 1, a bumpy body misses 15 % of its direct light; with 2,
  * 5 %; with 4 and more, nothing. */
 #define PATCH_LIFT 4.F

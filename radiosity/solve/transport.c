@@ -253,7 +253,8 @@ static fct_result split_bent_leaves(fct_elements *set) {
     const double least = LEAST_BENT_AREA * set->items[0].area;
     for (size_t id = 0; id < set->count; ++id) {
         const fct_element *e = &set->items[id];
-        if (e->child_count || e->kind != FCT_ELEMENT_CLUSTER || e->area < least) continue;
+        if (e->kind != FCT_ELEMENT_CLUSTER || e->area < least || !fct_elements_can_split(set, (uint32_t)id))
+            continue;
         if (v3_norm(e->vector) > BENT * e->area) continue;
         fct_result result = fct_elements_split(set, (uint32_t)id);
         if (result != FCT_OK) return result;

@@ -53,19 +53,28 @@ static bool corners_are_smooth(const work *w, uint32_t a, uint32_t b) {
     return v3_dot(n, m) > w->shading->crease_cosine;
 }
 
+/* Corners of a vertex that a corner is compared with, at most: few vertices have more different normals. */
+enum { MOST_COMPARED = 32 };
+
+/* Joins corner `at` of the list with the first of those from `begin` on that has the same normal. */
+static void join_to_earlier(const work *w, const uint32_t *corners, const uint32_t *list, size_t begin,
+                            size_t at, uint32_t *parents) {
+    const v3 own = v3_load(w->shades + 3 * (size_t)corners[list[at]]);
+    for (size_t i = begin; i < at && i < begin + MOST_COMPARED; ++i) {
+        if (!fct_shading_same(v3_load(w->shades + 3 * (size_t)corners[list[i]]), own)) continue;
+        fct_sets_join(parents, list[i], list[at]);
+        return;
+    }
+}
+
 /* Joins corners of one vertex that have the same normal of the file. Corners without one stay apart. */
 static void join_shared_normals(const work *w, const uint32_t *corners, size_t count, uint64_t *keys,
                                 uint32_t *values, uint32_t *parents) {
     for (size_t i = 0; i < count; ++i) keys[i] = w->mesh->triangles[corners[i]], values[i] = (uint32_t)i;
     fct_sort_in_place(keys, values, count);
-    for (size_t i = 1, head = 0; i < count; ++i) {
-        const v3 a = v3_load(w->shades + 3 * (size_t)corners[values[head]]);
-        const v3 b = v3_load(w->shades + 3 * (size_t)corners[values[i]]);
-        if (keys[i] == keys[head] && fct_shading_same(a, b))
-            fct_sets_join(parents, values[head], values[i]);
-        else if (keys[i] != keys[head] || v3_norm2(a) == 0)
-            head = i;
-    }
+    for (size_t i = 0, end; i < count; i = end)
+        for (end = i; end < count && keys[end] == keys[i]; ++end)
+            join_to_earlier(w, corners, values, i, end, parents);
 }
 
 /* Joins the corners around a position across smooth edges. open[i]: corner i has an edge that is not joined;

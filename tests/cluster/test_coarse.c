@@ -231,6 +231,48 @@ static void files_are_checked_as_they_are_read(void **state) {
     assert_int_equal(r.alive, 0);
 }
 
+/* A single face in the cut: its corners are checked as well. */
+static void corners_of_single_faces_are_checked(void **state) {
+    (void)state;
+    recorder r = {0};
+    const fct_env env = recorder_env(&r);
+    fct_mesh mesh = make_hills(&env, 90, .05), part;
+    const uint32_t last = mesh.face_count - 1;
+    /* The last face alone is far away, so it stays alone down to every cut. */
+    for (uint32_t k = 0; k < 3; ++k) mesh.triangles[3 * (size_t)last + k] = k;
+    uint32_t *kept = calloc(last, sizeof *kept), *ids = NULL;
+    for (uint32_t f = 0; f < last; ++f) kept[f] = f;
+    assert_int_equal(fct_mesh_extract(&env, &mesh, kept, last, &part, &ids), FCT_OK);
+    fct_mesh far = make_grid(&env, 1), both;
+    for (size_t v = 0; v < far.vertex_count; ++v) far.positions[3 * v] += 50;
+    far.face_count = 1;
+    const fct_mesh parts[2] = {part, far};
+    assert_int_equal(fct_mesh_join(&env, parts, 2, &both), FCT_OK);
+    fct_tree *tree = tree_of(&env, both), *open;
+    assert_int_equal(fct_tree_save(&env, tree, "far.fct"), FCT_OK);
+    const fct_tree_view view = fct_tree_get(tree);
+    uint32_t place = 0;
+    while (view.face_ids[place] != view.face_count - 1) ++place;
+    FILE *file = fopen("far.fct", "r+b");
+    unsigned char *bytes = malloc(1 << 23);
+    const size_t size = fread(bytes, 1, 1 << 23, file), want = 12 * (size_t)view.face_count;
+    size_t at = 0;
+    while (at + want <= size && memcmp(bytes + at, view.triangles, want) != 0) at += 4;
+    assert_true(at + want <= size);
+    const uint32_t wild = 0x7fffffff;
+    fseek(file, (long)(at + 12 * (size_t)place), SEEK_SET);
+    fwrite(&wild, sizeof wild, 1, file);
+    fclose(file);
+    assert_int_equal(fct_tree_open(&env, "far.fct", &open), FCT_OK);
+    fct_coarse c;
+    assert_int_equal(fct_tree_coarsen(&env, open, 100, &c), FCT_ERROR_DATA);
+    fct_tree_destroy(open), fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh), fct_mesh_release(&env, &part), fct_mesh_release(&env, &far);
+    fct_memory_release(&env, ids);
+    free(kept), free(bytes);
+    assert_int_equal(r.alive, 0);
+}
+
 static void each_allocation_may_fail(void **state) {
     (void)state;
     recorder r = {0};
@@ -257,6 +299,7 @@ int main(void) {
         cmocka_unit_test(trees_follow_their_definition),
         cmocka_unit_test(rays_do_not_pass),
         cmocka_unit_test(files_are_checked_as_they_are_read),
+        cmocka_unit_test(corners_of_single_faces_are_checked),
         cmocka_unit_test(each_allocation_may_fail),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,7 +3,10 @@
 #include "support.h"
 
 #include "base/math/vec.h"
+#include "cluster/tree/node.h"
 #include "facetree/radiosity.h"
+#include "radiosity/bake.h"
+#include "radiosity/output/solution.h"
 #include "scene/coarse.h"
 
 static uint32_t add_material(fct_scene *scene, double reflectance, double emission) {
@@ -110,6 +113,54 @@ static fct_scene *make_room(const fct_env *env, uint32_t n, fct_backend backend)
     return scene;
 }
 
+/* Points of a patch lie within the outline: evenly over the rectangle, shrunk to the area of the cluster's
+ * outline about its middle. Rays start four half heights above it. */
+static void points_lie_within_the_outline(void **state) {
+    (void)state;
+    const fct_env env = fct_env_default();
+    fct_scene *scene = make_room(&env, 40, FCT_BACKEND_MULTIRES);
+    const fct_scene *coarse = fct_scene_coarse(scene);
+    const fct_coarse *c = fct_scene_coarse_model(coarse, 1);
+    assert_non_null(c);
+    const fct_tree_view view = fct_tree_get(c->tree);
+    fct_elements set;
+    assert_int_equal(fct_elements_create(&env, coarse, 100, &set), FCT_OK);
+    for (uint32_t id = 0; id < set.count && set.count < 3000; ++id)
+        if (set.items[id].kind != FCT_ELEMENT_VOLUME && fct_elements_can_split(&set, id))
+            assert_int_equal(fct_elements_split(&set, id), FCT_OK);
+    int tested = 0;
+    for (uint32_t id = 0; id < set.count; ++id) {
+        const fct_element *e = &set.items[id];
+        if (e->instance != 1 || e->kind != FCT_ELEMENT_CLUSTER || e->node < c->top_count) continue;
+        assert_false(fct_elements_can_split(&set, id));
+        const uint32_t place = fct_node_first(c->tree, e->node), patch = c->patches[place];
+        const uint32_t *t = view.triangles + 3 * (size_t)place;
+        v3 q[3], mean = {0, 0, 0};
+        for (int k = 0; k < 3; ++k) q[k] = v3_load(view.positions + 3 * (size_t)t[k]);
+        const v3 u = v3_sub(q[1], q[0]), v = v3_sub(q[2], q[1]), middle = v3_scale(v3_add(q[0], q[2]), .5);
+        const double shrink = sqrt((double)c->fill[patch]), n = 400;
+        double widest[2] = {0, 0};
+        for (int k = 0; k < n; ++k) {
+            fct_element_point p;
+            fct_element_sample(&set, id, (k + .5) / n, fmod(.618034 * k, 1), fmod(.754878 * k, 1), &p);
+            const v3 d = v3_sub(v3_load(p.position), middle);
+            mean = v3_mad(mean, 1 / n, d);
+            widest[0] = fmax(widest[0], fabs(v3_dot(d, u)) / v3_norm2(u));
+            widest[1] = fmax(widest[1], fabs(v3_dot(d, v)) / v3_norm2(v));
+            const double above = 4 * (double)c->height[patch];
+            assert_true(p.offset >= above && p.offset < above * 1.001 + 2e-4 * v3_norm(u) + 1e-5);
+        }
+        for (int k = 0; k < 2; ++k) /* shares of the sides, u and v are at right angles */
+            if (widest[k] > .5 * shrink + 1e-3 || widest[k] < .45 * shrink)
+                fail_msg("%g, %g", widest[k], shrink);
+        assert_true(v3_norm(mean) < .03 * shrink * (v3_norm(u) + v3_norm(v)));
+        ++tested;
+    }
+    assert_true(tested > 300);
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
 static fct_bake *solve(const fct_env *env, const fct_scene *scene, fct_bake_stats *stats) {
     fct_bake *bake;
     const fct_bake_def def = fct_bake_def_default();
@@ -139,6 +190,42 @@ static void work_does_not_grow(void **state) {
     assert_true((double)large.touched_bytes < 1.1 * (double)small.touched_bytes);
     assert_true(exact.touched_bytes > 3 * large.touched_bytes / 2);
     fct_scene_destroy(a), fct_scene_destroy(b), fct_scene_destroy(c);
+}
+
+/* After the solution, elements refer to nodes and places of the model, and none of them is a part of a patch.
+ */
+static void elements_refer_to_the_model(void **state) {
+    (void)state;
+    const fct_env env = fct_env_default();
+    fct_bake_stats stats;
+    fct_scene *scene = make_room(&env, 40, FCT_BACKEND_MULTIRES);
+    const fct_coarse *c = fct_scene_coarse_model(fct_scene_coarse(scene), 1);
+    fct_bake *bake = solve(&env, scene, &stats);
+    const fct_elements *set = &fct_bake_solution(bake)->elements;
+    for (size_t id = 0; id < set->count; ++id)
+        if (set->items[id].instance == 1 && set->items[id].kind == FCT_ELEMENT_CLUSTER &&
+            set->items[id].node >= c->top_count)
+            assert_int_equal(set->items[id].child_count, 0);
+    uint32_t *before = calloc(set->count, sizeof *before);
+    for (size_t id = 0; id < set->count; ++id) before[id] = set->items[id].node;
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_instance(bake, 0, &mesh), FCT_OK);
+    fct_mesh_release(&env, &mesh);
+    assert_ptr_equal(set->scene, scene);
+    int patches = 0;
+    for (size_t id = 0; id < set->count; ++id) {
+        const fct_element *e = &set->items[id];
+        if (e->instance != 1) continue;
+        const fct_tree *tree = set->view.models[1].tree;
+        assert_int_equal(e->node, fct_coarse_origin(c, before[id]));
+        assert_int_equal(set->ranges[id].first, fct_node_first(tree, e->node));
+        assert_int_equal(set->ranges[id].count, fct_node_faces(tree, e->node));
+        patches += before[id] >= c->top_count;
+    }
+    assert_true(patches > 100);
+    free(before);
+    fct_bake_destroy(bake);
+    fct_scene_destroy(scene);
 }
 
 /* Output and probes use the models themselves: light differs from that of an exact solution as little as two
@@ -180,8 +267,8 @@ static void output_is_that_of_exact_rays(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(light_in_a_sphere_is_even),
-        cmocka_unit_test(work_does_not_grow),
+        cmocka_unit_test(light_in_a_sphere_is_even),    cmocka_unit_test(points_lie_within_the_outline),
+        cmocka_unit_test(elements_refer_to_the_model),  cmocka_unit_test(work_does_not_grow),
         cmocka_unit_test(output_is_that_of_exact_rays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

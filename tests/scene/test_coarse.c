@@ -71,6 +71,32 @@ static void large_plain_models_become_coarse(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* More models than patches, and trees of several roots: each keeps at least its roots. */
+static void many_models_have_enough_patches(void **state) {
+    (void)state;
+    const fct_env env = fct_env_default();
+    fct_scene *scene;
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_MULTIRES, &scene), FCT_OK);
+    scene->patches = 6;
+    const uint32_t grey = add_material(scene, 0);
+    fct_tree_def def = fct_tree_def_default();
+    for (int i = 0; i < 12; ++i) {
+        fct_mesh ball = make_sphere(&env, 6);
+        fct_tree *tree;
+        def.root_count = 1 + (uint32_t)i;
+        assert_int_equal(fct_tree_build(&env, &ball, &def, NULL, &tree), FCT_OK);
+        assert_int_equal(fct_scene_add_object(scene, "ball", NULL, tree, NULL, grey, NULL), FCT_OK);
+        fct_mesh_release(&env, &ball);
+    }
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    for (uint32_t m = 0; m < 12; ++m) {
+        const fct_coarse *c = fct_scene_coarse_model(fct_scene_coarse(scene), m);
+        assert_non_null(c);
+        assert_int_equal(c->patch_count, 1 + m);
+    }
+    fct_scene_destroy(scene);
+}
+
 static float next_random(uint32_t *seed) {
     *seed = *seed * 1664525u + 1013904223u;
     return (float)(*seed >> 8) / 16777216.F;
@@ -141,6 +167,7 @@ static void each_allocation_may_fail(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(large_plain_models_become_coarse),
+        cmocka_unit_test(many_models_have_enough_patches),
         cmocka_unit_test(completed_scenes_answer_like_others),
         cmocka_unit_test(each_allocation_may_fail),
     };

@@ -83,9 +83,8 @@ static const struct argp_option bake_options_table[] = {
     {"samples", KEY_SAMPLES, "N", 0,
      "reference: paths per vertex (default 256); face: gather rays per anchor (default: from --error)", 0},
     {"visibility", KEY_VISIBILITY, "NAME", 0,
-     "Rays: obb (default) or embree. multires: obb, and the solution replaces each model of many faces by a "
-     "few "
-     "thousand flat patches of its hierarchy, so its memory does not grow with the models",
+     "Rays: obb (default) or embree. multires: obb, and the solution replaces each model of many faces by "
+     "flat patches of its hierarchy, about 32,768 in all, so its memory does not grow with the models",
      0},
     {"backend", KEY_VISIBILITY, NULL, OPTION_ALIAS, NULL, 0},
     {"indirect-only", KEY_INDIRECT, NULL, 0, "Leave out emission and direct light", 0},
@@ -130,7 +129,8 @@ static const struct argp_option bake_options_table[] = {
      0},
     {"max-links", KEY_MAX_LINKS, "N", 0,
      "Most links of the solution, from 1000 to 4e9: those with the largest errors are divided first "
-     "(default: 1000000 and 30 per object, more with a small --error). A warning tells if this leaves larger "
+     "(default: 1000000 and 30 per instance, more with a small --error). A warning tells if this leaves "
+     "larger "
      "errors than --error asks for",
      0},
     {"two-sided", KEY_TWO_SIDED, NULL, 0,
@@ -310,6 +310,7 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
     if (object) json_object_set_new(object, "solve_peak_bytes", json_integer((json_int_t)o->solve_peak));
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
     if (object) json_object_set_new(object, "interrupted", json_boolean(s->interrupted));
+    if (object && s->interrupted) json_object_set_new(object, "error_estimate", json_null());
     if (object) json_object_set_new(object, "max_links", json_integer((json_int_t)s->max_links));
     if (object) json_object_set_new(object, "links_limited", json_boolean(s->links_limited));
     if (object) json_object_set_new(object, "link_error", json_real(s->link_error));
@@ -387,6 +388,8 @@ static void prepare_interruption(tool *t, bake_options *o, bool first) {
     o->def.stop = can && first ? is_interrupted : NULL;
     t->soft = can && first;
     if (can) guard_end_softly();
+    if (!can && first && t->output && is_folder_output(t->output))
+        snprintf(t->ending, sizeof t->ending, "%.150s may have some of its files", t->output);
 }
 
 /* Says what a signal leaves behind. Returns whether there is a result to report. */
@@ -429,8 +432,12 @@ static int solve_scene(tool *t, bake_options *o, const bake_probes *set, fct_sce
     } while (!guard_signal() && bake_try_again(t, &o->target, &stats, &o->def));
     const bool interrupted = end_interrupted(t, code, complete, &stats);
     if (interrupted) code = TOOL_DONE;
-    if (code == TOOL_DONE && o->probes && !interrupted)
+    if (code == TOOL_DONE && o->probes && !interrupted) {
+        t->soft = false; /* a signal leaves out the probes */
         code = bake_run_probes(t, bake, &view, set, &answers->probes);
+        if (code == TOOL_CANCELLED && t->output)
+            snprintf(t->ending, sizeof t->ending, "the outputs are complete, without probes");
+    }
     if (code == TOOL_DONE) {
         if (!interrupted) stats = fct_bake_get_stats(bake);
         warn_sides(t, &stats);

@@ -162,6 +162,7 @@ static fct_result add_extra(const filling *f, const char *name, const fct_glb_ar
 }
 
 static fct_result add_normals(const filling *f, const fct_glb_array *array, bool back, fct_mesh *lit) {
+    fct_release(f->scene->env, lit->normals);
     lit->normals = fct_allocate(f->scene->env, lit->vertex_count, 3 * sizeof *lit->normals);
     if (!lit->normals) return fct_fail_memory(f->scene->env, "the normals of a glTF file");
     for (size_t v = 0; v < lit->vertex_count; ++v) {
@@ -190,16 +191,17 @@ static fct_result find_sources(const filling *f, uint32_t *sources) {
     return FCT_OK;
 }
 
-static fct_result fill_all(filling *f, json_t *attributes, bool back, fct_glb_piece *piece) {
+static fct_result fill_all(filling *f, json_t *attributes, const fct_glb_lit *lit, fct_glb_piece *piece) {
     const char *name;
     json_t *value;
     const fct_glb_array *array;
     int64_t accessor;
     fct_glb *glb = &f->scene->document->glb;
     fct_result result = fct_glb_index(glb, attributes, "NORMAL", &accessor);
-    if (result == FCT_OK && accessor >= 0 && !piece->lit.normals) {
+    if (result == FCT_OK && accessor >= 0 && (lit->file_normals || !piece->lit.normals)) {
         result = find_array(f, accessor, &array);
-        if (result == FCT_OK && array && array->width == 3) result = add_normals(f, array, back, &piece->lit);
+        if (result == FCT_OK && array && array->width == 3)
+            result = add_normals(f, array, lit->back, &piece->lit);
     }
     json_object_foreach(attributes, name, value) {
         if (result != FCT_OK) return result;
@@ -216,7 +218,7 @@ static fct_result fill_all(filling *f, json_t *attributes, bool back, fct_glb_pi
 }
 
 fct_result fct_glb_fill_attributes(fct_glb_scene *scene, const fct_glb_span *span, const uint32_t *corners,
-                                   bool back, fct_glb_piece *piece) {
+                                   const fct_glb_lit *lit, fct_glb_piece *piece) {
     fct_gltf *d = scene->document;
     json_t *mesh = json_array_get(json_object_get(d->glb.root, "meshes"), (size_t)span->mesh);
     json_t *primitive = json_array_get(json_object_get(mesh, "primitives"), (size_t)span->primitive);
@@ -228,7 +230,7 @@ fct_result fct_glb_fill_attributes(fct_glb_scene *scene, const fct_glb_span *spa
                             ? find_sources(&f, sources)
                             : fct_fail_memory(scene->env, "the attributes of a glTF file");
     name_colors(attributes, piece->color_name, sizeof piece->color_name);
-    if (result == FCT_OK) result = fill_all(&f, attributes, back, piece);
+    if (result == FCT_OK) result = fill_all(&f, attributes, lit, piece);
     fct_release(scene->env, sources);
     return result;
 }

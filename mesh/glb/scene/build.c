@@ -319,7 +319,7 @@ static fct_result add_span(fct_glb_scene *s, const fct_glb_lit *lit, const fct_g
     fct_mesh_release(s->env, &part);
     if (result == FCT_OK) {
         piece->primitive = span->primitive;
-        result = fct_glb_fill_attributes(s, span, corners, lit->back, piece);
+        result = fct_glb_fill_attributes(s, span, corners, lit, piece);
     }
     if (result == FCT_OK)
         result = fct_glb_index(&s->document->glb, json_array_get(primitives, (size_t)span->primitive),

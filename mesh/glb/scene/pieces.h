@@ -42,7 +42,7 @@ fct_result fct_glb_find_spans(fct_glb_scene *scene, int64_t mesh, const fct_glb_
 /* Gives the piece the attributes of its primitive, interpolated. corners: face_count x 3 vertices of the
  * joined mesh. Errors: DATA, INPUT, MEMORY. */
 fct_result fct_glb_fill_attributes(fct_glb_scene *scene, const fct_glb_span *span, const uint32_t *corners,
-                                   bool back, fct_glb_piece *piece);
+                                   const fct_glb_lit *lit, fct_glb_piece *piece);
 
 void fct_glb_release_piece(const fct_env *env, fct_glb_piece *piece);
 

@@ -38,12 +38,13 @@ typedef struct fct_glb_lit {
     uint32_t material;       /* in a new document */
     bool one_sided;          /* another surface at the same place has the light of the back */
     bool back;               /* it is the back: its normals are those of the front, negated */
+    bool file_normals;       /* given document: its normals replace those of the lit mesh where it has some */
     const uint32_t *corners; /* given document: per face x 3, the vertices of the face's source, in the order
                                 in which a reader joins the primitives of the mesh */
 } fct_glb_lit;
 /* Adds a lit mesh in the space of its node, with source_faces (faces of the mesh of the document) and
  * source_uv, and takes its arrays. In a given document it becomes one primitive per primitive of the mesh,
- * with the attributes of the file interpolated, except normals that the lit mesh has. Errors: DATA (the
+ * with the attributes of the file interpolated; its normals only as file_normals says. Errors: DATA (the
  * document is not that of the mesh), INPUT, MEMORY; the mesh is released then. */
 fct_result fct_glb_scene_add_lit(fct_glb_scene *scene, const fct_glb_lit *lit, fct_mesh *mesh);
 

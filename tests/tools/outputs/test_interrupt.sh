@@ -29,6 +29,7 @@ interrupted() {
 interrupted 'direct light' INT cornell/scene.json -o lit.ply
 says 'lit.ply has the light of the last complete solution'
 check "the answer tells it" test "$(value interrupted)" = true
+check "nothing is known of the error" test "$(value error_estimate)" = null
 holds "$(value vertices) > 1000 && $(value absorbed) > .2 * $(value emitted)"
 expect 0 info lit.ply --json
 check "the output is whole" test "$(value vertex_colors)" = true
@@ -45,6 +46,15 @@ check "nothing is written" test ! -e lit.ply -a ! -s out
 interrupted gathering INT cornell/scene.json -o lit.ply --light indirect
 says 'nothing is written'
 check "nothing is written" test ! -e lit.ply
+
+# Files of a folder that were complete stay; a signal during probes leaves these out.
+rm -rf lit
+interrupted 'surface|covers|anchors|vertices|objects' INT cornell/scene.json -o lit/ --light radiosity,direct
+says 'lit/ may have some of its files'
+for i in $(seq 40000); do echo "$((i % 500)).$i 100 $((i % 300)) 0 1 0"; done >points
+interrupted probes INT cornell/scene.json -o lit.ply --error 5e-4 --probe points
+says 'the outputs are complete, without probes'
+expect 0 info lit.ply
 
 # A second signal, and one that no output shall follow.
 interrupted gathering 'INT TERM' cornell/scene.json -o lit.ply --error 1e-6
