@@ -423,6 +423,45 @@ static void a_limit_leaves_small_errors(void **state) {
     }
 }
 
+/* Where there is room for one split alone, the pair with the largest error is split. */
+static void the_largest_error_is_split_first(void **state) {
+    (void)state;
+    const double epsilon = .002;
+    int contested = 0;
+    for (uint64_t seed = 0; seed < 8; ++seed) {
+        fct_scene *scene = make_scene(seed);
+        soup triangles = list_triangles(scene);
+        refined r;
+        open_refined(scene, &r);
+        judge g = {.set = &r.set, .triangles = &triangles, .epsilon = epsilon};
+        fct_link worst = {0};
+        double largest = 0, second = 0;
+        for (size_t k = 0; k < r.links.count; ++k) {
+            fct_link l = r.links.items[k];
+            const outcome o = judge_pair(&g, &l);
+            if (o == KEPT || o == DROPPED) continue;
+            if (g.error > largest)
+                second = largest, largest = g.error, worst = l;
+            else if (g.error > second)
+                second = g.error;
+        }
+        contested += second > .5 * largest && second < .99 * largest;
+        const fct_refine_def def = {
+            .epsilon = epsilon, .most = r.links.count + 3, .limited = true, .phase = "links"};
+        fct_refine_result done;
+        assert_true(largest > epsilon);
+        assert_int_equal(fct_links_refine(&r.set, &r.links, &def, &done), FCT_OK);
+        assert_true(done.limited);
+        for (size_t k = 0; k < r.links.count && second < .99 * largest; ++k)
+            assert_false(r.links.items[k].receiver == worst.receiver &&
+                         r.links.items[k].source == worst.source);
+        close_refined(&r);
+        free(triangles.corners);
+        fct_scene_destroy(scene);
+    }
+    assert_true(contested > 2);
+}
+
 /* Elements that were added since an earlier moment leave no trace. */
 static void truncated_elements_can_be_split_again(void **state) {
     (void)state;
@@ -479,6 +518,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(links_follow_the_rules),
         cmocka_unit_test(a_limit_leaves_small_errors),
+        cmocka_unit_test(the_largest_error_is_split_first),
         cmocka_unit_test(truncated_elements_can_be_split_again),
         cmocka_unit_test(links_are_sorted_stably),
     };
