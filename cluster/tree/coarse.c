@@ -65,6 +65,7 @@ static fct_result walk_to_cut(const fct_env *env, const fct_tree *tree, uint32_t
             stack[height++] = record.child[1];
             stack[height++] = record.child[0];
         } else { /* the walk visits no node twice (walk.h), so at most root_count + top of them */
+            if (record.count == 1) result = fct_tree_check_face(env, tree, record.first);
             c->nodes[c->count] = node;
             c->records[c->count++] = record;
         }

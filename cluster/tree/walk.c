@@ -62,7 +62,6 @@ static const char *read_unchecked(const fct_tree *tree, uint32_t node, fct_clust
     if (record) {
         *out = *record;
         fault = fct_tree_node_fault(&tree->view, node, out);
-        if (!fault && node >= tree->view.node_count) fault = corners_fault(&tree->view, out->first);
     } else {
         uint32_t place = node - tree->view.node_count;
         fault = corners_fault(&tree->view, place);
@@ -86,6 +85,12 @@ fct_result fct_tree_cluster(const fct_tree *tree, uint32_t node, fct_cluster *ou
     else
         fct_leaf_describe(view, node - view->node_count, out);
     return FCT_OK;
+}
+
+fct_result fct_tree_check_face(const fct_env *env, const fct_tree *tree, uint32_t place) {
+    if (!atomic_load_explicit(&tree->unchecked, memory_order_acquire)) return FCT_OK;
+    const char *fault = corners_fault(&tree->view, place);
+    return fault ? fct_fail(env, FCT_ERROR_DATA, "%s: place %u: %s", tree->path, place, fault) : FCT_OK;
 }
 
 fct_result fct_tree_children(const fct_tree *tree, uint32_t node, fct_cluster out[2]) {

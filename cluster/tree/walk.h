@@ -8,6 +8,10 @@
  * others; see walk.c. Errors: DATA. */
 fct_result fct_tree_open_node(const fct_env *env, const fct_tree *tree, uint32_t node, uint32_t child[2]);
 
+/* Whether the face at a place, which is in range, has vertices at finite positions. The record of a leaf may
+ * come from the cut, which does not tell. Errors: DATA. */
+fct_result fct_tree_check_face(const fct_env *env, const fct_tree *tree, uint32_t place);
+
 /* Whether the roots of an unchecked tree partition the places, in order. Errors: DATA. */
 fct_result fct_tree_check_roots(const fct_env *env, const fct_tree *tree);
 

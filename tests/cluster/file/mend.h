@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cluster/file/format.h"
+#include "cluster/tree/coarse.h"
 #include "facetree/bvh.h"
 #include "facetree/partition.h"
 #include "fuzz/fuzz.h"
@@ -71,6 +72,24 @@ static inline void mend_cut(const fct_env *env, const fct_tree *tree, uint32_t *
     fuzz_require(fct_tree_count_at_cost(tree, .01) <= view.face_count, "there are no more than all");
 }
 
+/* Coarse trees and rays through them. */
+static inline void mend_coarsen(const fct_env *env, const fct_tree *tree, bool sound) {
+    const fct_tree_view view = fct_tree_get(tree);
+    for (uint32_t k = view.root_count; k <= view.face_count; k += 1 + k) {
+        fct_coarse coarse;
+        const fct_result result = fct_tree_coarsen(env, tree, k, &coarse);
+        fuzz_require(result == FCT_OK || (!sound && !coarse.tree), "a checked tree has coarse ones");
+        if (result != FCT_OK) continue;
+        const fct_tree_view small = fct_tree_get(coarse.tree);
+        fuzz_require(small.face_count >= k && small.face_count <= 2 * (uint64_t)k, "patches have triangles");
+        for (uint32_t node = 0; node < small.node_count + small.face_count; ++node)
+            fuzz_require(fct_coarse_origin(&coarse, node) < view.node_count + view.face_count,
+                         "a patch is a node");
+        mend_shoot(env, coarse.tree);
+        fct_coarse_release(env, &coarse);
+    }
+}
+
 static inline void mend_use_all(const fct_env *env, const fct_tree *tree, uint32_t *nodes, uint32_t *labels) {
     fct_tree_view view = fct_tree_get(tree);
     for (uint32_t k = 1; k <= view.face_count; k += 1 + k / 2) {
@@ -108,9 +127,11 @@ static inline mend_outcome mend_try(const fct_env *env, uint8_t *data, size_t si
     uint32_t faces = fct_tree_get(tree).face_count;
     uint32_t *nodes = fct_allocate(env, faces, 4), *labels = fct_allocate(env, faces, 4);
     mend_cut(env, tree, nodes, false);
+    mend_coarsen(env, tree, false);
     if (fct_tree_check(env, tree) == FCT_OK) {
         outcome = MEND_SOUND;
         mend_cut(env, tree, nodes, true);
+        mend_coarsen(env, tree, true);
         mend_use_all(env, tree, nodes, labels);
     }
     if (fct_tree_verify(env, tree) == FCT_OK) {
