@@ -401,7 +401,7 @@ static void bad_normals_fall_back(void **state) {
     (void)state;
     fct_mesh ball = make_ball(8, false);
     const uint32_t zero = 20, turned = 50;
-    uint64_t expected = 0, corners;
+    uint64_t expected = 0, corners = 0;
     for (size_t k = 0; k < 3; ++k) ball.normals[3 * zero + k] = 0, ball.normals[3 * turned + k] *= -1;
     for (size_t c = 0; c < 3 * (size_t)ball.face_count; ++c)
         expected += ball.triangles[c] == zero || ball.triangles[c] == turned;
