@@ -187,7 +187,8 @@ static void work_does_not_grow(void **state) {
     fct_bake_destroy(solve(&env, c, &exact));
     assert_true(fabs((double)large.elements / (double)small.elements - 1) < .05);
     assert_true(fabs((double)large.rays / (double)small.rays - 1) < .05);
-    assert_true((double)large.touched_bytes < 1.1 * (double)small.touched_bytes);
+    /* The smaller file of the sanitized test is read nearly as a whole. */
+    assert_true((double)large.touched_bytes < (SANITIZED ? 1.5 : 1.1) * (double)small.touched_bytes);
     assert_true(exact.touched_bytes > 3 * large.touched_bytes / 2);
     fct_scene_destroy(a), fct_scene_destroy(b), fct_scene_destroy(c);
 }
