@@ -237,14 +237,11 @@ static double estimate_work(const fct_scene_view *view, uint32_t instance, doubl
     return tree_view.face_count + 12 * area * sqrt(scale2) / (max_edge * max_edge);
 }
 
-static fct_bounds bound_model(const fct_model *m) {
-    return m->bvh ? fct_bvh_bounds(m->bvh) : fct_tree_get(m->tree).bounds;
-}
-
 /* Rejects diagonals outside [LEAST_SIZE, MOST_SIZE]. A scene that is a single point is valid and dark. */
 static fct_result check_extents(const fct_env *env, const fct_scene_view *view) {
     for (uint32_t m = 0; m <= view->model_count; ++m) {
-        fct_bounds b = m < view->model_count ? bound_model(&view->models[m]) : view->bounds;
+        const fct_model *model = view->models + m;
+        fct_bounds b = m < view->model_count ? fct_scene_model_bounds(model->tree, model->bvh) : view->bounds;
         double size = v3_norm(v3_sub(v3_load(b.upper), v3_load(b.lower)));
         if (size != 0 && !(size >= LEAST_SIZE && size <= MOST_SIZE))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g across; light needs %g to %g",

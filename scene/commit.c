@@ -24,17 +24,13 @@ static fct_result build_ray_structures(fct_scene *scene) {
     return FCT_OK;
 }
 
-/* The tree's bounds hold all vertices, those of a ray structure only vertices of faces. */
-static fct_bounds bound_model(const fct_scene_model *own) {
-    return own->bvh ? fct_bvh_bounds(own->bvh) : fct_tree_get(own->tree).bounds;
-}
-
 /* Chooses the scene's origin and makes transforms and camera relative to it. */
 static fct_result move_to_origin(fct_scene *scene) {
     double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         const float *m = scene->instances[i].to_world;
-        fct_bounds b = bound_model(&scene->own[scene->instances[i].model]);
+        const fct_scene_model *own = &scene->own[scene->instances[i].model];
+        fct_bounds b = fct_scene_model_bounds(own->tree, own->bvh);
         for (int c = 0; c < 3; ++c) {
             double middle = scene->frames[i].at[c], half = 0;
             for (int k = 0; k < 3; ++k) {
@@ -64,7 +60,7 @@ static fct_result bound_instances(fct_scene *scene, fct_bounds *bounds) {
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         fct_instance *instance = scene->instances + i;
         const fct_scene_model *own = scene->own + instance->model;
-        fct_bounds model = bound_model(own);
+        fct_bounds model = fct_scene_model_bounds(own->tree, own->bvh);
         fct_result result =
             fct_transform_bounds(scene->env, own->tree, &model, instance->to_world, &instance->bounds);
         if (result != FCT_OK) return result;

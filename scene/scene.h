@@ -92,6 +92,12 @@ struct fct_scene {
     uint32_t patches; /* of all coarse forms together, about; default FCT_SCENE_PATCHES */
 };
 
+/* The bounds of a model. Those of a tree hold all vertices, those of a ray structure only vertices of faces;
+ * bvh may be NULL. */
+static inline fct_bounds fct_scene_model_bounds(const fct_tree *tree, const fct_bvh *bvh) {
+    return bvh ? fct_bvh_bounds(bvh) : fct_tree_get(tree).bounds;
+}
+
 /* Sets the transform (NULL: identity) of an instance and of its frame. Errors: DATA (singular, not finite).
  */
 fct_result fct_scene_set_transform(const fct_env *env, const char *name, const float transform[12],

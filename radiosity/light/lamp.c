@@ -197,8 +197,8 @@ static void add_minor_lamps(query *q, const double light[3], double sum, double 
     for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * ((all[k] > 0 ? seen[k] / all[k] : grey) - known);
 }
 
-/* Adds the light of the lamps to measure, less what is known of it. Returns the light of all lamps without
- * blockers, summed over channels. */
+/* Adds the light of the lamps in q->slots. With q->doubt, adds only its difference from the light that the
+ * earlier call gave. Returns the light of all lamps without blockers, summed over channels. */
 static double add_lamps(query *q, double irradiance[3]) {
     double minor = 0, open = 0, minor_light[3] = {0, 0, 0};
     fct_cut cut;

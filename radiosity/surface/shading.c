@@ -11,7 +11,8 @@
 #define LEAST_FRONT .0349
 /* Cosine of one degree: nearer normals are the same. Normals of bytes err by half a degree. */
 #define SAME_COSINE .99985
-/* Slack of the crease angle, for the rounding of face normals: an edge of exactly that angle is smooth. */
+/* The cosine of the crease angle is lowered by this, because face normals are rounded. So an edge of exactly
+ * that angle is smooth. */
 #define ROUNDING 1e-6
 /* Least cosine between the normals of a triangle and of its corners for the lift. Beyond 45 degrees they do
  * not describe a surface near the triangle: the lift of a cube of three such normals per corner would be a

@@ -82,4 +82,18 @@ static inline fct_mesh make_bumpy(const fct_env *env, uint32_t n, double height)
     return mesh;
 }
 
+/* The unit sphere with its own normals; hollow: wound and turned inwards. */
+static inline fct_mesh make_smooth_ball(const fct_env *env, uint32_t n, bool hollow) {
+    fct_mesh mesh = make_sphere(env, n);
+    mesh.normals = fct_allocate(env, mesh.vertex_count, 3 * sizeof(float));
+    assert_non_null(mesh.normals);
+    for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
+        mesh.normals[i] = hollow ? -mesh.positions[i] : mesh.positions[i];
+    for (size_t f = 0; hollow && f < mesh.face_count; ++f) {
+        uint32_t *t = mesh.triangles + 3 * f, swap = t[1];
+        t[1] = t[2], t[2] = swap;
+    }
+    return mesh;
+}
+
 #endif

@@ -17,21 +17,6 @@ static fct_scene *begin(void) {
     return scene;
 }
 
-/* The unit sphere with its own normals; hollow: wound and turned inwards. */
-static fct_mesh make_ball(uint32_t n, bool hollow) {
-    plain = fct_env_default();
-    fct_mesh mesh = make_sphere(&plain, n);
-    mesh.normals = fct_allocate(&plain, mesh.vertex_count, 3 * sizeof(float));
-    assert_non_null(mesh.normals);
-    for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
-        mesh.normals[i] = hollow ? -mesh.positions[i] : mesh.positions[i];
-    for (size_t f = 0; hollow && f < mesh.face_count; ++f) {
-        uint32_t *t = mesh.triangles + 3 * f, swap = t[1];
-        t[1] = t[2], t[2] = swap;
-    }
-    return mesh;
-}
-
 static fct_bake *start(const fct_scene *scene, fct_bake_def def) {
     fct_bake *bake;
     assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_OK);
@@ -48,7 +33,7 @@ static v3 load(const float *values, size_t i) {
 
 /* A coarse ball without any other surface under a small far lamp. */
 static fct_scene *make_lit_ball(const float *transform) {
-    fct_mesh ball = make_ball(6, false);
+    fct_mesh ball = make_smooth_ball(&plain, 6, false);
     fct_scene *scene = begin();
     place_mesh(scene, &ball, place_material(scene, .5, 0, false), transform);
     place_sheet(&plain, scene, place_material(scene, 0, 1e5, false), 1, v3_make(-1, -1, FAR),
@@ -130,7 +115,7 @@ static void creases_have_other_light(void **state) {
 /* Inside a closed sphere that shines evenly, any normal gets the light e / (1 - rho). */
 static void furnaces_are_even(void **state) {
     (void)state;
-    fct_mesh ball = make_ball(8, true);
+    fct_mesh ball = make_smooth_ball(&plain, 8, true);
     fct_scene *scene = begin();
     place_mesh(scene, &ball, place_material(scene, .5, 1, false), NULL);
     assert_int_equal(fct_scene_commit(scene), FCT_OK);
@@ -194,7 +179,7 @@ static void probes_start_on_the_curve(void **state) {
 static fct_scene *make_objects(void) {
     const float stretched[12] = {-1, 0, 0, 4, 0, 2, 0, 0, 0, 0, .5f, 0};
     const float aside[12] = {1, 0, 0, 0, 0, 1, 0, 4, 0, 0, 1, 0};
-    fct_mesh ball = make_ball(5, false);
+    fct_mesh ball = make_smooth_ball(&plain, 5, false);
     fct_scene *scene = begin();
     const uint32_t grey = place_material(scene, .5, 0, false);
     place_mesh(scene, &ball, grey, NULL);
@@ -224,7 +209,7 @@ static fct_bake_def quick(fct_keep keep, unsigned outputs) {
 static void outputs_have_normals(void **state) {
     (void)state;
     fct_scene *scene = make_objects();
-    fct_mesh ball = make_ball(5, false);
+    fct_mesh ball = make_smooth_ball(&plain, 5, false);
     for (int keep = FCT_KEEP_NONE; keep <= FCT_KEEP_FACE; ++keep) {
         fct_bake *bake = start(scene, quick((fct_keep)keep, FCT_MESH_NORMALS));
         for (uint32_t object = 0; object < 2; ++object) {
@@ -394,7 +379,7 @@ static void hierarchies_have_the_normals_of_their_mesh(void **state) {
     (void)state;
     char mesh_path[128], tree_path[128];
     const char *const endings[] = {"ply", "obj", "glb"};
-    fct_mesh ball = make_ball(6, false);
+    fct_mesh ball = make_smooth_ball(&plain, 6, false);
     for (int k = 0; k < 3; ++k)
         for (int with = 0; with < 2; ++with) {
             snprintf(mesh_path, sizeof mesh_path, "%s/ball.%s", folder, endings[k]);
@@ -449,7 +434,7 @@ static void wrong_input_is_named(void **state) {
     }
     fct_scene_destroy(scene);
     scene = begin();
-    fct_mesh ball = make_ball(5, false);
+    fct_mesh ball = make_smooth_ball(&plain, 5, false);
     const uint32_t grey = place_material(scene, .5, 0, false);
     ball.normals[4] = NAN;
     assert_int_equal(fct_scene_add_object(scene, "ball", &ball, NULL, NULL, grey, NULL), FCT_ERROR_DATA);
@@ -474,6 +459,7 @@ static void wrong_input_is_named(void **state) {
 }
 
 int main(void) {
+    plain = fct_env_default();
     if (!mkdtemp(folder)) return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_follows_the_file),

@@ -26,25 +26,6 @@ static fct_surface build(const fct_scene *scene, fct_normals rule, double crease
     return s;
 }
 
-static void add_normals(fct_mesh *mesh) {
-    mesh->normals = fct_allocate_zero(&plain, mesh->vertex_count, 3 * sizeof(float));
-    assert_non_null(mesh->normals);
-}
-
-/* The unit sphere with its own normals; hollow: wound and turned inwards. */
-static fct_mesh make_ball(uint32_t n, bool hollow) {
-    plain = fct_env_default();
-    fct_mesh mesh = make_sphere(&plain, n);
-    add_normals(&mesh);
-    for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; ++i)
-        mesh.normals[i] = hollow ? -mesh.positions[i] : mesh.positions[i];
-    for (size_t f = 0; hollow && f < mesh.face_count; ++f) {
-        uint32_t *t = mesh.triangles + 3 * f, swap = t[1];
-        t[1] = t[2], t[2] = swap;
-    }
-    return mesh;
-}
-
 static v3 load(const float *values, size_t i) {
     return v3_load(values + 3 * i);
 }
@@ -63,7 +44,7 @@ static v3 face_normal(const fct_mesh *m, size_t f) {
 /* The edges of a ball of four rings turn by more than 40 degrees. */
 static void files_decide_creases(void **state) {
     (void)state;
-    fct_mesh ball = make_ball(4, false);
+    fct_mesh ball = make_smooth_ball(&plain, 4, false);
     fct_scene *scene = one_mesh(&ball, NULL);
     const double creases[] = {40, 90, 180};
     fct_surface s = build(scene, FCT_NORMALS_FILE, 40, false, 10);
@@ -263,7 +244,7 @@ static void transforms_turn_normals(void **state) {
                              0,
                              (float)scale[2],
                              -2};
-        fct_mesh ball = make_ball(12, false);
+        fct_mesh ball = make_smooth_ball(&plain, 12, false);
         fct_scene *scene = one_mesh(&ball, m);
         fct_surface s = build(scene, FCT_NORMALS_FILE, 40, false, 10);
         assert_int_equal(s.mesh.vertex_count, ball.vertex_count);
@@ -319,7 +300,7 @@ static void expect_phong(const fct_mesh *mesh, const fct_surface *s, bool back) 
 static void new_vertices_interpolate(void **state) {
     (void)state;
     for (int hollow = 0; hollow < 2; ++hollow) {
-        fct_mesh ball = make_ball(6, hollow);
+        fct_mesh ball = make_smooth_ball(&plain, 6, hollow);
         fct_scene *scene = one_mesh(&ball, NULL);
         const bool back = hollow; /* the side on which the ball bulges */
         fct_surface s = build(scene, FCT_NORMALS_FILE, 40, back, .3);
@@ -342,7 +323,7 @@ static void new_vertices_interpolate(void **state) {
 
 static void centres_interpolate(void **state) {
     (void)state;
-    fct_mesh ball = make_ball(6, false);
+    fct_mesh ball = make_smooth_ball(&plain, 6, false);
     fct_scene *scene = one_mesh(&ball, NULL);
     fct_surface s = build(scene, FCT_NORMALS_FILE, 40, false, INFINITY);
     const uint32_t first = s.mesh.vertex_count;
@@ -371,7 +352,7 @@ static void centres_interpolate(void **state) {
 /* A shell just above the ball lies between a point and its lifted place. */
 static void lifts_stop_at_surfaces(void **state) {
     (void)state;
-    fct_mesh ball = make_ball(6, false);
+    fct_mesh ball = make_smooth_ball(&plain, 6, false);
     for (int near = 0; near < 2; ++near) {
         fct_scene *scene;
         const float scale = near ? 1.001f : 1.2f;
@@ -399,7 +380,7 @@ static void lifts_stop_at_surfaces(void **state) {
 /* Normals that are zero or turn away count, and the geometry replaces them. */
 static void bad_normals_fall_back(void **state) {
     (void)state;
-    fct_mesh ball = make_ball(8, false);
+    fct_mesh ball = make_smooth_ball(&plain, 8, false);
     const uint32_t zero = 20, turned = 50;
     uint64_t expected = 0, corners = 0;
     for (size_t k = 0; k < 3; ++k) ball.normals[3 * zero + k] = 0, ball.normals[3 * turned + k] *= -1;
@@ -453,6 +434,7 @@ static void limits(void **state) {
 }
 
 int main(void) {
+    plain = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(files_decide_creases),
         cmocka_unit_test(split_normals_are_creases),
