@@ -290,8 +290,12 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
              (unsigned long long)s->elements, (unsigned long long)s->links, (unsigned long long)s->rays,
              s->passes, s->converged ? "" : " (NOT converged)", (unsigned long long)s->vertices,
              (unsigned long long)s->output_rays);
-    tool_say(t, "power %.6g emitted, %.6g absorbed, %.6g escaped; estimated error %.2g %%", s->power_emitted,
-             s->power_absorbed, s->power_escaped, 100 * s->error_estimate);
+    if (s->interrupted)
+        tool_say(t, "power %.6g emitted, %.6g absorbed; no error estimate", s->power_emitted,
+                 s->power_absorbed);
+    else
+        tool_say(t, "power %.6g emitted, %.6g absorbed, %.6g escaped; estimated error %.2g %%",
+                 s->power_emitted, s->power_absorbed, s->power_escaped, 100 * s->error_estimate);
     tool_say(t, "load %.2f s, open %.2f s, solve %.2f s, output %.2f s, total %.2f s; peak %.0f MB", load,
              s->seconds_open, s->seconds_solve, s->seconds_push, total, (double)tool_peak_bytes() / 1e6);
     json_t *object = json_pack(
@@ -311,6 +315,8 @@ static int report_bake(tool *t, const bake_options *o, const fct_bake_stats *s, 
     if (object) json_object_set_new(object, "error", json_real(o->def.error));
     if (object) json_object_set_new(object, "interrupted", json_boolean(s->interrupted));
     if (object && s->interrupted) json_object_set_new(object, "error_estimate", json_null());
+    if (object && s->interrupted)
+        json_object_set_new(json_object_get(object, "power"), "escaped", json_null());
     if (object) json_object_set_new(object, "max_links", json_integer((json_int_t)s->max_links));
     if (object) json_object_set_new(object, "links_limited", json_boolean(s->links_limited));
     if (object) json_object_set_new(object, "link_error", json_real(s->link_error));
