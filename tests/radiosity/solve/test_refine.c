@@ -412,6 +412,16 @@ static void a_limit_leaves_small_errors(void **state) {
             assert_int_equal(fct_links_refine(&r.set, &r.links, &def, &done), FCT_OK);
             assert_true(done.limited && r.links.count <= most && r.links.count > most - 16);
             assert_near(done.epsilon, find_left_error(&triangles, &r, epsilon), 1e-5 * done.epsilon);
+            /* A pass that starts again leaves nothing of its first try. */
+            refined direct;
+            open_refined(scene, &direct);
+            const fct_refine_def at_once = {
+                .epsilon = epsilon, .most = most, .limited = true, .phase = "links"};
+            fct_refine_result same_done;
+            assert_int_equal(fct_links_refine(&direct.set, &direct.links, &at_once, &same_done), FCT_OK);
+            assert_int_equal(r.set.count, direct.set.count);
+            assert_int_equal(r.links.count, direct.links.count);
+            close_refined(&direct);
             close_refined(&r);
             fct_refine_result other;
             const size_t same = count_links(scene, done.epsilon, SIZE_MAX, false, &other);
