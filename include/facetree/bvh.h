@@ -24,8 +24,25 @@ typedef struct fct_bvh fct_bvh;
  * it is OBB. */
 typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULTIRES } fct_backend;
 
-/* The tree must outlive the bvh. Errors: DATA (a damaged hierarchy file), MEMORY, CANCELLED, INTERNAL
- * (Embree). */
+/* What an OBB structure holds beside rays and points. */
+enum {
+    FCT_BVH_PAIRS = 1, /* queries on two models (collide.h): about 10 bytes per triangle */
+    FCT_BVH_SIGN = 2   /* winding numbers and signed distances */
+};
+
+typedef struct fct_bvh_def {
+    uint32_t size; /* sizeof(fct_bvh_def), set by fct_bvh_def_default */
+    fct_backend backend;
+    uint32_t parts; /* FCT_BVH_PAIRS | FCT_BVH_SIGN, or 0; the Embree backend ignores it */
+} fct_bvh_def;
+
+/* The OBB backend without further parts. */
+FCT_API fct_bvh_def fct_bvh_def_default(void);
+/* The tree must outlive the bvh. A def that is NULL means the default. Errors: DATA (a damaged hierarchy
+ * file), MEMORY, CANCELLED, INTERNAL (Embree). */
+FCT_API fct_result fct_bvh_build(const fct_env *env, const fct_tree *tree, const fct_bvh_def *def,
+                                 fct_bvh **out);
+/* The same with a backend and no further parts. */
 FCT_API fct_result fct_bvh_create(const fct_env *env, const fct_tree *tree, fct_backend backend,
                                   fct_bvh **out);
 FCT_API void fct_bvh_destroy(fct_bvh *bvh);
