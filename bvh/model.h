@@ -61,6 +61,15 @@ typedef struct fct_oriented_node {
     uint32_t unused[7];
 } fct_oriented_node;
 
+/* Eight oriented boxes for queries on two models, relative to fct_bvh.center: the points
+ * center + sum_k s_k half[k] axes[k], |s_k| <= 1. An empty slot has negative half extents. */
+typedef struct fct_pair_node {
+    float center[3][8];
+    float half[3][8];
+    float axes[3][3][8]; /* axis, coordinate, child */
+    uint32_t child[8];   /* FCT_REF_LEAF and a leaf, a number of a node, or FCT_NONE */
+} fct_pair_node;
+
 /* A leaf in memory:
  *
  *     fct_leaf | corners: per 8 triangles, 3 rows of 8 bytes | vertices: rows x, y, z
@@ -114,6 +123,11 @@ struct fct_bvh {
     char *nodes, *leaves;
     size_t node_bytes, leaf_bytes;
     uint32_t root; /* reference */
+    /* FCT_BVH_PAIRS */
+    fct_pair_node *pairs; /* pair_count; node 0 has one child, the root */
+    uint32_t pair_count;
+    uint32_t *parts; /* part_count: one tree vertex of each connected part */
+    uint32_t part_count;
     /* FCT_BACKEND_EMBREE */
     struct fct_embree *embree;
 };

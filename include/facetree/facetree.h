@@ -5,6 +5,7 @@
 #include "facetree/base.h"
 #include "facetree/bvh.h"
 #include "facetree/cluster.h"
+#include "facetree/collide.h"
 #include "facetree/dual.h"
 #include "facetree/mesh.h"
 #include "facetree/partition.h"

@@ -1,0 +1,109 @@
+/* bvh/pair/collide.c: the public queries on two models. */
+#include "bvh/pair/search.h"
+#include "bvh/pair/triangles.h"
+
+fct_face_pair fct_face_pair_none(void) {
+    return (fct_face_pair){FCT_NONE, FCT_NONE, FCT_NONE, FCT_NONE};
+}
+
+static bool is_pair(const fct_pair_map *map, const fct_face_pair *pair) {
+    return pair && pair->place_a < map->a->view.face_count && pair->place_b < map->b->view.face_count;
+}
+
+static void read_pair(const fct_pair_map *map, const fct_face_pair *pair, v3 p[3], v3 q[3]) {
+    fct_pair_triangle_a(map, pair->place_a, p);
+    fct_pair_triangle_b(map, pair->place_b, q);
+}
+
+static fct_face_pair make_pair(const fct_pair_map *map, uint32_t place_a, uint32_t place_b) {
+    return (fct_face_pair){map->a->view.face_ids[place_a], map->b->view.face_ids[place_b], place_a, place_b};
+}
+
+static bool hint_meets(const fct_pair_map *map, const fct_face_pair *hint) {
+    v3 p[3], q[3];
+    if (!is_pair(map, hint)) return false;
+    if (fct_bvh_degenerate(map->a, hint->place_a) || fct_bvh_degenerate(map->b, hint->place_b)) return false;
+    read_pair(map, hint, p, q);
+    return fct_triangles_meet(p, q);
+}
+
+static bool find_overlap(const fct_pair_map *map, fct_face_pair *hint, fct_visits *visits) {
+    fct_face_pair found;
+    if (hint_meets(map, hint)) return true;
+    if (!fct_overlap_search(map, 1, 1, &found, visits)) return false;
+    if (hint) *hint = found;
+    return true;
+}
+
+bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_face_pair *hint,
+                     fct_visits *visits) {
+    fct_pair_map map;
+    return fct_pair_map_set(a, b, pose, &map) && find_overlap(&map, hint, visits);
+}
+
+size_t fct_bvh_pairs(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, size_t limit, size_t capacity,
+                     fct_face_pair *pairs, fct_visits *visits) {
+    fct_pair_map map;
+    if (!fct_pair_map_set(a, b, pose, &map)) return 0;
+    return fct_overlap_search(&map, limit, capacity, pairs, visits);
+}
+
+size_t fct_bvh_self_pairs(const fct_bvh *bvh, size_t limit, size_t capacity, fct_face_pair *pairs,
+                          fct_visits *visits) {
+    fct_pair_map map;
+    if (!fct_pair_map_set(bvh, bvh, NULL, &map)) return 0;
+    return fct_self_search(&map, limit, capacity, pairs, visits);
+}
+
+bool fct_bvh_contact(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, const fct_face_pair *pair,
+                     fct_contact *out) {
+    fct_pair_map map;
+    v3 p[3], q[3];
+    if (!fct_pair_map_set(a, b, pose, &map) || !is_pair(&map, pair)) return false;
+    read_pair(&map, pair, p, q);
+    return fct_triangles_contact(p, q, out);
+}
+
+fct_distance_def fct_distance_def_default(void) {
+    return (fct_distance_def){.size = sizeof(fct_distance_def), .max_distance = INFINITY};
+}
+
+static bool find_distance(const fct_pair_map *map, const fct_distance_def *def, double enough,
+                          fct_face_pair *hint, fct_distance *out, fct_visits *visits) {
+    fct_near_pair best = {
+        .distance2 = def->max_distance * def->max_distance, .place_a = FCT_NONE, .place_b = FCT_NONE};
+    if (!(def->max_distance >= 0) || !(def->relative >= 0) || !(def->absolute >= 0)) return false;
+    if (is_pair(map, hint)) {
+        fct_near_pair known = {.place_a = hint->place_a, .place_b = hint->place_b};
+        v3 p[3], q[3];
+        read_pair(map, hint, p, q);
+        known.distance2 = fct_triangles_distance(p, q, &known.point_a, &known.point_b);
+        if (known.distance2 <= best.distance2) best = known;
+    }
+    fct_distance_search(map, def->relative, def->absolute, enough, &best, visits);
+    if (best.place_a == FCT_NONE) return false;
+    *out =
+        (fct_distance){.distance = sqrt(best.distance2), .pair = make_pair(map, best.place_a, best.place_b)};
+    out->point_a[0] = best.point_a.x, out->point_a[1] = best.point_a.y, out->point_a[2] = best.point_a.z;
+    out->point_b[0] = best.point_b.x, out->point_b[1] = best.point_b.y, out->point_b[2] = best.point_b.z;
+    if (hint) *hint = out->pair;
+    return true;
+}
+
+bool fct_bvh_distance(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, const fct_distance_def *def,
+                      fct_face_pair *hint, fct_distance *out, fct_visits *visits) {
+    fct_distance_def standard = fct_distance_def_default();
+    fct_pair_map map;
+    if (!def) def = &standard;
+    if (def->size != sizeof *def || !fct_pair_map_set(a, b, pose, &map)) return false;
+    return find_distance(&map, def, 0, hint, out, visits);
+}
+
+bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, double distance,
+                    fct_face_pair *hint, fct_visits *visits) {
+    fct_distance_def def = fct_distance_def_default();
+    fct_distance found;
+    fct_pair_map map;
+    def.max_distance = distance;
+    return fct_pair_map_set(a, b, pose, &map) && find_distance(&map, &def, distance, hint, &found, visits);
+}

@@ -1,0 +1,127 @@
+/* facetree/collide.h: queries on two models: do they touch, where, how far are they apart, when do they meet.
+ * docs/queries.md is the guide.
+ *
+ * Both models need FCT_BVH_PAIRS (bvh.h). A pose places model b in the coordinates of model a. Its rotation
+ * may also scale or mirror. Any matrix gives correct answers, but one that shears or scales unequally gives
+ * slow ones. A pose that is NULL is the identity.
+ *
+ * Faces are closed triangles. The corners of b are mapped by the pose in double, as
+ * ((r0 x + r1 y) + r2 z) + t for each coordinate, and rounded once per operation. From there on, whether two
+ * faces meet is decided by exact arithmetic: also where they are coplanar, or share a vertex or an edge. A
+ * face without area meets nothing; its distance counts. Distances are computed in double.
+ *
+ * Queries do not allocate and do not fail, and any number of threads may ask. If a model has no
+ * FCT_BVH_PAIRS, or if the pose is not finite, nothing touches and no distance is found. visits may be NULL;
+ * it counts pairs of boxes, and pairs of triangles.
+ */
+#ifndef FACETREE_COLLIDE_H
+#define FACETREE_COLLIDE_H
+
+#include "facetree/bvh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* x -> rotation x + translation. */
+typedef struct fct_pose {
+    double rotation[3][3]; /* rows */
+    double translation[3];
+} fct_pose;
+FCT_API fct_pose fct_pose_identity(void);
+
+/* A face of a and a face of b. As a hint, it is the answer to a similar question, such as that of the last
+ * frame; it makes the query faster and does not change its answer. */
+typedef struct fct_face_pair {
+    uint32_t face_a, face_b;   /* input face ids; FCT_NONE if there is no pair */
+    uint32_t place_a, place_b; /* their places in the trees' order */
+} fct_face_pair;
+/* All ids FCT_NONE: the first hint of a sequence. */
+FCT_API fct_face_pair fct_face_pair_none(void);
+
+/* Whether any two faces meet. `hint` may be NULL. It is read as a hint, and receives a pair that meets; it
+ * stays unchanged if none does. */
+FCT_API bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_face_pair *hint,
+                             fct_visits *visits);
+/* The pairs of faces that meet, in an order that is the same for the same structures and pose. Stops after
+ * `limit` pairs. The first `capacity` pairs are written; returns the number of pairs found. */
+FCT_API size_t fct_bvh_pairs(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, size_t limit,
+                             size_t capacity, fct_face_pair *pairs, fct_visits *visits);
+/* The pairs of faces of one model that meet and share no vertex position; each once, with face_a < face_b. */
+FCT_API size_t fct_bvh_self_pairs(const fct_bvh *bvh, size_t limit, size_t capacity, fct_face_pair *pairs,
+                                  fct_visits *visits);
+
+/* Where two faces meet. All in the coordinates of a. */
+typedef struct fct_contact {
+    double from[3], to[3]; /* ends of the segment that both share; of faces in one plane: the two points of
+                              their common region that are farthest apart */
+    double normal[3]; /* unit: the direction in which the face of b leaves that of a by the shortest way */
+    double depth;     /* the length of that way; 0 if the faces only touch */
+} fct_contact;
+/* Returns whether the faces meet; *out is undefined if they do not. */
+FCT_API bool fct_bvh_contact(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose,
+                             const fct_face_pair *pair, fct_contact *out);
+
+typedef struct fct_distance_def {
+    uint32_t size;             /* sizeof(fct_distance_def), set by fct_distance_def_default */
+    double max_distance;       /* farther faces do not count; default: infinity */
+    double relative, absolute; /* the result may exceed the distance d by relative d + absolute; default: 0 */
+} fct_distance_def;
+FCT_API fct_distance_def fct_distance_def_default(void);
+
+typedef struct fct_distance {
+    double distance;               /* 0 if faces meet */
+    double point_a[3], point_b[3]; /* the nearest points, in the coordinates of a */
+    fct_face_pair pair;
+} fct_distance;
+/* The distance of the two surfaces; returns whether it is within max_distance. def and hint may be NULL;
+ * *hint receives the pair. A def of another size finds nothing. */
+FCT_API bool fct_bvh_distance(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose,
+                              const fct_distance_def *def, fct_face_pair *hint, fct_distance *out,
+                              fct_visits *visits);
+/* Whether the surfaces are within `distance` of each other. */
+FCT_API bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, double distance,
+                            fct_face_pair *hint, fct_visits *visits);
+
+typedef enum fct_relation {
+    FCT_APART,    /* no faces meet, and neither body holds a part of the other */
+    FCT_TOUCHING, /* faces meet */
+    FCT_A_INSIDE, /* no faces meet, and a connected part of a lies inside b */
+    FCT_B_INSIDE  /* no faces meet, no part of a lies inside b, and a part of b lies inside a */
+} fct_relation;
+/* Inside is where the winding number of a surface is over 1/2 (bvh.h). Both models need FCT_BVH_SIGN too,
+ * else only APART and TOUCHING are returned. */
+FCT_API fct_relation fct_bvh_relation(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose,
+                                      fct_face_pair *hint, fct_visits *visits);
+
+/* b moves from one pose to another in the time from 0 to 1: its centre along a straight line at constant
+ * speed, while it turns about the axis and angle (under half a turn) between the two rotations at constant
+ * speed. */
+typedef struct fct_motion {
+    fct_pose from, to; /* rotations: orthonormal, not mirrored */
+} fct_motion;
+/* The pose at a time. The centre is that of the bounds of b. */
+FCT_API fct_pose fct_motion_at(const fct_bvh *b, const fct_motion *motion, double time);
+
+typedef struct fct_first_contact {
+    double time;          /* the bodies come within `tolerance` at this time, and not earlier */
+    fct_pose pose;        /* of b at this time */
+    fct_distance nearest; /* at this time */
+} fct_first_contact;
+/* The first time in [0, 1] at which the surfaces are within `tolerance` (> 0) of each other, by conservative
+ * advancement (Mirtich 1996). Returns false if they stay apart, or if the motion is not one of rotations. */
+FCT_API bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion *motion,
+                                   double tolerance, fct_first_contact *out, fct_visits *visits);
+
+/* The answers for `count` poses, on the threads of a's environment. Bit i % 64 of touching[i / 64] is the
+ * answer to pose i; `touching` has (count + 63) / 64 words. The answer to a pose is a hint for the next. */
+FCT_API void fct_bvh_overlaps(const fct_bvh *a, const fct_bvh *b, size_t count, const fct_pose *poses,
+                              uint64_t *touching);
+/* out[i].pair has the faces FCT_NONE if nothing is within def's max_distance. */
+FCT_API void fct_bvh_distances(const fct_bvh *a, const fct_bvh *b, size_t count, const fct_pose *poses,
+                               const fct_distance_def *def, fct_distance *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
