@@ -38,6 +38,7 @@ typedef struct distance_search {
     bool found;        /* best is new */
     bool done;         /* the rest cannot matter */
     double to_limit_b; /* squared distances in b's unit, times this, are lower bounds in a's unit */
+    fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
     uint32_t waiting;
     candidate candidates[CANDIDATES];
     fct_visits visits;
@@ -201,22 +202,22 @@ static uint32_t open_node(distance_search *s, bool opens_a, uint32_t fixed, uint
     const fct_space_map *space = opens_a ? &map->to_a : &map->to_b;
     uint32_t number = fct_box_child(own, opened), base = height, met;
     const fct_pair_node *node = &own->pairs[number];
-    fct_placed_box box;
+    fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     float distance2[8], keys[8];
     double reach2 = (double)s->limit * (double)s->limit, limit2 = opens_a ? reach2 : reach2 / s->to_limit_b;
-    fct_place_box(space, &other->pairs[fixed >> 3], fixed & 7, &box);
-    double far = fabs(box.exact_center[0]) + fabs(box.exact_center[1]) + fabs(box.exact_center[2]);
+    fct_place_box(space, other, fixed, box);
+    double far = fabs(box->exact_center[0]) + fabs(box->exact_center[1]) + fabs(box->exact_center[2]);
     if (far > FAR_CENTER)
-        met = bound_far_boxes(&box, node, space, limit2, distance2);
+        met = bound_far_boxes(box, node, space, limit2, distance2);
     else
-        met = bound_boxes(&box, node, limit2 < (double)FLT_MAX ? (float)(limit2 * (1 + 0x1p-20)) : INFINITY,
+        met = bound_boxes(box, node, limit2 < (double)FLT_MAX ? (float)(limit2 * (1 + 0x1p-20)) : INFINITY,
                           distance2);
     ++s->visits.nodes, s->visits.boxes += 8;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = number << 3 | i;
         if (node->child[i] == FCT_NONE) continue;
         float bound = opens_a ? distance2[i] : (float)((double)distance2[i] * s->to_limit_b);
-        float key = estimate_distance(own, node, i, child, &box);
+        float key = estimate_distance(own, node, i, child, box);
         uint32_t at = height++;
         for (; at > base && keys[at - 1 - base] < key; --at)
             stack[at] = stack[at - 1], keys[at - base] = keys[at - 1 - base];
@@ -253,6 +254,7 @@ bool fct_distance_search(const fct_pair_map *map, double relative, double absolu
         .map = map, .relative = relative, .absolute = absolute, .enough = enough, .best = *best};
     double shrink2 = 1 - map->to_a.skew;
     s.to_limit_b = shrink2 > 0 ? map->to_a.factor * map->to_a.factor * shrink2 * (1 - 0x1p-20) : 0;
+    s.placed_a.box = s.placed_b.box = FCT_NONE;
     s.upper = sqrt(best->distance2) * map->a->scale;
     s.found = best->place_a != FCT_NONE;
     set_limit(&s);

@@ -59,6 +59,11 @@ static void invert_map(const fct_space_map *other, fct_space_map *out) {
     out->shift[0] = shift.x, out->shift[1] = shift.y, out->shift[2] = shift.z;
 }
 
+static void round_turn(fct_space_map *map) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) map->turn_float[i][j] = (float)map->turn[i][j];
+}
+
 bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_map *out) {
     if (!a->pairs || !b->pairs) return false;
     *out = (fct_pair_map){.a = a, .b = b, .pose = pose ? *pose : fct_pose_identity()};
@@ -72,8 +77,10 @@ bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, 
     if (!(far < 1e100)) return false;
     out->to_a.shift[0] = shift.x, out->to_a.shift[1] = shift.y, out->to_a.shift[2] = shift.z;
     out->to_a.factor = factor * (a->scale / b->scale);
+    round_turn(&out->to_a);
     out->to_a.blur = (far + out->to_a.factor) * 0x1p-48;
     invert_map(&out->to_a, &out->to_b);
+    round_turn(&out->to_b);
     return out->to_a.factor > 1e-30 && out->to_a.factor < 1e30;
 }
 
@@ -100,23 +107,26 @@ static float round_up(double x) {
     return (float)(x * (1 + 0x1p-20)) + 1e-37f;
 }
 
-void fct_place_box(const fct_space_map *map, const fct_pair_node *node, uint32_t slot, fct_placed_box *out) {
+void fct_place_box(const fct_space_map *map, const fct_bvh *from, uint32_t box, fct_placed_box *out) {
+    if (out->box == box) return;
+    const fct_pair_node *node = &from->pairs[box >> 3];
+    uint32_t slot = box & 7;
     v3 at = v3_scale(multiply(map->turn, box_center(node, slot)), map->factor);
     at = v3_add(at, v3_make(map->shift[0], map->shift[1], map->shift[2]));
+    out->box = box;
     out->exact_center[0] = at.x, out->exact_center[1] = at.y, out->exact_center[2] = at.z;
     v3_store(out->center, at);
-    double half = 0;
+    float factor = (float)map->factor;
     for (int k = 0; k < 3; ++k) {
-        double h = (double)node->half[k][slot] * map->factor;
-        half += h;
-        out->half[k] = (float)h;
-        v3 axis = v3_make((double)node->axes[k][0][slot], (double)node->axes[k][1][slot],
-                          (double)node->axes[k][2][slot]);
-        v3_store(out->axes[k], multiply(map->turn, axis));
+        float x = node->axes[k][0][slot], y = node->axes[k][1][slot], z = node->axes[k][2][slot];
+        out->half[k] = node->half[k][slot] * factor;
+        for (int j = 0; j < 3; ++j)
+            out->axes[k][j] =
+                map->turn_float[j][0] * x + map->turn_float[j][1] * y + map->turn_float[j][2] * z;
     }
-    double size = sum_sizes(at) + half + MODEL_RADIUS;
-    double slack = FLOAT_ERROR * size + 4 * map->skew * (size + MODEL_RADIUS * map->factor) + map->blur;
-    out->slack = round_up(slack);
+    double size = sum_sizes(at) + (double)(out->half[0] + out->half[1] + out->half[2]) + MODEL_RADIUS;
+    out->slack =
+        round_up(FLOAT_ERROR * size + 4 * map->skew * (size + MODEL_RADIUS * map->factor) + map->blur);
 }
 
 /* Sets `from` to the centre of the box in the coordinates of its leaf, and returns it, as rounded, relative

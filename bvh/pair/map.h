@@ -13,7 +13,8 @@
 
 /* From the space of one model to that of the other: x -> factor turn x + shift. */
 typedef struct fct_space_map {
-    double turn[3][3]; /* orthonormal to `skew` */
+    double turn[3][3];      /* orthonormal to `skew` */
+    float turn_float[3][3]; /* the same, rounded */
     double factor, shift[3];
     double skew; /* a bound of | turn^T turn - 1 | */
     double blur; /* a bound of what double arithmetic errs, in the target's unit */
@@ -36,12 +37,13 @@ void fct_pair_triangle_b(const fct_pair_map *map, uint32_t place, v3 p[3]);
 
 /* A box of one model in the space of the other. */
 typedef struct fct_placed_box {
+    uint32_t box; /* its name; FCT_NONE before the first use */
     float center[3], half[3], axes[3][3];
     float slack;
     double exact_center[3];
 } fct_placed_box;
-/* Box `slot` of the node. */
-void fct_place_box(const fct_space_map *map, const fct_pair_node *node, uint32_t slot, fct_placed_box *out);
+/* Box `box` of `from`; does nothing if it is placed already. */
+void fct_place_box(const fct_space_map *map, const fct_bvh *from, uint32_t box, fct_placed_box *out);
 
 /* From the coordinates of a leaf to those of its box or of another leaf's: x -> turn (x - from) + shift. */
 typedef struct fct_leaf_map {

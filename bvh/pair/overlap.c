@@ -17,6 +17,7 @@ typedef struct overlap_search {
     size_t limit, capacity, count;
     fct_face_pair *pairs;
     bool self;
+    fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
     fct_visits visits;
 } overlap_search;
 
@@ -73,6 +74,14 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
     return false;
 }
 
+/* Prefetches a node, or the largest leaf. */
+static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
+    const char *at =
+        ref & FCT_REF_LEAF ? (const char *)fct_bvh_leaf(bvh, ref) : (const char *)&bvh->pairs[ref];
+    uint32_t bytes = ref & FCT_REF_LEAF ? 256 : (uint32_t)sizeof(fct_pair_node);
+    for (uint32_t i = 0; i < bytes; i += 64) __builtin_prefetch(at + i);
+}
+
 /* A pair of boxes. */
 typedef struct box_pair {
     uint32_t a, b;
@@ -86,14 +95,15 @@ static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint3
     const fct_bvh *other = opens_a ? map->b : map->a, *own = opens_a ? map->a : map->b;
     uint32_t number = fct_box_child(own, opened);
     const fct_pair_node *node = &own->pairs[number];
-    fct_placed_box box;
+    fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     float depth[8], waiting[8];
-    fct_place_box(opens_a ? &map->to_a : &map->to_b, &other->pairs[fixed >> 3], fixed & 7, &box);
-    uint32_t met = meet_boxes(&box, node, depth), base = height;
+    fct_place_box(opens_a ? &map->to_a : &map->to_b, other, fixed, box);
+    uint32_t met = meet_boxes(box, node, depth), base = height;
     ++s->visits.nodes, s->visits.boxes += 8;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = number << 3 | i;
         if (node->child[i] == FCT_NONE) continue;
+        prefetch_child(own, node->child[i]);
         uint32_t at = height++;
         for (; at > base && waiting[at - 1 - base] < depth[i]; --at)
             stack[at] = stack[at - 1], waiting[at - base] = waiting[at - 1 - base];
@@ -124,9 +134,16 @@ static size_t search_below(overlap_search *s, box_pair from) {
     return s->count;
 }
 
+static overlap_search begin_search(const fct_pair_map *map, size_t limit, size_t capacity,
+                                   fct_face_pair *pairs) {
+    overlap_search s = {.map = map, .limit = limit, .capacity = capacity, .pairs = pairs};
+    s.placed_a.box = s.placed_b.box = FCT_NONE;
+    return s;
+}
+
 size_t fct_overlap_search(const fct_pair_map *map, size_t limit, size_t capacity, fct_face_pair *pairs,
                           fct_visits *visits) {
-    overlap_search s = {.map = map, .limit = limit, .capacity = capacity, .pairs = pairs};
+    overlap_search s = begin_search(map, limit, capacity, pairs);
     if (limit) search_below(&s, (box_pair){0, 0});
     fct_visits_add(visits, &s.visits);
     return s.count;
@@ -136,7 +153,8 @@ size_t fct_overlap_search(const fct_pair_map *map, size_t limit, size_t capacity
 size_t fct_self_search(const fct_pair_map *map, size_t limit, size_t capacity, fct_face_pair *pairs,
                        fct_visits *visits) {
     const fct_bvh *bvh = map->a;
-    overlap_search s = {.map = map, .limit = limit, .capacity = capacity, .pairs = pairs, .self = true};
+    overlap_search s = begin_search(map, limit, capacity, pairs);
+    s.self = true;
     uint32_t stack[7 * (FCT_TOP_DEPTH + 1) + 1], height = 0;
     if (limit) stack[height++] = 0;
     while (height) {
@@ -147,10 +165,9 @@ size_t fct_self_search(const fct_pair_map *map, size_t limit, size_t capacity, f
         }
         const fct_pair_node *node = &bvh->pairs[number];
         for (uint32_t i = 0; i < 8 && node->child[i] != FCT_NONE && s.count < limit; ++i) {
-            fct_placed_box placed;
             float depth[8];
-            fct_place_box(&map->to_a, node, i, &placed);
-            uint32_t met = meet_boxes(&placed, node, depth) & ((1u << i) - 1);
+            fct_place_box(&map->to_a, bvh, number << 3 | i, &s.placed_a);
+            uint32_t met = meet_boxes(&s.placed_a, node, depth) & ((1u << i) - 1);
             ++s.visits.nodes, s.visits.boxes += i;
             for (; met && s.count < limit; met &= met - 1)
                 search_below(&s, (box_pair){number << 3 | (uint32_t)__builtin_ctz(met), number << 3 | i});
