@@ -31,6 +31,12 @@ static inline float fct_float_of_key(uint32_t key) {
     return fct_float_of_bits(key & 0x80000000u ? key ^ 0x80000000u : ~key);
 }
 
+/* The same for doubles. */
+static inline uint64_t fct_double_key(double value) {
+    uint64_t bits = fct_double_bits(value), sign = (uint64_t)1 << 63;
+    return bits & sign ? ~bits : bits | sign;
+}
+
 /* The unordered pair of two ids: the smaller id in the upper half. */
 static inline uint64_t fct_pair_key(uint32_t a, uint32_t b) {
     return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;

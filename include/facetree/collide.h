@@ -109,7 +109,8 @@ typedef struct fct_first_contact {
     fct_distance nearest; /* at this time */
 } fct_first_contact;
 /* The first time in [0, 1] at which the surfaces are within `tolerance` (> 0) of each other, by conservative
- * advancement (Mirtich 1996). Returns false if they stay apart, or if the motion is not one of rotations. */
+ * advancement (Mirtich 1996). A tolerance below 1e-5 of the longest way of a point of b counts as that.
+ * Returns false if they stay apart, or if the motion is not one of rotations. */
 FCT_API bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion *motion,
                                    double tolerance, fct_first_contact *out, fct_visits *visits);
 
@@ -120,6 +121,22 @@ FCT_API void fct_bvh_overlaps(const fct_bvh *a, const fct_bvh *b, size_t count, 
 /* out[i].pair has the faces FCT_NONE if nothing is within def's max_distance. */
 FCT_API void fct_bvh_distances(const fct_bvh *a, const fct_bvh *b, size_t count, const fct_pose *poses,
                                const fct_distance_def *def, fct_distance *out);
+
+/* A model under a pose, in the world. */
+typedef struct fct_body {
+    const fct_bvh *bvh;
+    fct_pose pose;
+} fct_body;
+typedef struct fct_body_pair {
+    uint32_t body_a, body_b; /* body_a < body_b */
+    fct_face_pair faces;     /* a pair of their faces that meets */
+} fct_body_pair;
+/* All pairs of bodies that touch, ordered by body_a, then body_b. Bodies may share a model. Writes the first
+ * `capacity` pairs; *found receives the number of all. The rotations must have an inverse. Errors: DATA (a
+ * body without FCT_BVH_PAIRS, or a pose that is not finite or has no inverse; the message names it), MEMORY,
+ * CANCELLED. */
+FCT_API fct_result fct_bodies_touching(const fct_env *env, uint32_t count, const fct_body *bodies,
+                                       size_t capacity, fct_body_pair *pairs, size_t *found);
 
 #ifdef __cplusplus
 }
