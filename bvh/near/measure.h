@@ -21,9 +21,12 @@
 /* Times the distance to the farthest point of the model: the error of either bound. */
 #define FCT_MEASURE_MARGIN 0x1p-19
 
+/* Farther points move to this distance from the centre, along each axis. */
+#define FCT_AT_CLAMP 1e9
+
 /* A point as the boxes and triangles see it. */
 typedef struct fct_at {
-    float at[3];       /* the scaled point in float, clamped to 10^9 around the centre */
+    float at[3];       /* the scaled point in float, clamped to a cube around the centre */
     float centered[3]; /* relative to the centre */
     double rounding;   /* at least the distance between `at` and the clamped point */
     double margin;     /* error of the bounds of a triangle */
@@ -35,7 +38,8 @@ static inline fct_at fct_at_make(const fct_bvh *bvh, v3 scaled) {
     fct_at a = {.rounding = 0};
     double p[3] = {scaled.x, scaled.y, scaled.z}, farthest2 = 0;
     for (int k = 0; k < 3; ++k) {
-        double c = (double)bvh->center[k], clamped = fct_min(fct_max(p[k], c - 1e9), c + 1e9);
+        double c = (double)bvh->center[k],
+               clamped = fct_min(fct_max(p[k], c - FCT_AT_CLAMP), c + FCT_AT_CLAMP);
         double rounded = fct_round(clamped);
         a.at[k] = (float)rounded;
         a.centered[k] = a.at[k] - bvh->center[k];
