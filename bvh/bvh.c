@@ -1,8 +1,9 @@
 /* bvh/bvh.c: creation of the structure with either backend. */
 #include "bvh/build/nodes.h"
+#include "bvh/near/moments.h"
 #include "bvh/ray/embree.h"
 
-static fct_result build_packed(fct_bvh *bvh) {
+static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {
     fct_leaf_list leaves = {0};
     fct_top top = {0};
     fct_wide_list wide = {0};
@@ -14,6 +15,7 @@ static fct_result build_packed(fct_bvh *bvh) {
     if (result == FCT_OK) result = fct_wide_build(bvh, &leaves, &top, &wide);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .9);
     if (result == FCT_OK) result = fct_nodes_build(bvh, &leaves, &top, &wide);
+    if (result == FCT_OK && parts & FCT_BVH_SIGN) result = fct_moments_build(bvh);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", 1);
     fct_wide_release(bvh->env, &wide);
     fct_top_release(bvh->env, &top);
@@ -39,7 +41,7 @@ fct_result fct_bvh_build(const fct_env *env, const fct_tree *tree, const fct_bvh
     bvh->view = fct_tree_get(tree);
     bvh->backend = def->backend;
     fct_bvh_measure(bvh);
-    result = def->backend == FCT_BACKEND_EMBREE ? fct_embree_create(bvh) : build_packed(bvh);
+    result = def->backend == FCT_BACKEND_EMBREE ? fct_embree_create(bvh) : build_packed(bvh, def->parts);
     if (result == FCT_OK)
         *out = bvh;
     else
@@ -58,11 +60,13 @@ void fct_bvh_destroy(fct_bvh *bvh) {
     fct_embree_destroy(bvh->env, bvh->embree);
     fct_release(bvh->env, bvh->nodes);
     fct_release(bvh->env, bvh->leaves);
+    fct_release(bvh->env, bvh->moments);
     fct_release(bvh->env, bvh);
 }
 
 size_t fct_bvh_bytes(const fct_bvh *bvh) {
-    size_t bytes = bvh->embree ? fct_embree_bytes(bvh->embree) : bvh->node_bytes + bvh->leaf_bytes;
+    size_t bytes =
+        bvh->embree ? fct_embree_bytes(bvh->embree) : bvh->node_bytes + bvh->leaf_bytes + bvh->moment_bytes;
     return sizeof *bvh + bytes;
 }
 

@@ -27,7 +27,7 @@ typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULT
 /* What an OBB structure holds beside rays and points. */
 enum {
     FCT_BVH_PAIRS = 1, /* queries on two models (collide.h): about 10 bytes per triangle */
-    FCT_BVH_SIGN = 2   /* winding numbers and signed distances */
+    FCT_BVH_SIGN = 2   /* winding numbers and signed distances: about 24 bytes per triangle */
 };
 
 typedef struct fct_bvh_def {
@@ -120,6 +120,23 @@ FCT_API bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], flo
 /* The same for `count` points (count x 3), on the threads of the environment. */
 FCT_API void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                                     fct_closest *out);
+
+/* The generalised winding number of the surface about a point (Jacobson, Kavan, Sorkine-Hornung 2013): the
+ * sum of the signed solid angles of the faces over 4 pi. About a closed surface whose faces wind outwards it
+ * is 1 inside and 0 outside; inwards, -1 inside. Holes and overlaps change it smoothly. Far clusters count by
+ * their moments up to the third (Barill et al. 2018): the result errs by less than .001 on scans. NaN for a
+ * bvh that was built without FCT_BVH_SIGN, for the Embree backend, and if the point is not finite. visits may
+ * be NULL. */
+FCT_API double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visits *visits);
+/* fct_bvh_closest_point, with a negative distance where the winding number is above .5 or below -.5: inside
+ * of a closed surface, however its faces wind, also where parts overlap or small holes are open. The sum of
+ * all faces decides where the winding number is within .01 of that. Returns false for a bvh that was built
+ * without FCT_BVH_SIGN. */
+FCT_API bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max_distance,
+                                     fct_closest *out, fct_visits *visits);
+/* The same for `count` points (count x 3), on the threads of the environment. */
+FCT_API void fct_bvh_signed_distances(const fct_bvh *bvh, size_t count, const float *points,
+                                      float max_distance, fct_closest *out);
 
 /* The k nearest faces within max_distance, by distance and then by face id, each as fct_bvh_closest_point
  * gives it. `out` has room for k. Returns the number of faces found, at most k; 0 where fct_bvh_closest_point
