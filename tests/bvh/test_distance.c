@@ -1,4 +1,4 @@
-/* The distance of two models, against all pairs of faces; motions and first contacts; bodies. */
+/* The distance of two models, against all pairs of faces; motions and first contacts; relations; bodies. */
 #include "pairs.h"
 
 #include "bvh/model.h"
@@ -277,6 +277,57 @@ static void first_contacts_are_first(void **state) {
     model_release(&env, &b);
 }
 
+/* ---- Relations ---- */
+
+/* A large and a small body, the small one also inwards, twice as two parts, and beside the large one. */
+static void bodies_in_bodies(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh small = make_pebble(&env, 6, 51), two;
+    assert_int_equal(fct_mesh_create(&env, 2 * small.vertex_count, 2 * small.face_count, 0, &two), FCT_OK);
+    for (uint32_t i = 0; i < 3 * small.vertex_count; ++i) {
+        small.positions[i] *= .1f;
+        two.positions[i] = small.positions[i] + (i % 3 == 0 ? 3 : 0);
+        two.positions[i + 3 * small.vertex_count] = small.positions[i];
+    }
+    for (uint32_t i = 0; i < 3 * small.face_count; ++i) {
+        two.triangles[i] = small.triangles[i];
+        two.triangles[i + 3 * small.face_count] = small.triangles[i] + small.vertex_count;
+    }
+    model large = pair_model_make(&env, make_pebble(&env, 10, 50)), one = pair_model_make(&env, small),
+          both = pair_model_make(&env, two);
+    assert_int_equal(both.bvh->part_count, 2);
+    assert_int_equal(large.bvh->part_count, 1);
+    uint64_t seed = 52;
+    for (int i = 0; i < 20; ++i) {
+        fct_pose pose = random_pose(&seed, .2), back = invert_pose(&pose);
+        assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_B_INSIDE);
+        assert_int_equal(fct_bvh_relation(one.bvh, large.bvh, &back, NULL, NULL), FCT_A_INSIDE);
+        /* One of two parts is enough. */
+        assert_int_equal(fct_bvh_relation(large.bvh, both.bvh, &pose, NULL, NULL), FCT_B_INSIDE);
+        assert_int_equal(fct_bvh_relation(both.bvh, large.bvh, &back, NULL, NULL), FCT_A_INSIDE);
+        pose.translation[i % 3] += 5;
+        back = invert_pose(&pose);
+        assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_APART);
+        assert_int_equal(fct_bvh_relation(one.bvh, large.bvh, &back, NULL, NULL), FCT_APART);
+        /* Ten times as large, the small one holds the other. */
+        pose = random_pose(&seed, .2);
+        for (int r = 0; r < 9; ++r) pose.rotation[r / 3][r % 3] *= i % 2 ? 100 : -100;
+        assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_A_INSIDE);
+    }
+    fct_face_pair hint = fct_face_pair_none();
+    fct_pose pose = fct_pose_identity();
+    assert_int_equal(fct_bvh_relation(large.bvh, large.bvh, &pose, &hint, NULL), FCT_TOUCHING);
+    assert_true(hint.face_a != FCT_NONE);
+    memset(pose.rotation[2], 0, sizeof pose.rotation[2]);
+    assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_B_INSIDE);
+    fct_mesh_release(&env, &small);
+    one.mesh = (fct_mesh){0};
+    model_release(&env, &large);
+    model_release(&env, &one);
+    model_release(&env, &both);
+}
+
 /* ---- Bodies ---- */
 
 static void bodies_that_touch(void **state) {
@@ -350,7 +401,8 @@ int main(void) {
         cmocka_unit_test(distances_of_pebbles),     cmocka_unit_test(distances_at_extremes),
         cmocka_unit_test(distances_of_cubes),       cmocka_unit_test(distance_searches_visit_few),
         cmocka_unit_test(motions_are_steady),       cmocka_unit_test(first_contacts_of_cubes),
-        cmocka_unit_test(first_contacts_are_first), cmocka_unit_test(bodies_that_touch),
+        cmocka_unit_test(first_contacts_are_first), cmocka_unit_test(bodies_in_bodies),
+        cmocka_unit_test(bodies_that_touch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
