@@ -119,6 +119,8 @@ struct fct_bvh {
     float offset[3];          /* a scaled position is scale p - offset */
     float center[3];          /* of the scaled bounds */
     float lower[3], upper[3]; /* scaled bounds plus a margin, see fct_bvh_measure */
+    float *moved;             /* after a refit: view.positions; else NULL */
+    double built_cost;        /* after a refit: fct_bvh_cost of the structure that was built; else 0 */
     /* FCT_BACKEND_OBB */
     char *nodes, *leaves;
     size_t node_bytes, leaf_bytes;

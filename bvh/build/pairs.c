@@ -7,29 +7,12 @@
 
 #include "base/parallel.h"
 #include "base/union_find.h"
+#include "bvh/build/boxes.h"
 
 enum { NODE_CHUNK = 256 /* nodes per task */ };
 
-/* The centre and the axes are rounded to floats, and axes are orthonormal to a few roundings. All coordinates
- * are below 1, so a vertex leaves the box by less than 16 u, u = 2^-24. */
-#define PAIR_PAD 0x1p-19
-
 /* Half extents of the empty slots: separated from everything, and their squares are floats. */
 #define EMPTY_HALF (-1e18f)
-
-static void pack_box(const fct_slabs *s, uint32_t i, fct_pair_node *out) {
-    v3 center = {0, 0, 0};
-    for (int k = 0; k < 3; ++k) {
-        center = v3_mad(center, (s->upper[k] + s->lower[k]) / 2, s->axes[k]);
-        out->half[k][i] = (float)((s->upper[k] - s->lower[k]) / 2 + PAIR_PAD);
-        float axis[3];
-        v3_store(axis, s->axes[k]);
-        for (int j = 0; j < 3; ++j) out->axes[k][j][i] = axis[j];
-    }
-    float c[3];
-    v3_store(c, center);
-    for (int k = 0; k < 3; ++k) out->center[k][i] = c[k];
-}
 
 static void clear_node(fct_pair_node *out) {
     *out = (fct_pair_node){0};
@@ -56,7 +39,7 @@ static void pack_pair_nodes(void *user, size_t begin, size_t end, size_t chunk, 
         clear_node(out);
         for (uint32_t k = 0; k < wide->count; ++k) {
             const fct_top_node *child = &job->top->nodes[wide->top[k]];
-            pack_box(&job->wide->boxes[8 * i + k], k, out);
+            fct_pack_pair_box(&job->wide->boxes[8 * i + k], k, out);
             if (child->left == FCT_NONE)
                 out->child[k] = FCT_REF_LEAF | job->leaves->offsets[job->top->order[child->begin]];
         }
@@ -92,7 +75,7 @@ fct_result fct_pairs_build(fct_bvh *bvh, const fct_leaf_list *leaves, const fct_
     if (!bvh->pairs) return fct_fail_memory(bvh->env, "the nodes of a pair structure");
     fct_slabs root = fct_slabs_fit(bvh, leaves, top, &top->nodes[0]);
     clear_node(&bvh->pairs[0]);
-    pack_box(&root, 0, &bvh->pairs[0]);
+    fct_pack_pair_box(&root, 0, &bvh->pairs[0]);
     bvh->pairs[0].child[0] = wide->count ? 1 : FCT_REF_LEAF | leaves->offsets[0];
     pair_job job = {.bvh = bvh, .leaves = leaves, .top = top, .wide = wide};
     fct_parallel_for(bvh->env, wide->count, NODE_CHUNK, pack_pair_nodes, &job);

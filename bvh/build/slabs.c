@@ -38,25 +38,30 @@ static uint32_t find_enclosing_cluster(const fct_tree *tree, uint32_t first, uin
     return node;
 }
 
+void fct_slabs_clear(fct_slabs *s) {
+    for (int k = 0; k < 3; ++k) s->lower[k] = INFINITY, s->upper[k] = -INFINITY;
+}
+
+void fct_slabs_hold(const fct_bvh *bvh, const fct_leaf *leaf, fct_slabs *s) {
+    v3 center = v3_load(bvh->center);
+    const float *rows = fct_leaf_vertices(leaf);
+    uint32_t stride = 8u * leaf->vertex_octets;
+    for (uint32_t j = 0; j < stride; ++j) {
+        v3 p = v3_make((double)rows[j] - center.x, (double)rows[stride + j] - center.y,
+                       (double)rows[2 * stride + j] - center.z);
+        for (int k = 0; k < 3; ++k) {
+            double at = v3_dot(p, s->axes[k]);
+            if (at < s->lower[k]) s->lower[k] = at;
+            if (at > s->upper[k]) s->upper[k] = at;
+        }
+    }
+}
+
 /* Fits the slabs to the vertices of `count` leaves. */
 static void fit_slabs(const fct_bvh *bvh, const fct_leaf_list *leaves, const uint32_t *order, uint32_t count,
                       fct_slabs *s) {
-    v3 center = v3_load(bvh->center);
-    for (int k = 0; k < 3; ++k) s->lower[k] = INFINITY, s->upper[k] = -INFINITY;
-    for (uint32_t i = 0; i < count; ++i) {
-        const fct_leaf *leaf = fct_bvh_leaf(bvh, leaves->offsets[order[i]]);
-        const float *rows = fct_leaf_vertices(leaf);
-        uint32_t stride = 8u * leaf->vertex_octets;
-        for (uint32_t j = 0; j < stride; ++j) {
-            v3 p = v3_make((double)rows[j] - center.x, (double)rows[stride + j] - center.y,
-                           (double)rows[2 * stride + j] - center.z);
-            for (int k = 0; k < 3; ++k) {
-                double at = v3_dot(p, s->axes[k]);
-                if (at < s->lower[k]) s->lower[k] = at;
-                if (at > s->upper[k]) s->upper[k] = at;
-            }
-        }
-    }
+    fct_slabs_clear(s);
+    for (uint32_t i = 0; i < count; ++i) fct_slabs_hold(bvh, fct_bvh_leaf(bvh, leaves->offsets[order[i]]), s);
 }
 
 static void use_cluster_axes(const fct_bvh *bvh, uint32_t node, fct_slabs *s) {
