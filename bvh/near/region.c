@@ -185,9 +185,8 @@ void fct_region_ball(const fct_bvh *bvh, v3 point, double radius, fct_face_list 
     double reach = radius * bvh->scale;
     r.radius2 = reach * reach;
     r.limit2 = fct_box_limit2(&r.at, reach);
-    double outer = reach * (1 + 1e-6) + r.at.margin + r.at.rounding,
-           inner = reach * (1 - 1e-6) - r.at.margin - r.at.rounding;
-    r.reach2 = reach < INFINITY ? (float)fct_min(outer * outer, 3e38) : INFINITY;
+    r.reach2 = fct_triangle_limit2(&r.at, reach);
+    double inner = reach * (1 - 1e-6) - r.at.margin - r.at.rounding;
     /* Clamping makes upper bounds too small: then no box is inside, and double decides on each face. */
     bool clamped = v3_norm(v3_sub(r.point, v3_load(bvh->center))) > FCT_AT_CLAMP;
     r.inside2 = inner > 0 && !clamped ? (float)fct_min(inner * inner, 3e38) : 0;
