@@ -1,6 +1,6 @@
 /* bvh/bvh.c: creation of the structure with either backend. */
 #include "bvh/build/nodes.h"
-#include "bvh/near/moments.h"
+#include "bvh/near/sign/moments.h"
 #include "bvh/ray/embree.h"
 
 static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {

@@ -1,4 +1,4 @@
-/* bvh/near/region.c: the faces that touch a ball or a convex region of half-spaces. A kernel file.
+/* bvh/near/region/region.c: the faces that touch a ball or a convex region of half-spaces. A kernel file.
  *
  * The search carries a mask of the parts of the region's boundary that may cut a box: bit i for half-space i,
  * bit 0 for a ball. A box outside of one half-space is dropped. A box inside of one clears its bit; once the
@@ -6,7 +6,7 @@
  * a margin. Faces that float cannot decide are decided in double: by their distance from the centre of the
  * ball, or by clipping them against the half-spaces of the mask.
  */
-#include "bvh/near/region.h"
+#include "bvh/near/region/region.h"
 
 #include "base/math/simd.h"
 #include "bvh/near/measure.h"

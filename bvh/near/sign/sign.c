@@ -1,11 +1,11 @@
-/* bvh/near/sign.c: the public queries for winding numbers and signed distances.
+/* bvh/near/sign/sign.c: the public queries for winding numbers and signed distances.
  *
  * The sign only needs to know whether |w| is above .5. So the first sum uses moments of clusters that are
  * close to the point. If its result is not clear, a more precise sum follows, and then that of all faces.
  */
 #include "base/parallel.h"
 #include "bvh/near/nearest.h"
-#include "bvh/near/winding.h"
+#include "bvh/near/sign/winding.h"
 
 enum { CHUNK = 256 }; /* points per task */
 

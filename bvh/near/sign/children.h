@@ -1,4 +1,4 @@
-/* bvh/near/children.h: the children of a packed node of either kind. */
+/* bvh/near/sign/children.h: the children of a packed node of either kind. */
 #ifndef FCT_BVH_CHILDREN_H
 #define FCT_BVH_CHILDREN_H
 
