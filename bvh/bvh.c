@@ -4,7 +4,7 @@
 #include "bvh/build/nodes.h"
 #include "bvh/build/pairs.h"
 #include "bvh/build/refit.h"
-#include "bvh/near/moments.h"
+#include "bvh/near/sign/moments.h"
 #include "bvh/ray/embree.h"
 
 static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {

@@ -143,6 +143,17 @@ static inline const fct_leaf *fct_bvh_leaf(const fct_bvh *bvh, uint32_t ref) {
 static inline const void *fct_bvh_node(const fct_bvh *bvh, uint32_t ref) {
     return bvh->nodes + (size_t)(ref & ~FCT_REF_ORIENTED) * FCT_REF_UNIT;
 }
+/* The references of the eight children of a node; bit i of *present: child i exists. */
+static inline const uint32_t *fct_bvh_children(const fct_bvh *bvh, uint32_t ref, uint32_t *present) {
+    if (ref & FCT_REF_ORIENTED) {
+        const fct_oriented_node *node = fct_bvh_node(bvh, ref);
+        *present = node->present;
+        return node->child;
+    }
+    const fct_axis_node *node = fct_bvh_node(bvh, ref);
+    *present = node->present;
+    return node->child;
+}
 /* Adds `more` to *visits, which may be NULL. */
 static inline void fct_visits_add(fct_visits *visits, const fct_visits *more) {
     if (!visits) return;

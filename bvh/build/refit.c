@@ -13,7 +13,6 @@
 
 #include "base/parallel.h"
 #include "bvh/build/boxes.h"
-#include "bvh/near/children.h"
 
 enum { LEAF_CHUNK = 1024, NODE_CHUNK = 64 /* per task */ };
 

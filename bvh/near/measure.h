@@ -57,6 +57,12 @@ static inline float fct_box_limit2(const fct_at *a, double distance) {
     return distance < INFINITY ? (float)fct_min(limit * limit * 1.0001 + 1e-30, 3e38) : INFINITY;
 }
 
+/* The same for the lower bounds of triangles: a triangle beyond is farther than `distance` from the point. */
+static inline float fct_triangle_limit2(const fct_at *a, double distance) {
+    double limit = distance * (1 + 1e-6) + a->margin + a->rounding;
+    return distance < INFINITY ? (float)fct_min(limit * limit, 3e38) : INFINITY;
+}
+
 /* Squared distances of eight axis boxes; bit i of the result: box i is within the limit. */
 static inline uint32_t fct_measure_axis_boxes(const fct_axis_node *node, const fct_at *a, float limit2,
                                               float distance2[8]) {

@@ -44,8 +44,7 @@ typedef struct search {
 static void set_bound(search *s, double bound) {
     s->bound = bound;
     s->limit2 = fct_box_limit2(&s->at, bound);
-    double reach = bound * (1 + 1e-6) + s->at.margin + s->at.rounding;
-    s->reach2 = bound < INFINITY ? (float)fct_min(reach * reach, 3e38) : INFINITY;
+    s->reach2 = fct_triangle_limit2(&s->at, bound);
 }
 
 /* Takes the face if it is in reach and its normal is closer to the wanted one than that of the best face. */

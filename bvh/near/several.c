@@ -51,10 +51,10 @@ static void swap_items(void *items, size_t i, size_t j) {
 }
 
 static void set_reach(several *s, double bound2) {
-    double bound = sqrt(bound2), reach = bound * (1 + 1e-6) + s->at.margin + s->at.rounding;
+    double bound = sqrt(bound2);
     s->bound2 = bound2;
     s->limit2 = fct_box_limit2(&s->at, bound);
-    s->reach2 = bound < INFINITY ? (float)fct_min(reach * reach, 3e38) : INFINITY;
+    s->reach2 = fct_triangle_limit2(&s->at, bound);
 }
 
 static double measure_face(const several *s, const fct_leaf *leaf, uint32_t number, v3 *nearest, double *u,

@@ -20,12 +20,17 @@ static v3 mix_corners(v3 a, v3 b, v3 c, double u, double v) {
 static v3 closest_on_sides(v3 a, v3 b, v3 c, double *u, double *v) {
     double ab = closest_on_segment(a, b), bc = closest_on_segment(b, c), ac = closest_on_segment(a, c);
     double us[3] = {ab, 1 - bc, 0}, vs[3] = {0, bc, ac};
-    int best = 0;
-    for (int i = 1; i < 3; ++i)
-        if (v3_norm2(mix_corners(a, b, c, us[i], vs[i])) < v3_norm2(mix_corners(a, b, c, us[best], vs[best])))
-            best = i;
-    *u = us[best], *v = vs[best];
-    return mix_corners(a, b, c, *u, *v);
+    v3 best = mix_corners(a, b, c, us[0], vs[0]);
+    double best2 = v3_norm2(best);
+    *u = us[0], *v = vs[0];
+    for (int i = 1; i < 3; ++i) {
+        v3 point = mix_corners(a, b, c, us[i], vs[i]);
+        double point2 = v3_norm2(point);
+        if (!(point2 < best2)) continue;
+        best = point, best2 = point2;
+        *u = us[i], *v = vs[i];
+    }
+    return best;
 }
 
 v3 fct_triangle_closest(v3 p, v3 a, v3 b, v3 c, double *u, double *v) {

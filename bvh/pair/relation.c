@@ -3,7 +3,7 @@
  * If no faces meet, a connected part lies inside the other surface or outside as a whole, so one vertex of
  * each part decides.
  */
-#include "bvh/near/winding.h"
+#include "bvh/near/sign/winding.h"
 #include "bvh/pair/map.h"
 #include "bvh/pair/pose.h"
 

@@ -3,7 +3,7 @@
 
 #include "bvh/build/refit.h"
 #include "bvh/model.h"
-#include "bvh/near/moments.h"
+#include "bvh/near/sign/moments.h"
 
 static float *copy_positions(const fct_mesh *mesh) {
     float *out = malloc(12 * (size_t)mesh->vertex_count);

@@ -2,7 +2,7 @@
 #include "packed.h"
 
 #include "base/math/round.h"
-#include "bvh/near/winding.h"
+#include "bvh/near/sign/winding.h"
 
 #define PI 3.14159265358979324
 

@@ -55,13 +55,19 @@ static void shoot(const fct_bvh *bvh, const double *row) {
 
 /* A box of one unit has a nearest point for every point, at most at its distance from a corner. */
 static void find_nearest(const fct_bvh *bvh, const float *point) {
-    fct_closest closest;
+    fct_closest closest, two[2];
     bool found = fct_bvh_closest_point(bvh, point, INFINITY, &closest, NULL);
     double away = hypot(hypot((double)point[0], (double)point[1]), (double)point[2]);
     fuzz_require(found && closest.face < fct_tree_get(fct_bvh_tree(bvh)).face_count, "a nearest point");
     fuzz_require((double)closest.distance <= away * (1 + 1e-6) + 1e-6, "no corner is nearer");
     for (int k = 0; k < 3; ++k)
         fuzz_require(closest.point[k] >= -1.0001F && closest.point[k] <= 1.0001F, "a point of the model");
+    fuzz_require(fct_bvh_nearest(bvh, point, 2, INFINITY, two, NULL) == 2 && two[0].face == closest.face &&
+                     two[1].distance >= closest.distance,
+                 "the nearest of two faces");
+    uint32_t least,
+        found_count = fct_bvh_faces_in_ball(bvh, point, closest.distance * 1.0001F + 1e-30F, 1, &least, NULL);
+    fuzz_require(found_count >= 1 && least <= closest.face, "a ball that touches the model");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

@@ -39,6 +39,7 @@ write_outputs() {
         "$@" boxes "$in/mesh.ply" -k 30 -o "$out/boxes.txt" --quiet
         "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" -o "$out/hits.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" -o "$out/closest.txt" --quiet
+        "$@" closest "$in/mesh.ply" --points "$in/points.txt" --signed -o "$out/signed.txt" --quiet
         # shellcheck disable=SC2086 # a list of words
         "$@" bake "$in/cornell/scene.json" $light -o "$out/lit.ply" --also "$out/lit.glb" --quiet
         "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --quiet
@@ -60,7 +61,7 @@ fine="--error 1e-3" coarse="--error 1e-2 --max-edge .5" # an emulated processor 
 make_inputs inputs 12000
 make_inputs small 1500
 FACETREE_SIMD=baseline write_outputs inputs first "$fine" "$program"
-[ "$(find first -type f -size +0 | wc -l)" = 16 ] || { echo "expected 16 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
+[ "$(find first -type f -size +0 | wc -l)" = 17 ] || { echo "expected 17 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
 variants=baseline
 FACETREE_SIMD=avx2 "$program" --version >/dev/null 2>&1 && variants="baseline avx2"
 threads() { "$@" --threads "$count"; }

@@ -1,5 +1,5 @@
-/* bvh/near/faces.c: the public queries for the faces in a region. */
-#include "bvh/near/region.h"
+/* bvh/near/region/faces.c: the public queries for the faces in a region. */
+#include "bvh/near/region/region.h"
 
 static bool is_finite(v3 a) {
     return fabs(a.x) < INFINITY && fabs(a.y) < INFINITY && fabs(a.z) < INFINITY;

@@ -1,5 +1,5 @@
-/* bvh/near/winding.c: the generalised winding number (Jacobson, Kavan, Sorkine-Hornung 2013): the sum of the
- * solid angles of the faces, over 4 pi. A kernel file.
+/* bvh/near/sign/winding.c: the generalised winding number (Jacobson, Kavan, Sorkine-Hornung 2013): the sum of
+ * the solid angles of the faces, over 4 pi. A kernel file.
  *
  * Far clusters count by their moments (moments.h), eight at a time. Faces near the point count by their solid
  * angles (van Oosterom and Strackee 1983), eight at a time in float:
@@ -10,12 +10,12 @@
  * the point lies close to the face or to its rim. Such a face is measured again in double. So a half angle
  * errs by at most 3e-5, on nearly all faces by less than 1e-6.
  */
-#include "bvh/near/winding.h"
+#include "bvh/near/sign/winding.h"
 
 #include "base/math/elementary.h"
 #include "base/math/simd.h"
 #include "bvh/near/measure.h"
-#include "bvh/near/moments.h"
+#include "bvh/near/sign/moments.h"
 
 #define HALF_PI 1.57079632679489662
 /* A fraction whose terms are smaller than this, over |a| |b| |c|, is computed in double. */

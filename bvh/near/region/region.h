@@ -1,11 +1,11 @@
-/* bvh/near/region.h: the faces that touch a region. A kernel: region.c is compiled per processor. */
+/* bvh/near/region/region.h: the faces that touch a region. A kernel: region.c is compiled per processor. */
 #ifndef FCT_BVH_REGION_H
 #define FCT_BVH_REGION_H
 
 #include "base/variant.h"
 #include "bvh/model.h"
-#include "bvh/near/clip.h"
-#include "bvh/near/list.h"
+#include "bvh/near/region/clip.h"
+#include "bvh/near/region/list.h"
 
 /* Adds the faces within `radius` (>= 0) of the point to the list. OBB backend. */
 #define fct_region_ball FCT_KERNEL(fct_region_ball)

@@ -1,4 +1,4 @@
-/* bvh/near/region.c: the faces that touch a ball or a convex region of half-spaces. A kernel file.
+/* bvh/near/region/region.c: the faces that touch a ball or a convex region of half-spaces. A kernel file.
  *
  * The search carries a mask of the parts of the region's boundary that may cut a box: bit i for half-space i,
  * bit 0 for a ball. A box outside of one half-space is dropped. A box inside of one clears its bit; once the
@@ -6,7 +6,7 @@
  * a margin. Faces that float cannot decide are decided in double: by their distance from the centre of the
  * ball, or by clipping them against the half-spaces of the mask.
  */
-#include "bvh/near/region.h"
+#include "bvh/near/region/region.h"
 
 #include "base/math/simd.h"
 #include "bvh/near/measure.h"
@@ -185,9 +185,8 @@ void fct_region_ball(const fct_bvh *bvh, v3 point, double radius, fct_face_list 
     double reach = radius * bvh->scale;
     r.radius2 = reach * reach;
     r.limit2 = fct_box_limit2(&r.at, reach);
-    double outer = reach * (1 + 1e-6) + r.at.margin + r.at.rounding,
-           inner = reach * (1 - 1e-6) - r.at.margin - r.at.rounding;
-    r.reach2 = reach < INFINITY ? (float)fct_min(outer * outer, 3e38) : INFINITY;
+    r.reach2 = fct_triangle_limit2(&r.at, reach);
+    double inner = reach * (1 - 1e-6) - r.at.margin - r.at.rounding;
     /* Clamping makes upper bounds too small: then no box is inside, and double decides on each face. */
     bool clamped = v3_norm(v3_sub(r.point, v3_load(bvh->center))) > FCT_AT_CLAMP;
     r.inside2 = inner > 0 && !clamped ? (float)fct_min(inner * inner, 3e38) : 0;

@@ -1,4 +1,4 @@
-/* bvh/near/clip.h: whether a triangle touches a convex region. */
+/* bvh/near/region/clip.h: whether a triangle touches a convex region. */
 #ifndef FCT_BVH_CLIP_H
 #define FCT_BVH_CLIP_H
 

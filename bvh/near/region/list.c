@@ -1,5 +1,5 @@
-/* bvh/near/list.c: see list.h. Adding costs O(1) while there is room, then O(log capacity). */
-#include "bvh/near/list.h"
+/* bvh/near/region/list.c: see list.h. Adding costs O(1) while there is room, then O(log capacity). */
+#include "bvh/near/region/list.h"
 
 #include "base/sift.h"
 

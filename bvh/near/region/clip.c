@@ -1,5 +1,5 @@
-/* bvh/near/clip.c: see clip.h. A half-space adds at most one corner to a convex polygon. */
-#include "bvh/near/clip.h"
+/* bvh/near/region/clip.c: see clip.h. A half-space adds at most one corner to a convex polygon. */
+#include "bvh/near/region/clip.h"
 
 enum { CORNERS = 3 + FCT_BVH_PLANES };
 

@@ -1,4 +1,4 @@
-/* bvh/near/moments.h: the far field of the winding number: moments of the surface per child of a node.
+/* bvh/near/sign/moments.h: the far field of the winding number: moments of the surface per child of a node.
  *
  * The winding number of a surface about q is the integral of n.(x - q) / (4 pi |x - q|^3) over its area.
  * About a centre c, with d = c - q, R = |d| and e = d / R (Barill, Dickson, Schmidt, Levin, Jacobson 2018, in

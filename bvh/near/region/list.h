@@ -1,4 +1,4 @@
-/* bvh/near/list.h: the faces that a query finds, in the caller's array, by ascending id. */
+/* bvh/near/region/list.h: the faces that a query finds, in the caller's array, by ascending id. */
 #ifndef FCT_BVH_LIST_H
 #define FCT_BVH_LIST_H
 

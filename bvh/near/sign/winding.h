@@ -1,5 +1,5 @@
-/* bvh/near/winding.h: the winding number of the surface about a point. A kernel: winding.c is compiled per
- * processor. */
+/* bvh/near/sign/winding.h: the winding number of the surface about a point. A kernel: winding.c is compiled
+ * per processor. */
 #ifndef FCT_BVH_WINDING_H
 #define FCT_BVH_WINDING_H
 

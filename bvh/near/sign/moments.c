@@ -1,17 +1,15 @@
-/* bvh/near/moments.c: see moments.h.
+/* bvh/near/sign/moments.c: see moments.h.
  *
  * Moments of triangles are exact integrals. They are summed in double about the centre of the model, so that
  * those of a node are the sums of those of its children, and move to the centre of the child when they are
- * stored. The records of clusters (cluster.h) cannot serve: they have no moments of position,
- * and a node is no cluster.
- * Leaves are summed in parallel, nodes from the last to the first. O(F). 672 bytes per node, 24 per
- * triangle of a scan.
+ * stored. The records of clusters (cluster.h) cannot serve: they have no moments of position, and a node is
+ * no cluster. Leaves are summed in parallel, nodes from the last to the first. O(F). 672 bytes per node, 24
+ * per triangle of a scan.
  */
-#include "bvh/near/moments.h"
+#include "bvh/near/sign/moments.h"
 
 #include "base/math/round.h"
 #include "base/parallel.h"
-#include "bvh/near/children.h"
 
 enum { NODE_CHUNK = 64 }; /* nodes per task */
 
