@@ -104,6 +104,14 @@ for threads in 1 2 5; do
     echo "$(value box_tests) $(value triangle_tests)" >visits$threads
     check "the same tests on $threads threads" cmp -s visits1 visits$threads
 done
+# A pose with more pairs than its part of the memory of a block, as the first pose of its block and in the middle.
+holds "$(grep -c '^0 ' 1--pairs.txt) > 4096 && $(grep -c '^10 ' 1--pairs.txt) > 4096"
+for i in 0 10 11 300; do
+    expect 0 collide sphere.off sphere.off --pose "$(sed -n $((i + 1))p poses.txt)" --pairs
+    grep "^$i " 1--pairs.txt | cut -d ' ' -f 2,3 >expected
+    cut -d ' ' -f 2,3 out >found
+    check "the pairs of pose $i alone" cmp -s found expected
+done
 check "one pair of many" test "$(cut -d ' ' -f 1 1--pairs.txt | uniq | wc -l)" = "$(grep -c ^1 touching)"
 paste -d ' ' <(cut -d ' ' -f 1-3 1--contacts.txt) 1--pairs.txt | awk '$1 != $4 || $2 != $5 || $3 != $6' >bad
 check "contacts of the same pairs" test ! -s bad
@@ -177,6 +185,14 @@ check "names of instances" test "$(value name_a),$(value name_b)" = "box,big bal
 sed -e 's/"translate": \[2.9/"translate": [3.1/' -e 's/2.2, 0/6, 0/' scene.json >apart.json
 expect 1 collide apart.json
 check "no pair" test ! -s out
+expect 0 make cornell -o cornell --triangles 200 --quiet
+expect 0 collide cornell/scene.json
+cut -d ' ' -f 1,2 out >expected
+holds "$(wc -l <expected) == 5"
+expect 0 bake cornell/scene.json -o cornell.glb --error 1 --final none --quiet
+expect 0 collide cornell.glb
+cut -d ' ' -f 1,2 out >found
+check "a glTF file has the same instances" cmp -s found expected
 
 # --- Wrong input ---
 for bad in '1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 5' '1 0 0 0 0 1 0 x 0 0 1 0' '1 0 0 0 0 1 0 nan 0 0 1 0' 'inf 0 0 0 0 1 0 0 0 0 1 0'; do
