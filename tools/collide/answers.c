@@ -9,7 +9,9 @@
 #include "tools/kit/chunks.h"
 
 enum {
-    CHUNK = 64,          /* poses: a hint saves most of the next query if the poses are steps of a motion */
+    /* Poses. Along a path of 2,000 steps, distances test 23 % more boxes without hints, 5 % more in chunks of
+     * 4, and 1 % more in chunks of 16 than in those of 64. */
+    CHUNK = 16,
     BLOCK = 1 << 15,     /* poses: 3 MB of answers */
     PAIR_BLOCK = 256,    /* poses, which share */
     PAIR_SLOTS = 1 << 20 /* pairs: 16 MB. An answer with more than its part is computed again when taken */
