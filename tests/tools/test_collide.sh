@@ -153,16 +153,25 @@ holds "$(wc -l <out) == 2 && $(awk 'NF != 12' out | wc -l) == 0"
 expect 0 collide both.off --self --json
 holds "$(value found) == $(wc -l <expected)"
 
-# --- Far from the origin ---
-far() { awk 'NR > 2 && NF == 3 { printf "%.9f %.9f %.9f\n", $1 + 5000000, $2 - 3000000, $3; next } { print }' "$1"; }
-far cube.off >far.off
-far small.off >far-small.off
-expect 0 collide cube.off small.off --pose "$(moved 2 .5 .25)" --distance
-awk '{ print $1, $2, $3, $4 + 5000000, $5 - 3000000, $6, $7 + 5000000, $8 - 3000000, $9 }' OFMT=%.15g CONVFMT=%.15g out >expected
-expect 0 collide far.off far-small.off --pose "$(moved 2 .5 .25)" --distance
-check "far models at the same distance" cmp -s out expected
-expect 0 collide cube.off far-small.off --pose "$(moved -4999998 3000000.5 .25)" --distance
-check "a near and a far model" test "$(cut -d ' ' -f 1 out)" = "$(cut -d ' ' -f 1 expected)"
+# --- Far from the origin: floats have steps of .5 there, and the readers choose a local origin ---
+far() { awk -v x="$2" -v y="$3" 'NR > 2 && NF == 3 { printf "%.9f %.9f %.9f\n", $1 + x, $2 + y, $3; next } { print }' "$1"; }
+far cube.off 5000000.3 -3000000.7 >far.off
+far small.off -7000000.1 9000000.4 >far-small.off
+near() { # EXPECTED: out has the same distance and, moved to the far cube, the same points
+    paste -d ' ' out "$1" | awk '{ $4 -= 5000000.3; $7 -= 5000000.3; $5 += 3000000.7; $8 += 3000000.7
+        for (k = 1; k <= 9; ++k) if (k != 2 && k != 3) { d = $k - $(k + 9); if (d > 1e-6 || d < -1e-6) bad = 1 } } END { exit bad || NR != 1 }'
+}
+expect 0 collide cube.off small.off --pose "$(moved 2 .5 4)" --distance
+cp out expected
+expect 0 collide far.off far-small.off --pose "$(moved 12000002.4 -12000000.6 4)" --distance
+check "two far models" near expected
+expect 0 collide far.off small.off --pose "$(moved 5000002.3 -3000000.2 4)" --distance
+check "a far and a near model" near expected
+expect 0 collide far.off far-small.off --pose '0 1 0 -3999998.1 -1 0 0 -10000000.3 0 0 1 4' --distance
+check "a far model that is turned" near expected
+expect 0 collide far.off far-small.off --pose "$(moved 12000001.8 -12000001 .2)" --contacts
+check "contacts of far models" test "$(awk '$4 < 5000001.299 || $4 > 5000001.301 || $7 < 5000001.299 || $7 > 5000001.301' out | wc -l)" = 0
+holds "$(wc -l <out) >= 8"
 
 # --- Scenes ---
 cat >scene.json <<'END'
