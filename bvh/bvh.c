@@ -1,6 +1,7 @@
 /* bvh/bvh.c: creation of the structure with either backend. */
 #include "bvh/build/nodes.h"
 #include "bvh/build/pairs.h"
+#include "bvh/near/moments.h"
 #include "bvh/ray/embree.h"
 
 static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {
@@ -16,6 +17,7 @@ static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .9);
     if (result == FCT_OK) result = fct_nodes_build(bvh, &leaves, &top, &wide);
     if (result == FCT_OK && (parts & FCT_BVH_PAIRS)) result = fct_pairs_build(bvh, &leaves, &top, &wide);
+    if (result == FCT_OK && parts & FCT_BVH_SIGN) result = fct_moments_build(bvh);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", 1);
     fct_wide_release(bvh->env, &wide);
     fct_top_release(bvh->env, &top);
@@ -62,13 +64,14 @@ void fct_bvh_destroy(fct_bvh *bvh) {
     fct_release(bvh->env, bvh->leaves);
     fct_release(bvh->env, bvh->pairs);
     fct_release(bvh->env, bvh->parts);
+    fct_release(bvh->env, bvh->moments);
     fct_release(bvh->env, bvh);
 }
 
 size_t fct_bvh_bytes(const fct_bvh *bvh) {
     if (bvh->embree) return sizeof *bvh + fct_embree_bytes(bvh->embree);
-    return sizeof *bvh + bvh->node_bytes + bvh->leaf_bytes + bvh->pair_count * sizeof *bvh->pairs +
-           bvh->part_count * sizeof *bvh->parts;
+    return sizeof *bvh + bvh->node_bytes + bvh->leaf_bytes + bvh->moment_bytes +
+           bvh->pair_count * sizeof *bvh->pairs + bvh->part_count * sizeof *bvh->parts;
 }
 
 fct_bounds fct_bvh_bounds(const fct_bvh *bvh) {

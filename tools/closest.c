@@ -1,4 +1,5 @@
-/* tools/closest.c: facetree closest: the nearest surface point for each point of a text file. */
+/* tools/closest.c: facetree closest: the nearest surface point for each point of a text file, and
+ * on which side of the surface the point lies. */
 #include "tools/commands.h"
 
 #include <math.h>
@@ -13,14 +14,19 @@
 typedef struct closest_options {
     const char *points;
     double max_distance;
+    bool with_sign;
 } closest_options;
 
-enum { KEY_POINTS = TOOL_KEY, KEY_MAX_DISTANCE };
+enum { KEY_POINTS = TOOL_KEY, KEY_MAX_DISTANCE, KEY_SIGNED };
 
 static const struct argp_option closest_options_table[] = {
     {"points", KEY_POINTS, "FILE", 0, "Points, one per line: x y z; - is standard input", 0},
     {"max-distance", KEY_MAX_DISTANCE, "D", 0,
      "Search only within D, in the mesh's unit (default: no limit); the answer is -1 if nothing is that near",
+     0},
+    {"signed", KEY_SIGNED, 0, 0,
+     "Distances are negative inside the surface: where its winding number is above .5 or below -.5. Not for "
+     "scenes",
      0},
     {0}};
 
@@ -32,6 +38,9 @@ static error_t parse_closest(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_MAX_DISTANCE:
         return tool_parse_real(state, "--max-distance", text, 0, INFINITY, &o->max_distance);
+    case KEY_SIGNED:
+        o->with_sign = true;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -72,8 +81,13 @@ static int find_in_model(tool *t, const closest_options *o, const tool_rows *row
     if (code != TOOL_DONE) return code;
     memcpy(a->origin, fct_tree_get(tree).origin, sizeof a->origin);
     code = place_points(t, rows, a, &points);
-    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_create(&t->env, tree, FCT_BACKEND_OBB, &bvh));
-    if (code == TOOL_DONE) fct_bvh_closest_points(bvh, rows->count, points, (float)o->max_distance, a->found);
+    fct_bvh_def def = fct_bvh_def_default();
+    if (o->with_sign) def.parts = FCT_BVH_SIGN;
+    if (code == TOOL_DONE) code = tool_result(t, fct_bvh_build(&t->env, tree, &def, &bvh));
+    if (code == TOOL_DONE && o->with_sign)
+        fct_bvh_signed_distances(bvh, rows->count, points, (float)o->max_distance, a->found);
+    else if (code == TOOL_DONE)
+        fct_bvh_closest_points(bvh, rows->count, points, (float)o->max_distance, a->found);
     tool_release(t, points);
     fct_bvh_destroy(bvh);
     fct_tree_destroy(tree);
@@ -96,14 +110,18 @@ static int find_in_scene(tool *t, const closest_options *o, const tool_rows *row
     return code;
 }
 
-static int write_found(tool *t, const answers *a, size_t count, size_t *hits) {
+typedef struct totals {
+    size_t found, inside;
+} totals;
+
+static int write_found(tool *t, const answers *a, size_t count, totals *sum) {
     tool_writer writer = {0};
     bool wanted = !t->json || t->output;
     int code = wanted ? tool_writer_open(t, t->output ? t->output : "-", &writer) : TOOL_DONE;
     if (code != TOOL_DONE) return code;
     for (size_t i = 0; i < count; ++i) {
         bool hit = a->found[i].face != FCT_NONE;
-        *hits += hit;
+        sum->found += hit, sum->inside += hit && a->found[i].distance < 0;
         if (!wanted) continue;
         if (hit && a->instances) fprintf(writer.stream, "%u ", a->instances[i]);
         if (hit)
@@ -114,14 +132,26 @@ static int write_found(tool *t, const answers *a, size_t count, size_t *hits) {
     return wanted ? tool_writer_close(t, &writer, TOOL_DONE) : TOOL_DONE;
 }
 
+static int report_found(tool *t, const closest_options *o, size_t points, const totals *sum, double seconds) {
+    json_int_t found = (json_int_t)sum->found, inside = (json_int_t)sum->inside;
+    if (o->with_sign)
+        return tool_json(t, json_pack("{s:I, s:I, s:I, s:f}", "points", (json_int_t)points, "found", found,
+                                      "inside", inside, "seconds", seconds));
+    return tool_json(
+        t, json_pack("{s:I, s:I, s:f}", "points", (json_int_t)points, "found", found, "seconds", seconds));
+}
+
 static int run_closest(tool *t, void *options) {
     const closest_options *o = options;
     if (!o->points) return tool_fail(t, TOOL_USAGE, "expected --points FILE");
     if (!strcmp(o->points, "-") && !strcmp(t->inputs[0], "-"))
         return tool_fail(t, TOOL_USAGE, "the mesh and the points cannot both come from standard input");
     bool scene = tool_is_scene(t, t->inputs[0]);
+    if (scene && o->with_sign)
+        return tool_fail(t, TOOL_USAGE, "--signed: expected a mesh or a hierarchy file, found the scene '%s'",
+                         t->inputs[0]);
     tool_rows points;
-    size_t hits = 0;
+    totals sum = {0, 0};
     int code = tool_rows_read(t, o->points, 3, 3, NULL, &points);
     if (code != TOOL_DONE) return code;
     answers a = {.found = tool_allocate(t, points.count, sizeof *a.found)};
@@ -130,10 +160,8 @@ static int run_closest(tool *t, void *options) {
     double start = tool_seconds();
     if (code == TOOL_DONE) code = scene ? find_in_scene(t, o, &points, &a) : find_in_model(t, o, &points, &a);
     double seconds = tool_seconds() - start;
-    if (code == TOOL_DONE) code = write_found(t, &a, points.count, &hits);
-    if (code == TOOL_DONE)
-        code = tool_json(t, json_pack("{s:I, s:I, s:f}", "points", (json_int_t)points.count, "found",
-                                      (json_int_t)hits, "seconds", seconds));
+    if (code == TOOL_DONE) code = write_found(t, &a, points.count, &sum);
+    if (code == TOOL_DONE) code = report_found(t, o, points.count, &sum, seconds);
     tool_release(t, a.instances);
     tool_release(t, a.found);
     tool_rows_release(t, &points);
@@ -151,9 +179,11 @@ int tool_closest(int argc, char **argv) {
                 "distance', or 'instance face x y z distance' for a scene. Without -o the lines go to "
                 "standard output; with "
                 "--json the answers are only counted.\n\n"
-                "JSON keys: points, found, seconds (including the opening or building of the hierarchy).",
+                "JSON keys: points, found, seconds (including the opening or building of the hierarchy); "
+                "inside with "
+                "--signed.",
         .examples = "  facetree closest bunny.fct --points points.txt -o nearest.txt\n"
-                    "  echo 0 0 1 | facetree closest bunny.obj --points -",
+                    "  echo 0 0 1 | facetree closest bunny.obj --points - --signed",
         .options = closest_options_table,
         .parse = parse_closest,
         .run = run_closest,

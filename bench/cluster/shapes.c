@@ -1,9 +1,9 @@
 /* bench/cluster/shapes.c: makes subdivided, shuffled and adversarial meshes, which `facetree make` does not
  * make.
  *
- * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes, gear: of about COUNT triangles
- *        shapes subdivide LEVELS IN OUT   splits each triangle into four, LEVELS times, with noise
- *        shapes shuffle-faces SEED IN OUT, shapes shuffle SEED IN OUT (vertices, too), shapes copy 0 IN OUT
+ * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes, blocks, beams, needles, gear: of
+ * about COUNT triangles shapes subdivide LEVELS IN OUT   splits each triangle into four, LEVELS times, with
+ * noise shapes shuffle-faces SEED IN OUT, shapes shuffle SEED IN OUT (vertices, too), shapes copy 0 IN OUT
  * The output depends on the arguments only.
  */
 #include <math.h>
@@ -76,16 +76,89 @@ static void make_books(const fct_env *env, uint32_t count, fct_mesh *m) {
     }
 }
 
+/* Corners 0 to 7 of a cube: bit 0 is x, bit 1 is y, bit 2 is z. */
+static const uint8_t cube_sides[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                          {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+
 /* A high stack of small cubes with gaps between them. */
 static void make_cubes(const fct_env *env, uint32_t count, fct_mesh *m) {
-    static const uint8_t sides[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                                         {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
     uint32_t cubes = count < 12 ? 1 : count / 12;
     start(env, 8 * cubes, 12 * cubes, m);
     for (uint32_t c = 0; c < cubes; ++c) {
         for (uint32_t k = 0; k < 8; ++k) add_vertex(m, k & 1, 1.25 * c + (k >> 1 & 1), k >> 2);
         for (int s = 0; s < 12; ++s)
-            add_face(m, 8 * c + sides[s][0], 8 * c + sides[s][1], 8 * c + sides[s][2]);
+            add_face(m, 8 * c + cube_sides[s][0], 8 * c + cube_sides[s][1], 8 * c + cube_sides[s][2]);
+    }
+}
+
+/* Cubes at half of the places of a cubic grid, at random. Neighbours share vertices, and keep the two equal
+ * faces between them. */
+static void make_blocks(const fct_env *env, uint32_t count, fct_mesh *m) {
+    bench_dice dice = {1};
+    uint32_t n = (uint32_t)cbrt(count / 6.0) + 1, row = n + 1;
+    start(env, row * row * row, 12 * n * n * n, m);
+    for (uint32_t v = 0; v < row * row * row; ++v) add_vertex(m, v % row, v / row % row, v / row / row);
+    for (uint32_t c = 0; c < n * n * n; ++c) {
+        uint32_t at = c % n + row * (c / n % n + row * (c / n / n));
+        if (bench_roll(&dice) & 1) continue;
+        for (int s = 0; s < 12; ++s) {
+            uint32_t v[3];
+            for (int k = 0; k < 3; ++k) {
+                uint32_t corner = cube_sides[s][k];
+                v[k] = at + (corner & 1) + row * (corner >> 1 & 1) + row * row * (corner >> 2);
+            }
+            add_face(m, v[0], v[1], v[2]);
+        }
+    }
+}
+
+/* Two directions across `along`, of length `size`. */
+static void find_sides(const double along[3], double size, double a[3], double b[3]) {
+    double flat = hypot(along[0], along[1]), length = hypot(flat, along[2]);
+    a[0] = -along[1] / flat * size, a[1] = along[0] / flat * size, a[2] = 0;
+    for (int k = 0; k < 3; ++k) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        b[k] = (along[i] * a[j] - along[j] * a[i]) / length;
+    }
+}
+
+/* Square beams of 40 pieces along the diagonal of the unit cube, of slightly different directions. */
+static void make_beams(const fct_env *env, uint32_t count, fct_mesh *m) {
+    enum { PIECES = 40 };
+    bench_dice dice = {1};
+    uint32_t beams = count / (8 * PIECES) + 1;
+    start(env, 4 * (PIECES + 1) * beams, 8 * PIECES * beams, m);
+    for (uint32_t i = 0; i < beams; ++i) {
+        double from[3], along[3], a[3], b[3];
+        for (int k = 0; k < 3; ++k) from[k] = bench_unit(&dice), along[k] = .9 + .2 * bench_unit(&dice);
+        find_sides(along, .1 / sqrt(beams), a, b);
+        uint32_t base = m->vertex_count;
+        for (uint32_t v = 0; v < 4 * (PIECES + 1); ++v) {
+            static const double corner[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+            double s = (double)(v / 4) / PIECES, x = corner[v % 4][0], y = corner[v % 4][1], p[3];
+            for (int k = 0; k < 3; ++k) p[k] = from[k] + s * along[k] + x * a[k] + y * b[k];
+            add_vertex(m, p[0], p[1], p[2]);
+        }
+        for (uint32_t v = 0; v < 4 * PIECES; ++v) {
+            uint32_t p = base + v, q = base + v / 4 * 4 + (v + 1) % 4;
+            add_face(m, p, q, q + 4), add_face(m, p, q + 4, p + 4);
+        }
+    }
+}
+
+/* Thin triangles of random directions that share no vertex, as long as a tenth of the cube that holds them.
+ */
+static void make_needles(const fct_env *env, uint32_t count, fct_mesh *m) {
+    bench_dice dice = {1};
+    start(env, 3 * count, count, m);
+    for (uint32_t i = 0; i < count; ++i) {
+        double from[3], along[3], a[3], b[3];
+        for (int k = 0; k < 3; ++k) from[k] = bench_unit(&dice), along[k] = .1 * (2 * bench_unit(&dice) - 1);
+        find_sides(along, 1e-3, a, b);
+        uint32_t v = add_vertex(m, from[0] - a[0], from[1] - a[1], from[2] - a[2]);
+        add_vertex(m, from[0] + a[0], from[1] + a[1], from[2] + a[2]);
+        add_vertex(m, from[0] + along[0], from[1] + along[1], from[2] + along[2]);
+        add_face(m, v, v + 1, v + 2);
     }
 }
 
@@ -226,8 +299,9 @@ int main(int argc, char **argv) {
     static const struct {
         const char *name;
         void (*make)(const fct_env *env, uint32_t count, fct_mesh *m);
-    } made[] = {{"strip", make_strip}, {"fan", make_fan},     {"loose", make_loose},
-                {"books", make_books}, {"cubes", make_cubes}, {"gear", make_gear}};
+    } made[] = {{"strip", make_strip}, {"fan", make_fan},         {"loose", make_loose},
+                {"books", make_books}, {"cubes", make_cubes},     {"blocks", make_blocks},
+                {"beams", make_beams}, {"needles", make_needles}, {"gear", make_gear}};
     fct_env env = bench_env(2);
     fct_mesh m = {0};
     if (argc < 4 || argc > 5) bench_fail("usage: shapes NAME COUNT [IN] OUT");

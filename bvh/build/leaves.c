@@ -2,7 +2,7 @@
  *
  * Input: the cluster tree. Output: leaves in order of place; each face is in one leaf. A leaf is the largest
  * cluster of at most 16 faces and 16 vertices. It stores each vertex once and its corners as bytes: at most
- * 256 bytes, about 22 bytes per triangle on a scan. O(F).
+ * 256 bytes, about 22 bytes per triangle on a scan. O(F), in parallel but for the walk to the clusters.
  */
 #include "bvh/build/leaves.h"
 
@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "cluster/tree/node.h"
 
-/* Lists the vertices of a leaf in order of first use and returns their number, or FCT_LEAF_VERTICES + 1 if
+/* Lists the vertices of a cluster in order of first use and returns their number, or FCT_LEAF_VERTICES + 1 if
  * there are too many. `corners` receives 3 * count indices into `vertices`. */
 static uint32_t gather_vertices(const fct_tree_view *view, uint32_t first, uint32_t count,
                                 uint32_t vertices[FCT_LEAF_VERTICES], uint8_t *corners) {
@@ -28,42 +28,67 @@ static uint32_t gather_vertices(const fct_tree_view *view, uint32_t first, uint3
     return vertex_count;
 }
 
-/* Groups of eight vertices in the leaf of a cluster, or 0 if the cluster does not fit a leaf. */
-static uint32_t count_vertex_octets(const fct_tree *tree, uint32_t node) {
+/* Bytes of the leaf of a cluster of at most FCT_LEAF_FACES faces, or 0 if it has too many vertices. */
+static size_t measure_leaf(const fct_tree *tree, uint32_t node) {
     uint32_t vertices[FCT_LEAF_VERTICES], count = fct_node_faces(tree, node);
     uint8_t corners[3 * FCT_LEAF_FACES];
-    if (count > FCT_LEAF_FACES) return 0;
     uint32_t vertex_count =
         gather_vertices(&tree->view, fct_node_first(tree, node), count, vertices, corners);
-    return vertex_count > FCT_LEAF_VERTICES ? 0 : (vertex_count + 7) / 8;
+    return vertex_count > FCT_LEAF_VERTICES ? 0 : fct_leaf_bytes(count, (vertex_count + 7) / 8);
 }
 
-/* Descends from the roots, left child first, to the clusters that fit a leaf. If list->nodes is NULL, it only
- * counts them. `stack` has room for depth + root_count + 1 entries. *units receives the size of all leaves in
- * units of FCT_REF_UNIT bytes. */
-static void choose_leaves(const fct_tree *tree, uint32_t *stack, fct_leaf_list *list, uint64_t *units) {
+/* Lists the largest clusters of at most FCT_LEAF_FACES faces, in order of place, and returns their number.
+ * `stack` has room for depth + root_count + 1 nodes. */
+static uint32_t list_candidates(const fct_tree *tree, uint32_t *stack, uint32_t *candidates) {
     const fct_tree_view *view = &tree->view;
-    uint32_t height = 0, found = 0;
-    *units = 0;
+    uint32_t height = 0, count = 0;
     for (uint32_t r = view->root_count; r-- > 0;) stack[height++] = view->roots[r];
     while (height) {
-        uint32_t node = stack[--height], octets = count_vertex_octets(tree, node);
-        if (octets == 0) {
-            stack[height++] = fct_node_child(tree, node, 1);
-            stack[height++] = fct_node_child(tree, node, 0);
+        uint32_t node = stack[--height];
+        if (fct_node_faces(tree, node) <= FCT_LEAF_FACES) {
+            candidates[count++] = node;
             continue;
         }
-        if (list->nodes) {
-            list->nodes[found] = node;
-            list->offsets[found] = (uint32_t)*units;
-        }
-        *units += fct_leaf_bytes(fct_node_faces(tree, node), octets) / FCT_REF_UNIT;
-        ++found;
+        stack[height++] = fct_node_child(tree, node, 1);
+        stack[height++] = fct_node_child(tree, node, 0);
     }
-    list->count = found;
+    return count;
 }
 
-enum { PACK_CHUNK = 1024 }; /* leaves per task */
+/* Per place: the cluster whose leaf starts there, or FCT_NONE, and the size of that leaf. */
+typedef struct choice {
+    uint32_t node, units;
+} choice;
+
+typedef struct choose_job {
+    const fct_tree *tree;
+    const uint32_t *candidates;
+    choice *choices;
+} choose_job;
+
+enum { CHOOSE_CHUNK = 1024, PACK_CHUNK = 1024 }; /* candidates, leaves per task */
+
+/* Descends from each candidate to the clusters that fit a leaf. */
+static void choose_leaves(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const choose_job *job = user;
+    const fct_tree *tree = job->tree;
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t stack[FCT_LEAF_FACES], height = 1;
+        stack[0] = job->candidates[i];
+        while (height) {
+            uint32_t node = stack[--height];
+            size_t bytes = measure_leaf(tree, node);
+            if (bytes == 0) {
+                stack[height++] = fct_node_child(tree, node, 1);
+                stack[height++] = fct_node_child(tree, node, 0);
+            } else {
+                job->choices[fct_node_first(tree, node)] =
+                    (choice){.node = node, .units = (uint32_t)(bytes / FCT_REF_UNIT)};
+            }
+        }
+    }
+}
 
 typedef struct pack_job {
     fct_bvh *bvh;
@@ -106,33 +131,54 @@ static void pack_leaves(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
+/* Makes the list of the chosen leaves. *units receives the size of all leaves. */
+static void list_leaves(const choice *choices, uint32_t face_count, fct_leaf_list *list, uint64_t *units) {
+    uint32_t found = 0;
+    *units = 0;
+    for (uint32_t p = 0; p < face_count; ++p) {
+        if (choices[p].node == FCT_NONE) continue;
+        list->nodes[found] = choices[p].node;
+        list->offsets[found++] = (uint32_t)*units;
+        *units += choices[p].units;
+    }
+}
+
 fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out) {
     const fct_env *env = bvh->env;
+    const fct_tree_view *view = &bvh->view;
     *out = (fct_leaf_list){0};
     fct_leaf_list list = {0};
+    uint32_t *stack, *candidates;
+    choice *choices;
+    const fct_array scratch[] = {FCT_ARRAY(stack, (size_t)view->depth + view->root_count + 2),
+                                 FCT_ARRAY(candidates, view->face_count),
+                                 FCT_ARRAY(choices, view->face_count)};
+    fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "the leaves of a ray structure");
+    if (result != FCT_OK) return result;
+    for (uint32_t p = 0; p < view->face_count; ++p) choices[p].node = FCT_NONE;
+    choose_job choose = {bvh->tree, candidates, choices};
+    uint32_t candidate_count = list_candidates(bvh->tree, stack, candidates);
+    fct_parallel_for(env, candidate_count, CHOOSE_CHUNK, choose_leaves, &choose);
+    for (uint32_t p = 0; p < view->face_count; ++p) list.count += choices[p].node != FCT_NONE;
+    const fct_array arrays[] = {FCT_ARRAY(list.nodes, list.count), FCT_ARRAY(list.offsets, list.count),
+                                FCT_ARRAY(list.bounds, 6 * (size_t)list.count)};
+    result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the leaves of a ray structure");
+    if (result != FCT_OK) goto done;
     uint64_t units;
-    fct_result result = FCT_ERROR_MEMORY;
-    uint32_t *stack = fct_allocate(env, (size_t)bvh->view.depth + bvh->view.root_count + 2, sizeof *stack);
-    if (!stack) return fct_fail_memory(env, "the leaves of a ray structure");
-    choose_leaves(bvh->tree, stack, &list, &units);
-    list.nodes = fct_allocate(env, list.count, sizeof *list.nodes);
-    list.offsets = fct_allocate(env, list.count, sizeof *list.offsets);
-    list.bounds = fct_allocate(env, list.count, 6 * sizeof *list.bounds);
+    list_leaves(choices, view->face_count, &list, &units);
     bvh->leaves = units < FCT_REF_LEAF ? fct_allocate(env, (size_t)units, FCT_REF_UNIT) : NULL;
-    if (list.nodes && list.offsets && list.bounds && bvh->leaves) {
-        choose_leaves(bvh->tree, stack, &list, &units);
+    if (bvh->leaves) {
         bvh->leaf_bytes = (size_t)units * FCT_REF_UNIT;
-        pack_job job = {bvh, &list};
-        fct_parallel_for(env, list.count, PACK_CHUNK, pack_leaves, &job);
-        result = FCT_OK;
-    }
-    fct_release(env, stack);
-    if (result == FCT_OK) {
+        pack_job pack = {bvh, &list};
+        fct_parallel_for(env, list.count, PACK_CHUNK, pack_leaves, &pack);
         *out = list;
-        return FCT_OK;
+    } else {
+        fct_leaf_list_release(env, &list);
+        result = fct_fail_memory(env, "the leaves of a ray structure");
     }
-    fct_leaf_list_release(env, &list);
-    return fct_fail_memory(env, "the leaves of a ray structure");
+done:
+    fct_release_all(env, scratch, FCT_LENGTH(scratch));
+    return result;
 }
 
 void fct_leaf_list_release(const fct_env *env, fct_leaf_list *list) {

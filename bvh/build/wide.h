@@ -2,13 +2,8 @@
 #ifndef FCT_BVH_WIDE_H
 #define FCT_BVH_WIDE_H
 
+#include "bvh/build/collapse.h"
 #include "bvh/build/slabs.h"
-
-typedef struct fct_wide_node {
-    uint32_t top[8]; /* `count` nodes of the binary top */
-    uint32_t count;
-    uint32_t parent, slot; /* this node is child `slot` of node `parent` */
-} fct_wide_node;
 
 typedef struct fct_wide_list {
     uint32_t count;       /* 0 if the model is one leaf */

@@ -1,6 +1,8 @@
-/* bvh/near/closest.c: the public queries for the closest point, single and in batches. */
+/* bvh/near/closest.c: the public queries for the closest point, single and in batches, and for the k nearest
+ * faces. */
 #include "base/parallel.h"
 #include "bvh/near/nearest.h"
+#include "bvh/near/several.h"
 
 bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], float max_distance, fct_closest *out,
                            fct_visits *visits) {
@@ -38,4 +40,12 @@ void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const float *point
                             fct_closest *out) {
     point_batch batch = {.bvh = bvh, .points = points, .max_distance = max_distance, .out = out};
     fct_parallel_for(bvh->env, count, CHUNK, find_closest_points, &batch);
+}
+
+uint32_t fct_bvh_nearest(const fct_bvh *bvh, const float point[3], uint32_t k, float max_distance,
+                         fct_closest *out, fct_visits *visits) {
+    v3 p = v3_load(point);
+    if (bvh->embree || k == 0 || !(fabs(p.x) + fabs(p.y) + fabs(p.z) < INFINITY) || !(max_distance >= 0))
+        return 0;
+    return fct_several_search(bvh, p, k, (double)max_distance, out, visits);
 }

@@ -1,70 +1,56 @@
 /* bvh/near/nearest.c: the nearest point of the surface. A kernel file.
  *
- * The search opens the nearest box first. It prunes boxes and triangles in float, with a margin, and measures
- * the remaining triangles in double, so the answer is exact up to double rounding. Equal distances: the lower
- * face id.
+ * 1. The search opens the nearest box first. It bounds the distances of eight triangles at a time in float
+ *    (measure.h), and the upper bounds shrink the search at once.
+ * 2. Triangles whose lower bound is within reach wait in a short list.
+ * 3. At the end, the triangles of the list that are still within reach are measured in double. On most
+ *    searches these are one or two, so the answer is exact up to double rounding at the price of float.
+ *    Equal distances: the lower face id.
  */
 #include "bvh/near/nearest.h"
 
-#include "base/key.h"
-#include "base/math/round.h"
 #include "base/math/simd.h"
+#include "bvh/near/descend.h"
 #include "bvh/near/triangle.h"
+
+/* Triangles that wait for their measurement in double. Most searches keep fewer than ten. */
+enum { WAITING_MAX = 32 };
+
+typedef struct waiting_triangle {
+    float lower2; /* square of the lower bound of its distance */
+    uint32_t number;
+    const fct_leaf *leaf;
+} waiting_triangle;
 
 typedef struct search {
     const fct_bvh *bvh;
-    v3 point;        /* scaled */
-    float at[3];     /* the point in float, clamped to 10^9 around the centre */
-    double rounding; /* at least the distance between `at` and the clamped point */
-    double best2;    /* squared distance of the best face, or of the maximum distance */
-    float limit2;    /* a box farther than this from `at`, squared, has no better face */
+    v3 point; /* scaled */
+    fct_at at;
+    double bound; /* the distance of the answer is at most this, or there is no answer */
+    float reach2; /* a triangle whose lower bound, squared, is greater is not the answer */
+    float limit2; /* a box farther than this, squared, has no better face */
+    double best2; /* squared distance of the best face, or of the maximum distance */
     double u, v;
     uint32_t place;
+    const fct_leaf *leaf; /* that holds the place */
     fct_visits visits;
     /* If `normal` is set, best2 stays the maximum distance, and faces compete by their cosine to it. */
     const v3 *normal;
     double agreement, facing2; /* cosine and squared distance of the best face */
+    uint32_t waiting_count;
+    waiting_triangle waiting[WAITING_MAX];
 } search;
 
-static void set_best_distance(search *s, double best2) {
-    s->best2 = best2;
-    double limit = sqrt(best2) + s->rounding;
-    s->limit2 = (float)fmin(limit * limit * 1.0001 + 1e-30, 3e38);
-    if (best2 == INFINITY) s->limit2 = INFINITY;
-}
-
-static uint32_t measure_axis_boxes(const fct_axis_node *node, const float at[3], float limit2,
-                                   float distance2[8]) {
-    f8 zero = f8_set(0), sum = zero;
-    for (int k = 0; k < 3; ++k) {
-        f8 p = f8_set(at[k]);
-        f8 below = f8_sub(f8_load(node->bounds[k][0]), p), above = f8_sub(p, f8_load(node->bounds[k][1]));
-        f8 d = f8_max(f8_max(below, above), zero);
-        sum = f8_add(sum, f8_mul(d, d));
-    }
-    f8_store(distance2, sum);
-    return f8_le(sum, f8_set(limit2));
-}
-
-/* A row of a map is an axis of the box over its half extent h, so a distance d in mapped units is d h = d /
- * |row|. */
-static uint32_t measure_oriented_boxes(const fct_oriented_node *node, const float centered[3], float limit2,
-                                       float distance2[8]) {
-    f8 zero = f8_set(0), one = f8_set(1), sum = zero;
-    f8 x = f8_set(centered[0]), y = f8_set(centered[1]), z = f8_set(centered[2]);
-    for (int k = 0; k < 3; ++k) {
-        f8 mx = f8_load(node->map[k][0]), my = f8_load(node->map[k][1]), mz = f8_load(node->map[k][2]);
-        f8 q = f8_add(f8_add(f8_mul(mx, x), f8_mul(my, y)), f8_add(f8_mul(mz, z), f8_load(node->map[k][3])));
-        f8 d = f8_max(f8_sub(f8_abs(q), one), zero);
-        f8 row2 = f8_add(f8_add(f8_mul(mx, mx), f8_mul(my, my)), f8_mul(mz, mz));
-        sum = f8_add(sum, f8_div(f8_mul(d, d), f8_max(row2, f8_set(1e-30f))));
-    }
-    f8_store(distance2, sum);
-    return f8_le(sum, f8_set(limit2));
+static void set_bound(search *s, double bound) {
+    s->bound = bound;
+    s->limit2 = fct_box_limit2(&s->at, bound);
+    double reach = bound * (1 + 1e-6) + s->at.margin + s->at.rounding;
+    s->reach2 = bound < INFINITY ? (float)fct_min(reach * reach, 3e38) : INFINITY;
 }
 
 /* Takes the face if it is in reach and its normal is closer to the wanted one than that of the best face. */
-static void consider_facing(search *s, const v3 p[3], double d2, double u, double v, uint32_t place) {
+static void consider_facing(search *s, const v3 p[3], double d2, double u, double v, const fct_leaf *leaf,
+                            uint32_t place) {
     if (!(d2 <= s->best2)) return;
     v3 n = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
     double agreement = v3_norm2(n) > 0 ? v3_dot(n, *s->normal) : -2;
@@ -75,7 +61,7 @@ static void consider_facing(search *s, const v3 p[3], double d2, double u, doubl
         if (tie && (d2 > s->facing2 || (d2 == s->facing2 && ids[place] > ids[s->place]))) return;
     }
     s->agreement = agreement, s->facing2 = d2;
-    s->u = u, s->v = v, s->place = place;
+    s->u = u, s->v = v, s->place = place, s->leaf = leaf;
 }
 
 static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
@@ -85,65 +71,80 @@ static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     v3 q = fct_triangle_closest(s->point, p[0], p[1], p[2], &u, &v);
     double d2 = v3_norm2(v3_sub(q, s->point));
     uint32_t place = leaf->first + number;
+    ++s->visits.triangles;
     if (s->normal) {
-        consider_facing(s, p, d2, u, v, place);
+        consider_facing(s, p, d2, u, v, leaf, place);
         return;
     }
     const uint32_t *ids = s->bvh->view.face_ids;
     if (!(d2 < s->best2 || (d2 == s->best2 && (s->place == FCT_NONE || ids[place] < ids[s->place])))) return;
-    s->u = u, s->v = v, s->place = place;
-    set_best_distance(s, d2);
+    s->u = u, s->v = v, s->place = place, s->leaf = leaf, s->best2 = d2;
+    double distance = sqrt(d2);
+    if (distance < s->bound) set_bound(s, distance);
 }
 
-/* Measures the triangles whose axis boxes are near enough. */
+/* Measures the waiting triangles that are within reach, and empties the list. */
+static void measure_waiting(search *s) {
+    for (uint32_t i = 0; i < s->waiting_count; ++i)
+        if (!(s->waiting[i].lower2 > s->reach2))
+            measure_triangle(s, s->waiting[i].leaf, s->waiting[i].number);
+    s->waiting_count = 0;
+}
+
+/* Drops the waiting triangles that are out of reach. If that leaves more than half of the list, it measures
+ * all, so that the list is rarely full. */
+static void make_room(search *s) {
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < s->waiting_count; ++i)
+        if (!(s->waiting[i].lower2 > s->reach2)) s->waiting[kept++] = s->waiting[i];
+    s->waiting_count = kept;
+    if (kept > WAITING_MAX / 2) measure_waiting(s);
+}
+
+/* Takes the upper bounds of triangles whose bit is set. */
+static void shrink_bound(search *s, f8 upper2, uint32_t lanes) {
+    float d2[8], least = s->reach2;
+    lanes &= f8_lt(upper2, f8_set(least));
+    if (!lanes) return;
+    f8_store(d2, upper2);
+    for (; lanes; lanes &= lanes - 1) {
+        float lane2 = d2[__builtin_ctz(lanes)];
+        if (lane2 < least) least = lane2;
+    }
+    double bound = sqrt((double)least) + s->at.margin + s->at.rounding;
+    if (bound < s->bound) set_bound(s, bound);
+}
+
+/* Bounds the distances of the triangles of a leaf; those within reach join the waiting list. */
 static void search_leaf(search *s, const fct_leaf *leaf) {
-    const float *rows = fct_leaf_vertices(leaf);
+    fct_near_vertices vertices;
+    fct_near_vertices_load(leaf, &s->at, &vertices);
     const uint8_t *corners = fct_leaf_corners(leaf);
-    uint32_t stride = 8u * leaf->vertex_octets, second = leaf->vertex_octets == 2 ? 8 : 0;
-    f8 zero = f8_set(0);
     for (uint32_t first = 0; first < leaf->count; first += 8, corners += 24) {
-        i8 a = i8_load_bytes(corners), b = i8_load_bytes(corners + 8), c = i8_load_bytes(corners + 16);
-        f8 sum = zero;
-        for (uint32_t k = 0; k < 3; ++k) {
-            f8 p = f8_set(s->at[k]);
-            f8 low = f8_sub(f8_load(rows + k * stride), p),
-               high = f8_sub(f8_load(rows + k * stride + second), p);
-            f8 x = f8_lookup16(low, high, a), y = f8_lookup16(low, high, b), z = f8_lookup16(low, high, c);
-            f8 below = f8_min(x, f8_min(y, z)), above = f8_sub(zero, f8_max(x, f8_max(y, z)));
-            f8 d = f8_max(f8_max(below, above), zero);
-            sum = f8_add(sum, f8_mul(d, d));
-        }
-        float distance2[8];
-        f8_store(distance2, sum);
-        uint32_t left = leaf->count - first, open = f8_le(sum, f8_set(s->limit2));
-        if (left < 8) open &= (1u << left) - 1;
-        for (; open; open &= open - 1) {
-            uint32_t i = (uint32_t)__builtin_ctz(open);
-            if (distance2[i] > s->limit2) continue;
-            measure_triangle(s, leaf, first + i);
-            ++s->visits.triangles;
+        fct_eight_near near = fct_measure_triangles(&vertices, leaf->vertex_octets, corners);
+        uint32_t left = leaf->count - first, lanes = left < 8 ? (1u << left) - 1 : 0xffu;
+        if (!s->normal) shrink_bound(s, near.upper2, lanes);
+        lanes &= fct_triangles_within(&near, s->reach2);
+        if (!lanes) continue;
+        float upper2[8], plane[8];
+        f8_store(upper2, near.upper2), f8_store(plane, near.plane);
+        for (; lanes; lanes &= lanes - 1) {
+            uint32_t i = (uint32_t)__builtin_ctz(lanes);
+            if (s->waiting_count == WAITING_MAX) make_room(s);
+            float lower2 = plane[i] > 0 ? plane[i] * (plane[i] / upper2[i]) : 0;
+            s->waiting[s->waiting_count++] = (waiting_triangle){lower2, first + i, leaf};
         }
     }
 }
 
-static uint64_t make_entry(float distance2, uint32_t ref) {
-    return (uint64_t)fct_float_bits(distance2) << 32 | ref;
-}
-
-static float entry_distance2(uint64_t entry) {
-    return fct_float_of_bits((uint32_t)(entry >> 32));
-}
-
 static void search_nodes(search *s) {
     const fct_bvh *bvh = s->bvh;
-    float centered[3];
-    for (int k = 0; k < 3; ++k) centered[k] = s->at[k] - bvh->center[k];
     uint64_t stack[FCT_STACK_SIZE];
     uint32_t height = 1;
-    stack[0] = make_entry(0, bvh->root);
+    stack[0] = bvh->root;
     while (height) {
         uint64_t entry = stack[--height];
-        if (entry_distance2(entry) > s->limit2) continue;
+        if (fct_entry_distance2(entry) > s->limit2) continue;
         uint32_t ref = (uint32_t)entry;
         if (ref & FCT_REF_LEAF) {
             search_leaf(s, fct_bvh_leaf(bvh, ref));
@@ -151,59 +152,36 @@ static void search_nodes(search *s) {
         }
         float distance2[8];
         const uint32_t *child;
-        uint32_t met, base = height;
+        uint32_t met = fct_measure_children(bvh, ref, &s->at, s->limit2, distance2, &child);
         ++s->visits.nodes;
         s->visits.boxes += 8;
-        if (ref & FCT_REF_ORIENTED) {
-            const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = measure_oriented_boxes(node, centered, s->limit2, distance2) & node->present;
-            child = node->child;
-        } else {
-            const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = measure_axis_boxes(node, s->at, s->limit2, distance2) & node->present;
-            child = node->child;
-        }
-        for (; met; met &= met - 1) {
-            uint32_t i = (uint32_t)__builtin_ctz(met);
-            uint64_t waiting = make_entry(distance2[i], child[i]);
-            uint32_t at = height++;
-            while (at > base && stack[at - 1] < waiting) stack[at] = stack[at - 1], --at;
-            stack[at] = waiting;
-        }
+        height = fct_push_children(bvh, stack, height, met, distance2, child);
     }
+    measure_waiting(s);
 }
 
-/* Sets `at` and `rounding`. Clamping the point to a large cube around the model moves it nearer to everything
- * in the model, so box distances from the clamped point are lower bounds of those from the point. */
-static void round_point(search *s) {
-    double p[3] = {s->point.x, s->point.y, s->point.z};
-    s->rounding = 0;
-    for (int k = 0; k < 3; ++k) {
-        double c = (double)s->bvh->center[k], clamped = fmin(fmax(p[k], c - 1e9), c + 1e9);
-        double rounded = fct_round(clamped);
-        s->at[k] = (float)rounded;
-        s->rounding += fabs(rounded - clamped);
-    }
-}
-
+/* The corners come from the leaf, which is in the cache: unscaling them is exact. */
 static void report_face(const search *s, double distance2, fct_near *out) {
-    const fct_tree_view *view = &s->bvh->view;
-    const uint32_t *t = view->triangles + 3 * (size_t)s->place;
-    v3 a = v3_load(view->positions + 3 * (size_t)t[0]), b = v3_load(view->positions + 3 * (size_t)t[1]),
-       c = v3_load(view->positions + 3 * (size_t)t[2]);
+    v3 p[3];
     double scale = s->bvh->scale;
+    fct_leaf_triangle(s->leaf, s->place - s->leaf->first, p);
     *out = (fct_near){.distance2 = distance2 / scale / scale, .u = s->u, .v = s->v, .place = s->place};
-    out->point = v3_add(v3_scale(a, 1 - s->u - s->v), v3_add(v3_scale(b, s->u), v3_scale(c, s->v)));
+    v3 scaled = v3_add(v3_scale(p[0], 1 - s->u - s->v), v3_add(v3_scale(p[1], s->u), v3_scale(p[2], s->v)));
+    out->point = v3_scale(v3_add(scaled, v3_load(s->bvh->offset)), 1 / scale);
 }
 
 bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
                         fct_visits *visits) {
-    search s = {.bvh = bvh, .point = fct_bvh_to_scaled(bvh, point), .place = FCT_NONE, .normal = normal};
     double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
     if (bvh->embree || !(size < INFINITY) || !(max_distance >= 0)) return false;
-    round_point(&s);
+    search s;
+    s.bvh = bvh, s.point = fct_bvh_to_scaled(bvh, point), s.normal = normal;
+    s.at = fct_at_make(bvh, s.point);
+    s.place = FCT_NONE, s.waiting_count = 0;
+    s.visits = (fct_visits){0, 0, 0};
     double reach = max_distance * bvh->scale;
-    set_best_distance(&s, reach * reach);
+    s.best2 = reach * reach;
+    set_bound(&s, sqrt(s.best2));
     search_nodes(&s);
     fct_visits_add(visits, &s.visits);
     if (s.place == FCT_NONE) return false;

@@ -18,6 +18,8 @@ typedef struct fct_near {
  * the result is the face whose normal has the largest cosine to it; equal cosines: the nearest; equal
  * distances: the lower face id. A face without area ranks last.
  *
+ * Visits count the triangles that are measured in double.
+ *
  * Returns false if no face is that near, if the point or max_distance is not a number, or for the Embree
  * backend, and then leaves *out unchanged. visits may be NULL. */
 #define fct_nearest_search FCT_KERNEL(fct_nearest_search)

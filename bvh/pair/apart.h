@@ -19,6 +19,8 @@
 
 #define DISTANCE_ERROR 0x1p-10f
 #define FACE_SINE2     0x1p-22f
+/* Four times a squared area, scaled. A face with less is smaller than the error, and floats would vanish. */
+#define LEAST_FACE 1e-30f
 
 #define W3_LANES f8
 #include "base/math/w3.h"
@@ -68,8 +70,8 @@ static inline f8 edge_distance2(const lane_triangles *a, int i, const lane_trian
 /* The smaller of `least` and the squared distances of the corners of `from` above the inside of `face`. */
 static inline f8 face_distance2(const lane_triangles *face, const lane_triangles *from, f8 least) {
     w3 n = w3_cross(face->edge[0], face->edge[1]);
-    f8 n2 = w3_dot(n, n),
-       good = f8_sub(n2, f8_mul(f8_mul(face->edge2[0], face->edge2[1]), f8_set(FACE_SINE2)));
+    f8 least_n2 = f8_mul(f8_mul(face->edge2[0], face->edge2[1]), f8_set(FACE_SINE2));
+    f8 n2 = w3_dot(n, n), good = f8_sub(n2, f8_max(least_n2, f8_set(LEAST_FACE)));
     w3 in[3];
     for (int i = 0; i < 3; ++i) in[i] = w3_cross(n, face->edge[i]);
     f8 over_n2 = f8_div(f8_set(1), f8_max(n2, f8_set(1e-37f)));

@@ -8,7 +8,8 @@
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
-#include "bvh/pair/map.h"
+#include "bvh/model.h"
+#include "bvh/pair/pose.h"
 
 enum { PAIR_CHUNK = 8 /* pairs per task */ };
 
@@ -22,11 +23,6 @@ typedef struct touch_job {
     fct_body_pair *candidates;
 } touch_job;
 
-static double determinant(const double m[3][3]) {
-    v3 a = {m[0][0], m[0][1], m[0][2]}, b = {m[1][0], m[1][1], m[1][2]}, c = {m[2][0], m[2][1], m[2][2]};
-    return v3_dot(a, v3_cross(b, c));
-}
-
 static fct_result check_bodies(const fct_env *env, uint32_t count, const fct_body *bodies) {
     for (uint32_t i = 0; i < count; ++i) {
         double sum = 0, size = 0;
@@ -37,7 +33,7 @@ static fct_result check_bodies(const fct_env *env, uint32_t count, const fct_bod
         if (!bodies[i].bvh->pairs) return fct_fail(env, FCT_ERROR_DATA, "body %u has no FCT_BVH_PAIRS", i);
         if (!(sum + size < INFINITY))
             return fct_fail(env, FCT_ERROR_DATA, "the pose of body %u is not finite", i);
-        if (!(fabs(determinant(bodies[i].pose.rotation)) > 1e-12 * size * size * size))
+        if (!(fabs(fct_determinant(bodies[i].pose.rotation)) > 1e-12 * size * size * size))
             return fct_fail(env, FCT_ERROR_DATA, "the rotation of body %u has no inverse", i);
     }
     return FCT_OK;
@@ -119,34 +115,13 @@ static fct_result run_broad_phase(const fct_env *env, uint32_t count, touch_job 
     return result;
 }
 
-/* The pose of b in the coordinates of a. */
-static fct_pose relate_poses(const fct_pose *a, const fct_pose *b) {
-    const double(*m)[3] = a->rotation;
-    double det = determinant(m), inverse[3][3];
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-            inverse[i][j] = (m[r][c] * m[s][d] - m[r][d] * m[s][c]) / det;
-        }
-    fct_pose out;
-    for (int i = 0; i < 3; ++i) {
-        out.translation[i] = 0;
-        for (int j = 0; j < 3; ++j) {
-            out.translation[i] += inverse[i][j] * (b->translation[j] - a->translation[j]);
-            out.rotation[i][j] = 0;
-            for (int k = 0; k < 3; ++k) out.rotation[i][j] += inverse[i][k] * b->rotation[k][j];
-        }
-    }
-    return out;
-}
-
 static void test_candidates(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const touch_job *job = user;
     for (size_t i = begin; i < end; ++i) {
         fct_body_pair *pair = &job->candidates[i];
         const fct_body *a = &job->bodies[pair->body_a], *b = &job->bodies[pair->body_b];
-        fct_pose pose = relate_poses(&a->pose, &b->pose);
+        fct_pose pose = fct_pose_relate(&a->pose, &b->pose);
         pair->faces = fct_face_pair_none();
         fct_bvh_overlap(a->bvh, b->bvh, &pose, &pair->faces, NULL);
     }

@@ -1,6 +1,8 @@
 /* bvh/pair/map.c: see map.h. */
 #include "bvh/pair/map.h"
 
+#include "bvh/pair/pose.h"
+
 /* Errors of float arithmetic on a placed box, in units of u = 2^-24 of the lengths that meet: its centre, its
  * half extents and the other model's extent. The separation along an edge direction has the longest chain: a
  * dot product (4 u), twice a product with a rotation that errs by 4 u, and the sum of four radii (6 u each).
@@ -11,12 +13,6 @@
 
 fct_pose fct_pose_identity(void) {
     return (fct_pose){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-}
-
-static v3 multiply(const double m[3][3], v3 p) {
-    return v3_make(m[0][0] * p.x + m[0][1] * p.y + m[0][2] * p.z,
-                   m[1][0] * p.x + m[1][1] * p.y + m[1][2] * p.z,
-                   m[2][0] * p.x + m[2][1] * p.y + m[2][2] * p.z);
 }
 
 /* The centre of a model, unscaled. */
@@ -54,7 +50,7 @@ static void invert_map(const fct_space_map *other, fct_space_map *out) {
         .factor = 1 / other->factor, .skew = other->skew, .blur = other->blur / other->factor};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) out->turn[i][j] = other->turn[j][i];
-    v3 shift = multiply(out->turn, v3_make(other->shift[0], other->shift[1], other->shift[2]));
+    v3 shift = fct_rotate(out->turn, v3_make(other->shift[0], other->shift[1], other->shift[2]));
     shift = v3_scale(shift, -out->factor);
     out->shift[0] = shift.x, out->shift[1] = shift.y, out->shift[2] = shift.z;
 }
@@ -70,7 +66,7 @@ bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, 
     pose = &out->pose;
     double factor;
     if (!split_rotation(pose, &factor, &out->to_a)) return false;
-    v3 moved = multiply(pose->rotation, find_center(b));
+    v3 moved = fct_rotate(pose->rotation, find_center(b));
     v3 translation = v3_make(pose->translation[0], pose->translation[1], pose->translation[2]);
     v3 center = find_center(a), shift = v3_scale(v3_sub(v3_add(moved, translation), center), a->scale);
     double far = (sum_sizes(moved) + sum_sizes(translation) + sum_sizes(center)) * a->scale;
@@ -92,10 +88,9 @@ void fct_pair_triangle_a(const fct_pair_map *map, uint32_t place, v3 p[3]) {
 
 void fct_pair_triangle_b(const fct_pair_map *map, uint32_t place, v3 p[3]) {
     const fct_tree_view *view = &map->b->view;
-    const double *t = map->pose.translation;
     for (int c = 0; c < 3; ++c) {
         v3 q = v3_load(view->positions + 3 * (size_t)view->triangles[3 * (size_t)place + (size_t)c]);
-        p[c] = v3_add(multiply(map->pose.rotation, q), v3_make(t[0], t[1], t[2]));
+        p[c] = fct_pose_apply(&map->pose, q);
     }
 }
 
@@ -111,7 +106,7 @@ void fct_place_box(const fct_space_map *map, const fct_bvh *from, uint32_t box, 
     if (out->box == box) return;
     const fct_pair_node *node = &from->pairs[box >> 3];
     uint32_t slot = box & 7;
-    v3 at = v3_scale(multiply(map->turn, box_center(node, slot)), map->factor);
+    v3 at = v3_scale(fct_rotate(map->turn, box_center(node, slot)), map->factor);
     at = v3_add(at, v3_make(map->shift[0], map->shift[1], map->shift[2]));
     out->box = box;
     out->exact_center[0] = at.x, out->exact_center[1] = at.y, out->exact_center[2] = at.z;
@@ -144,7 +139,7 @@ void fct_leaf_maps_set(const fct_pair_map *map, uint32_t box_a, uint32_t box_b, 
     v3 center = box_center(na, sa);
     v3 from_a = v3_sub(set_from(map->a, center, &out->of_a), center);
     v3 from_b = set_from(map->b, box_center(nb, sb), &out->of_b);
-    from_b = v3_scale(multiply(to_a->turn, from_b), to_a->factor);
+    from_b = v3_scale(fct_rotate(to_a->turn, from_b), to_a->factor);
     from_b = v3_sub(v3_add(from_b, v3_make(to_a->shift[0], to_a->shift[1], to_a->shift[2])), center);
     double size = 0;
     for (int r = 0; r < 3; ++r) {

@@ -6,7 +6,8 @@
  * fifth too large is enough.
  */
 #include "base/math/elementary.h"
-#include "bvh/pair/map.h"
+#include "bvh/model.h"
+#include "bvh/pair/pose.h"
 
 /* Of far distances. */
 #define FAR_RELATIVE .2
@@ -19,12 +20,6 @@ typedef struct turn {
     double angle;
 } turn;
 
-static v3 apply_rotation(const double m[3][3], v3 p) {
-    return v3_make(m[0][0] * p.x + m[0][1] * p.y + m[0][2] * p.z,
-                   m[1][0] * p.x + m[1][1] * p.y + m[1][2] * p.z,
-                   m[2][0] * p.x + m[2][1] * p.y + m[2][2] * p.z);
-}
-
 static bool is_rotation(const fct_pose *pose) {
     const double(*m)[3] = pose->rotation;
     for (int i = 0; i < 3; ++i) {
@@ -35,8 +30,7 @@ static bool is_rotation(const fct_pose *pose) {
             if (!(fabs(dot) < 1e-6)) return false;
         }
     }
-    v3 x = {m[0][0], m[1][0], m[2][0]}, y = {m[0][1], m[1][1], m[2][1]}, z = {m[0][2], m[1][2], m[2][2]};
-    return v3_dot(v3_cross(x, y), z) > 0;
+    return fct_determinant(m) > 0;
 }
 
 /* The quaternion w x y z of a rotation: the largest of four candidates, so that nothing cancels (Shepperd
@@ -74,17 +68,12 @@ static v3 bounds_center(const fct_bvh *b) {
     return v3_scale(v3_add(lower, upper), .5);
 }
 
-static v3 apply_pose(const fct_pose *pose, v3 p) {
-    v3 t = {pose->translation[0], pose->translation[1], pose->translation[2]};
-    return v3_add(apply_rotation(pose->rotation, p), t);
-}
-
 /* out = (the turn by `share` of its angle) m */
 static void apply_turn(const turn *t, double share, const double m[3][3], double out[3][3]) {
     double sine, cosine;
     fct_sine_cosine(share * t->angle, &sine, &cosine);
     for (int j = 0; j < 3; ++j) {
-        v3 p = {m[0][j], m[1][j], m[2][j]}, along = v3_scale(t->axis, (1 - cosine) * v3_dot(t->axis, p));
+        v3 p = fct_matrix_column(m, j), along = v3_scale(t->axis, (1 - cosine) * v3_dot(t->axis, p));
         p = v3_add(v3_mad(v3_scale(p, cosine), sine, v3_cross(t->axis, p)), along);
         out[0][j] = p.x, out[1][j] = p.y, out[2][j] = p.z;
     }
@@ -95,9 +84,9 @@ static fct_pose pose_at(const fct_motion *motion, const turn *t, v3 center, doub
     if (time >= 1) return motion->to;
     fct_pose pose;
     apply_turn(t, time, motion->from.rotation, pose.rotation);
-    v3 from = apply_pose(&motion->from, center), to = apply_pose(&motion->to, center);
+    v3 from = fct_pose_apply(&motion->from, center), to = fct_pose_apply(&motion->to, center);
     v3 at = v3_mad(from, time, v3_sub(to, from));
-    at = v3_sub(at, apply_rotation(pose.rotation, center));
+    at = v3_sub(at, fct_rotate(pose.rotation, center));
     pose.translation[0] = at.x, pose.translation[1] = at.y, pose.translation[2] = at.z;
     return pose;
 }
@@ -113,7 +102,7 @@ bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion 
     turn t = find_turn(motion->from.rotation, motion->to.rotation);
     v3 center = bounds_center(b);
     double radius = v3_norm(v3_sub(v3_load(b->bounds.upper), center));
-    v3 way = v3_sub(apply_pose(&motion->to, center), apply_pose(&motion->from, center));
+    v3 way = v3_sub(fct_pose_apply(&motion->to, center), fct_pose_apply(&motion->from, center));
     double speed = v3_norm(way) + t.angle * radius, time = 0;
     tolerance = fct_max(tolerance, LEAST_TOLERANCE * speed);
     fct_distance_def def = fct_distance_def_default();

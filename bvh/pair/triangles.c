@@ -128,7 +128,7 @@ static double find_height(const v3 t[3], v3 p) {
 /* The point where the segment p q, with ends at the heights hp and hq on different sides, crosses the plane.
  */
 static v3 cross_plane(v3 p, v3 q, double hp, double hq) {
-    double sum = fabs(hp) + fabs(hq);
+    double sum = fabs(hp) + fabs(hq); /* 0 if both heights vanish as doubles */
     return v3_mad(p, sum > 0 ? fabs(hp) / sum : .5, v3_sub(q, p));
 }
 
@@ -141,7 +141,8 @@ static void add_clipped_segment(shared_points *s, int axis, v3 p, v3 q, const v3
         v3 from = t[i], to = t[(i + 1) % 3], out = v3_cross(v3_sub(to, from), n);
         if (!segments_cross(axis, p, q, from, to)) continue;
         double hp = v3_dot(out, v3_sub(p, from)), hq = v3_dot(out, v3_sub(q, from));
-        if (hp * hq <= 0) add_point(s, cross_plane(p, q, hp, hq));
+        /* Of segments on one line, the ends are among the points. */
+        if (hp != 0 || hq != 0) add_point(s, cross_plane(p, q, hp, hq));
     }
 }
 
@@ -229,10 +230,33 @@ static void approach_segments(v3 p, v3 u, v3 q, v3 v, double *s, double *t) {
     }
 }
 
-double fct_triangles_distance(const v3 a[3], const v3 b[3], v3 *pa, v3 *pb) {
+/* Whether an edge of t, which has no area, crosses the inside of the triangle; *at receives the point. */
+static bool needle_pierces(const v3 t[3], const v3 other[3], v3 *at) {
+    int side[3];
+    if (find_sides(other, t, side)) return false;
+    for (int i = 0; i < 3; ++i) {
+        int j = (i + 1) % 3;
+        if (side[i] * side[j] >= 0 || !passes_through(t[i], t[j], other)) continue;
+        *at = cross_plane(t[i], t[j], find_height(other, t[i]), find_height(other, t[j]));
+        return true;
+    }
+    return false;
+}
+
+static bool find_common_point(const v3 a[3], const v3 b[3], v3 *at) {
+    int side[3];
     fct_contact contact;
-    if (fct_triangles_contact(a, b, &contact)) {
-        *pa = *pb = v3_make(contact.from[0], contact.from[1], contact.from[2]);
+    if (find_sides(a, b, side) || find_sides(b, a, side)) return false;
+    bool flat_a = find_axis(a) < 0, flat_b = find_axis(b) < 0;
+    if (flat_a || flat_b) return (flat_a && needle_pierces(a, b, at)) || (flat_b && needle_pierces(b, a, at));
+    if (!fct_triangles_contact(a, b, &contact)) return false;
+    *at = v3_make(contact.from[0], contact.from[1], contact.from[2]);
+    return true;
+}
+
+double fct_triangles_distance(const v3 a[3], const v3 b[3], v3 *pa, v3 *pb) {
+    if (find_common_point(a, b, pa)) {
+        *pb = *pa;
         return 0;
     }
     double best = INFINITY;

@@ -9,8 +9,8 @@ enum { CLOSEST_CHUNK = 1024, WORD_CHUNK = 1024 / 64 };
 /* The scaled normal in the model's unit. If a float would overflow or vanish, the result is another positive
  * multiple of it. */
 static void unscale_normal(const fct_bvh *bvh, v3 n, float out[3]) {
-    double unit = 1 / bvh->scale, largest = fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) * unit * unit;
-    double factor = unit * unit;
+    double unit = 1 / bvh->scale, factor = unit * unit, x = fabs(n.x), y = fabs(n.y), z = fabs(n.z);
+    double largest = (x > y ? (x > z ? x : z) : y > z ? y : z) * factor;
     if (largest > 0x1p126 || (largest > 0 && largest < 0x1p-100)) factor *= ldexp(1, -ilogb(largest));
     v3_store(out, v3_scale(n, factor));
 }

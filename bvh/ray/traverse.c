@@ -19,36 +19,53 @@ typedef struct traversal {
     fct_raw_hit hit;      /* the closest so far; hit.t is ray->t_max before the first */
     const fct_leaf *leaf; /* of the hit */
     uint32_t number;      /* of the hit triangle in its leaf */
+    double weight[3];     /* of the hit: those of corners 1 and 2, and the sum of all three */
     fct_visits visits;
 } traversal;
 
+/* The ray's coordinates, each in eight lanes. */
+typedef struct wide_ray {
+    f8 origin[3], inverse[3];
+    f8 centered[3], direction[3]; /* the origin relative to the model's centre */
+    uint32_t entry[3];            /* per axis, where the bounds begin at which the ray enters a slab */
+} wide_ray;
+
+static inline wide_ray widen_ray(const fct_bvh *bvh, const fct_prepared_ray *r) {
+    wide_ray w;
+    for (uint32_t k = 0; k < 3; ++k) {
+        w.origin[k] = f8_set(r->origin[k]), w.inverse[k] = f8_set(r->inverse[k]);
+        w.centered[k] = f8_set(r->origin[k] - bvh->center[k]), w.direction[k] = f8_set(r->direction[k]);
+        w.entry[k] = 16 * k + 8 * r->side[k];
+    }
+    return w;
+}
+
 /* Tests eight axis boxes. Returns a mask of the boxes that the ray meets within [t_min, t_max]; enter[i] is
  * the entry distance of box i. */
-static inline uint32_t meet_axis_boxes(const fct_axis_node *node, const fct_prepared_ray *r, float t_max,
+static inline uint32_t meet_axis_boxes(const fct_axis_node *node, const wide_ray *r, float t_min, float t_max,
                                        float enter[8]) {
-    f8 first = f8_set(r->t_min), last = f8_set(t_max);
+    f8 first = f8_set(t_min), last = f8_set(t_max);
+    const float *bounds = node->bounds[0][0];
     for (int k = 0; k < 3; ++k) {
-        f8 origin = f8_set(r->origin[k]), inverse = f8_set(r->inverse[k]);
-        f8 a = f8_mul(f8_sub(f8_load(node->bounds[k][r->side[k]]), origin), inverse);
-        f8 b = f8_mul(f8_sub(f8_load(node->bounds[k][1 - r->side[k]]), origin), inverse);
+        f8 a = f8_mul(f8_sub(f8_load(bounds + r->entry[k]), r->origin[k]), r->inverse[k]);
+        f8 b = f8_mul(f8_sub(f8_load(bounds + (r->entry[k] ^ 8)), r->origin[k]), r->inverse[k]);
         first = f8_max(a, first);
         last = f8_min(b, last);
     }
     f8_store(enter, first);
-    return f8_le(first, last);
+    return f8_le(first, last) & node->present;
 }
 
-/* The same with eight oriented boxes: map i takes box i to [-1, 1]^3. `origin` is relative to the centre. */
-static inline uint32_t meet_oriented_boxes(const fct_oriented_node *node, const fct_prepared_ray *r,
-                                           const float origin[3], float t_max, float enter[8]) {
-    f8 first = f8_set(r->t_min), last = f8_set(t_max);
-    f8 ox = f8_set(origin[0]), oy = f8_set(origin[1]), oz = f8_set(origin[2]);
-    f8 dx = f8_set(r->direction[0]), dy = f8_set(r->direction[1]), dz = f8_set(r->direction[2]);
+/* The same with eight oriented boxes: map i takes box i to [-1, 1]^3. */
+static inline uint32_t meet_oriented_boxes(const fct_oriented_node *node, const wide_ray *r, float t_min,
+                                           float t_max, float enter[8]) {
+    f8 first = f8_set(t_min), last = f8_set(t_max);
     for (int k = 0; k < 3; ++k) {
         f8 mx = f8_load(node->map[k][0]), my = f8_load(node->map[k][1]), mz = f8_load(node->map[k][2]);
-        f8 at =
-            f8_add(f8_add(f8_mul(mx, ox), f8_mul(my, oy)), f8_add(f8_mul(mz, oz), f8_load(node->map[k][3])));
-        f8 go = f8_add(f8_add(f8_mul(mx, dx), f8_mul(my, dy)), f8_mul(mz, dz));
+        f8 at = f8_add(f8_add(f8_mul(mx, r->centered[0]), f8_mul(my, r->centered[1])),
+                       f8_add(f8_mul(mz, r->centered[2]), f8_load(node->map[k][3])));
+        f8 go = f8_add(f8_add(f8_mul(mx, r->direction[0]), f8_mul(my, r->direction[1])),
+                       f8_mul(mz, r->direction[2]));
         /* A component below 1e-18 moves the ray by less than the padding of the box. */
         f8 inverse = f8_div(f8_set(1), f8_copysign(f8_max(f8_abs(go), f8_set(1e-18f)), go));
         f8 middle = f8_sub(f8_set(0), f8_mul(at, inverse)), half = f8_abs(inverse);
@@ -56,28 +73,33 @@ static inline uint32_t meet_oriented_boxes(const fct_oriented_node *node, const 
         last = f8_min(f8_add(middle, half), last);
     }
     f8_store(enter, first);
-    return f8_le(first, last);
+    return f8_le(first, last) & node->present;
 }
 
-/* The vertices of a leaf after translation and shear. A leaf of eight vertices fills both halves with them.
- */
+/* The vertices of a leaf after translation and shear: x, y, z of the first eight, then of the others. */
 typedef struct sheared {
     f8 x[2], y[2], z[2];
 } sheared;
 
-static inline void shear_vertices(const fct_leaf *leaf, const fct_prepared_ray *r, sheared *s) {
+static inline void shear_vertices(const fct_leaf *leaf, const fct_prepared_ray *r, uint32_t octets,
+                                  sheared *s) {
     const float *rows = fct_leaf_vertices(leaf);
-    uint32_t stride = 8u * leaf->vertex_octets;
+    uint32_t stride = 8 * octets;
     f8 ox = f8_set(r->origin[r->axis[0]]), oy = f8_set(r->origin[r->axis[1]]),
        oz = f8_set(r->origin[r->axis[2]]);
     f8 sx = f8_set(r->shear[0]), sy = f8_set(r->shear[1]), sz = f8_set(r->shear[2]);
-    for (uint32_t i = 0; i < 2; ++i) {
-        const float *at = rows + (i && leaf->vertex_octets == 2 ? 8 : 0);
+    for (uint32_t i = 0; i < octets; ++i) {
+        const float *at = rows + 8 * i;
         f8 z = f8_sub(f8_load(at + r->axis[2] * stride), oz);
         s->x[i] = f8_sub(f8_sub(f8_load(at + r->axis[0] * stride), ox), f8_mul(sx, z));
         s->y[i] = f8_sub(f8_sub(f8_load(at + r->axis[1] * stride), oy), f8_mul(sy, z));
         s->z[i] = f8_mul(sz, z);
     }
+}
+
+/* One coordinate of the corners with these indices. */
+static inline f8 pick_corners(const f8 vertices[2], i8 index, uint32_t octets) {
+    return octets == 2 ? f8_lookup16(vertices[0], vertices[1], index) : f8_lookup8(vertices[0], index);
 }
 
 /* Barycentric weights, not normalised, and sheared z of a triangle's corners. */
@@ -125,35 +147,49 @@ static void refine_weights(const fct_leaf *leaf, uint32_t number, const fct_prep
     for (int c = 0; c < 3; ++c) out->w[c] = w[c], out->z[c] = z[c];
 }
 
-static inline float measure_spread(const float x[3]) {
-    float low = x[0] < x[1] ? x[0] : x[1], high = x[0] < x[1] ? x[1] : x[0];
-    low = x[2] < low ? x[2] : low, high = x[2] > high ? x[2] : high;
+static inline float measure_spread(float a, float b, float c) {
+    float low = a < b ? a : b, high = a < b ? b : a;
+    low = c < low ? c : low, high = c > high ? c : high;
     return high - low;
 }
 
-/* Whether the ray sees the triangle almost edge-on, so that a rounding error across the ray moves the hit
- * much farther along the ray. `det` is twice the area that the ray sees. */
-static inline bool is_seen_edge_on(const float x[3], const float y[3], const float z[3], double det) {
-    float dx = measure_spread(x), dy = measure_spread(y), dz = measure_spread(z);
+/* Eight triangles: the sheared corners a, b, c and the edge functions opposite to them. */
+typedef struct octet {
+    float x[3][8], y[3][8], z[3][8], w[3][8];
+} octet;
+
+/* Whether the ray sees triangle i almost edge-on, so that a rounding error across the ray moves the hit much
+ * farther along the ray. `det` is twice the area that the ray sees. */
+static inline bool is_seen_edge_on(const octet *o, uint32_t i, double det) {
+    float dx = measure_spread(o->x[0][i], o->x[1][i], o->x[2][i]);
+    float dy = measure_spread(o->y[0][i], o->y[1][i], o->y[2][i]);
+    float dz = measure_spread(o->z[0][i], o->z[1][i], o->z[2][i]);
     double wide = (double)(dx > dy ? dx : dy), deep = (double)dz;
     return 4 * fabs(det) < wide * (deep > wide ? deep : wide);
 }
 
-/* Tests one triangle that the eight-wide test has not rejected, and records a hit that is nearer, or as near
- * with a lower face id. x, y, z: its sheared corners. */
-static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t number, const float x[3],
-                                 const float y[3], const float z[3]) {
-    float u = x[2] * y[1] - y[2] * x[1], v = x[0] * y[2] - y[0] * x[2], w = x[1] * y[0] - y[1] * x[0];
-    weights s = {{(double)u, (double)v, (double)w}, {(double)z[0], (double)z[1], (double)z[2]}};
-    if (u == 0 || v == 0 || w == 0) {
-        s.w[0] = (double)x[2] * (double)y[1] - (double)y[2] * (double)x[1];
-        s.w[1] = (double)x[0] * (double)y[2] - (double)y[0] * (double)x[2];
-        s.w[2] = (double)x[1] * (double)y[0] - (double)y[1] * (double)x[0];
+/* The edge functions again, in double, where they are exact. */
+static void compute_exact_weights(const octet *o, uint32_t i, double w[3]) {
+    for (int c = 0; c < 3; ++c) {
+        int j = (c + 1) % 3, k = (c + 2) % 3;
+        w[c] = (double)o->x[k][i] * (double)o->y[j][i] - (double)o->y[k][i] * (double)o->x[j][i];
     }
-    if ((s.w[0] < 0 || s.w[1] < 0 || s.w[2] < 0) && (s.w[0] > 0 || s.w[1] > 0 || s.w[2] > 0)) return false;
+}
+
+/* Tests triangle i of an octet, which is triangle `number` of the leaf and which the eight-wide test has not
+ * rejected. Records a hit that is nearer, or as near with a lower face id. */
+static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t number, const octet *o,
+                                 uint32_t i) {
+    weights s;
+    for (int c = 0; c < 3; ++c) s.w[c] = (double)o->w[c][i], s.z[c] = (double)o->z[c][i];
+    if (s.w[0] == 0 || s.w[1] == 0 || s.w[2] == 0) {
+        compute_exact_weights(o, i, s.w);
+        if ((s.w[0] < 0 || s.w[1] < 0 || s.w[2] < 0) && (s.w[0] > 0 || s.w[1] > 0 || s.w[2] > 0))
+            return false;
+    }
     double det = s.w[0] + s.w[1] + s.w[2];
     if (det == 0) return false;
-    if (is_seen_edge_on(x, y, z, det)) {
+    if (is_seen_edge_on(o, i, det)) {
         refine_weights(leaf, number, t->ray, &s);
         det = s.w[0] + s.w[1] + s.w[2];
     }
@@ -162,23 +198,25 @@ static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t nu
     uint32_t place = leaf->first + number;
     const uint32_t *ids = t->bvh->view.face_ids;
     if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
-    t->hit = (fct_raw_hit){.t = at, .u = (float)(s.w[1] / det), .v = (float)(s.w[2] / det), .place = place};
+    __builtin_prefetch(ids + place); /* query.c reads it when the traversal ends */
+    t->hit.t = at, t->hit.place = place;
     t->leaf = leaf, t->number = number;
+    t->weight[0] = s.w[1], t->weight[1] = s.w[2], t->weight[2] = det;
     return true;
 }
 
-/* Tests the triangles of a leaf; returns whether t->hit has changed. With `any`, stops at the first hit. */
-static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
+/* Tests the triangles of a leaf of 8 or 16 vertices; returns whether t->hit has changed. With `any`, stops at
+ * the first hit. */
+static inline bool test_triangles(traversal *t, const fct_leaf *leaf, uint32_t octets, bool any) {
     sheared s;
     bool found = false;
-    shear_vertices(leaf, t->ray, &s);
+    shear_vertices(leaf, t->ray, octets, &s);
     const uint8_t *corners = fct_leaf_corners(leaf);
-    t->visits.triangles += leaf->count;
     for (uint32_t first = 0; first < leaf->count; first += 8, corners += 24) {
         i8 a = i8_load_bytes(corners), b = i8_load_bytes(corners + 8), c = i8_load_bytes(corners + 16);
-        f8 ax = f8_lookup16(s.x[0], s.x[1], a), ay = f8_lookup16(s.y[0], s.y[1], a);
-        f8 bx = f8_lookup16(s.x[0], s.x[1], b), by = f8_lookup16(s.y[0], s.y[1], b);
-        f8 cx = f8_lookup16(s.x[0], s.x[1], c), cy = f8_lookup16(s.y[0], s.y[1], c);
+        f8 ax = pick_corners(s.x, a, octets), ay = pick_corners(s.y, a, octets);
+        f8 bx = pick_corners(s.x, b, octets), by = pick_corners(s.y, b, octets);
+        f8 cx = pick_corners(s.x, c, octets), cy = pick_corners(s.y, c, octets);
         f8 u = f8_sub(f8_mul(cx, by), f8_mul(cy, bx));
         f8 v = f8_sub(f8_mul(ax, cy), f8_mul(ay, cx));
         f8 w = f8_sub(f8_mul(bx, ay), f8_mul(by, ax));
@@ -186,22 +224,26 @@ static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
         uint32_t mixed = f8_lt(f8_min(u, f8_min(v, w)), zero) & f8_lt(zero, f8_max(u, f8_max(v, w)));
         uint32_t open = ((uint32_t)leaf->mask >> first) & 0xffu & ~mixed;
         if (!open) continue;
-        float x[3][8], y[3][8], z[3][8];
-        f8_store(x[0], ax), f8_store(x[1], bx), f8_store(x[2], cx);
-        f8_store(y[0], ay), f8_store(y[1], by), f8_store(y[2], cy);
-        f8_store(z[0], f8_lookup16(s.z[0], s.z[1], a));
-        f8_store(z[1], f8_lookup16(s.z[0], s.z[1], b));
-        f8_store(z[2], f8_lookup16(s.z[0], s.z[1], c));
+        octet o;
+        f8_store(o.x[0], ax), f8_store(o.x[1], bx), f8_store(o.x[2], cx);
+        f8_store(o.y[0], ay), f8_store(o.y[1], by), f8_store(o.y[2], cy);
+        f8_store(o.z[0], pick_corners(s.z, a, octets));
+        f8_store(o.z[1], pick_corners(s.z, b, octets));
+        f8_store(o.z[2], pick_corners(s.z, c, octets));
+        f8_store(o.w[0], u), f8_store(o.w[1], v), f8_store(o.w[2], w);
         for (; open; open &= open - 1) {
             uint32_t i = (uint32_t)__builtin_ctz(open);
-            float tx[3] = {x[0][i], x[1][i], x[2][i]}, ty[3] = {y[0][i], y[1][i], y[2][i]},
-                  tz[3] = {z[0][i], z[1][i], z[2][i]};
-            if (!test_triangle(t, leaf, first + i, tx, ty, tz)) continue;
+            if (!test_triangle(t, leaf, first + i, &o, i)) continue;
             found = true;
             if (any) return true;
         }
     }
     return found;
+}
+
+static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
+    t->visits.triangles += leaf->count;
+    return leaf->vertex_octets == 2 ? test_triangles(t, leaf, 2, any) : test_triangles(t, leaf, 1, any);
 }
 
 /* A pending child: the bits of the entry distance, then the reference. The distance is not negative, so the
@@ -223,58 +265,66 @@ static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
     __builtin_prefetch(at + 192);
 }
 
-/* Pushes the children in the mask, the nearest on top, and returns the new height of the stack. */
-static inline uint32_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t height, uint32_t met,
+/* Pushes all children in the mask but the nearest, sorted, and returns the nearest. The mask is not empty.
+ * Most nodes have one or two such children. */
+static inline uint64_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t *height, uint32_t met,
                                      const float enter[8], const uint32_t child[8]) {
-    uint32_t base = height;
-    for (; met; met &= met - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(met);
+    uint32_t i = (uint32_t)__builtin_ctz(met);
+    uint64_t nearest = make_entry(enter[i], child[i]);
+    prefetch_child(bvh, child[i]);
+    uint32_t base = *height;
+    for (met &= met - 1; met; met &= met - 1) {
+        i = (uint32_t)__builtin_ctz(met);
         uint64_t entry = make_entry(enter[i], child[i]);
         prefetch_child(bvh, child[i]);
-        uint32_t at = height++;
-        while (at > base && stack[at - 1] < entry) stack[at] = stack[at - 1], --at;
-        stack[at] = entry;
+        uint64_t waiting = entry < nearest ? nearest : entry;
+        nearest = entry < nearest ? entry : nearest;
+        uint32_t at = (*height)++;
+        while (at > base && stack[at - 1] < waiting) stack[at] = stack[at - 1], --at;
+        stack[at] = waiting;
     }
-    return height;
+    return nearest;
 }
 
 static inline bool traverse_nodes(traversal *t, bool any) {
     const fct_prepared_ray *r = t->ray;
     const fct_bvh *bvh = t->bvh;
-    float centered[3];
-    for (int k = 0; k < 3; ++k) centered[k] = r->origin[k] - bvh->center[k];
-    uint64_t stack[FCT_STACK_SIZE];
-    uint32_t height = 1;
-    stack[0] = make_entry(r->t_min, bvh->root);
+    wide_ray wide = widen_ray(bvh, r);
+    float t_min = r->t_min;
+    uint64_t stack[FCT_STACK_SIZE], entry = make_entry(t_min, bvh->root);
+    uint32_t height = 0;
     bool found = false;
-    while (height) {
-        uint64_t entry = stack[--height];
-        if (entry_distance(entry) > t->hit.t) continue;
+    for (;;) {
         uint32_t ref = (uint32_t)entry;
         if (ref & FCT_REF_LEAF) {
             if (test_leaf(t, fct_bvh_leaf(bvh, ref), any)) {
                 found = true;
                 if (any) return true;
             }
-            continue;
-        }
-        float enter[8];
-        const uint32_t *child;
-        uint32_t met;
-        ++t->visits.nodes;
-        t->visits.boxes += 8;
-        if (ref & FCT_REF_ORIENTED) {
-            const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-            met = meet_oriented_boxes(node, r, centered, t->hit.t, enter) & node->present;
-            child = node->child;
         } else {
-            const fct_axis_node *node = fct_bvh_node(bvh, ref);
-            met = meet_axis_boxes(node, r, t->hit.t, enter) & node->present;
-            child = node->child;
+            float enter[8];
+            const uint32_t *child;
+            uint32_t met;
+            ++t->visits.nodes;
+            if (ref & FCT_REF_ORIENTED) {
+                const fct_oriented_node *node = fct_bvh_node(bvh, ref);
+                met = meet_oriented_boxes(node, &wide, t_min, t->hit.t, enter);
+                child = node->child;
+            } else {
+                const fct_axis_node *node = fct_bvh_node(bvh, ref);
+                met = meet_axis_boxes(node, &wide, t_min, t->hit.t, enter);
+                child = node->child;
+            }
+            if (met) {
+                entry = push_children(bvh, stack, &height, met, enter, child);
+                continue;
+            }
         }
-        height = push_children(bvh, stack, height, met, enter, child);
+        do {
+            if (height == 0) return found;
+            entry = stack[--height];
+        } while (entry_distance(entry) > t->hit.t);
     }
-    return found;
 }
 
 static traversal begin_traversal(const fct_bvh *bvh, const fct_prepared_ray *ray) {
@@ -292,8 +342,12 @@ bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_r
                           fct_visits *visits) {
     traversal t = begin_traversal(bvh, ray);
     bool found = traverse_nodes(&t, false);
-    if (found) t.hit.normal = cross_sides(&t);
+    if (found) {
+        t.hit.u = (float)(t.weight[0] / t.weight[2]), t.hit.v = (float)(t.weight[1] / t.weight[2]);
+        t.hit.normal = cross_sides(&t);
+    }
     *hit = t.hit;
+    t.visits.boxes = 8 * t.visits.nodes;
     fct_visits_add(visits, &t.visits);
     return found;
 }
@@ -301,6 +355,7 @@ bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_r
 bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits) {
     traversal t = begin_traversal(bvh, ray);
     bool found = traverse_nodes(&t, true);
+    t.visits.boxes = 8 * t.visits.nodes;
     fct_visits_add(visits, &t.visits);
     return found;
 }

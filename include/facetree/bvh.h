@@ -27,7 +27,7 @@ typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULT
 /* What an OBB structure holds beside rays and points. */
 enum {
     FCT_BVH_PAIRS = 1, /* queries on two models (collide.h): about 10 bytes per triangle */
-    FCT_BVH_SIGN = 2   /* winding numbers and signed distances */
+    FCT_BVH_SIGN = 2   /* winding numbers and signed distances: about 24 bytes per triangle */
 };
 
 typedef struct fct_bvh_def {
@@ -120,6 +120,47 @@ FCT_API bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], flo
 /* The same for `count` points (count x 3), on the threads of the environment. */
 FCT_API void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                                     fct_closest *out);
+
+/* The generalised winding number of the surface about a point (Jacobson, Kavan, Sorkine-Hornung 2013): the
+ * sum of the signed solid angles of the faces over 4 pi. About a closed surface whose faces wind outwards it
+ * is 1 inside and 0 outside; inwards, -1 inside. Holes and overlaps change it smoothly. Far clusters count by
+ * their moments up to the third (Barill et al. 2018): the result errs by less than .001 on scans. NaN for a
+ * bvh that was built without FCT_BVH_SIGN, for the Embree backend, and if the point is not finite. visits may
+ * be NULL. */
+FCT_API double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visits *visits);
+/* fct_bvh_closest_point, with a negative distance where the winding number is above .5 or below -.5: inside
+ * of a closed surface, however its faces wind, also where parts overlap or small holes are open. The sum of
+ * all faces decides where the winding number is within .01 of that. Returns false for a bvh that was built
+ * without FCT_BVH_SIGN. */
+FCT_API bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max_distance,
+                                     fct_closest *out, fct_visits *visits);
+/* The same for `count` points (count x 3), on the threads of the environment. */
+FCT_API void fct_bvh_signed_distances(const fct_bvh *bvh, size_t count, const float *points,
+                                      float max_distance, fct_closest *out);
+
+/* The k nearest faces within max_distance, by distance and then by face id, each as fct_bvh_closest_point
+ * gives it. `out` has room for k. Returns the number of faces found, at most k; 0 where fct_bvh_closest_point
+ * returns false. */
+FCT_API uint32_t fct_bvh_nearest(const fct_bvh *bvh, const float point[3], uint32_t k, float max_distance,
+                                 fct_closest *out, fct_visits *visits);
+
+/* The faces that touch a region: a point of the face lies in the region or on its border. Writes the lowest
+ * `capacity` face ids, ascending, and returns the number of all such faces, which may be larger. `faces` may
+ * be NULL if capacity is 0. A face without area counts as its sides. The OBB backend only: others find
+ * nothing.
+ *
+ * The ball of `radius` around `center`; the distance is computed in double. A radius may be infinite. Nothing
+ * touches a ball with a NaN, an infinite centre or a negative radius. */
+FCT_API uint32_t fct_bvh_faces_in_ball(const fct_bvh *bvh, const float center[3], float radius,
+                                       uint32_t capacity, uint32_t *faces, fct_visits *visits);
+/* Most half-spaces of a region. */
+enum { FCT_BVH_PLANES = 32 };
+/* The points x with n.x + d >= 0 for all `count` planes (count x 4: n, d; n may have any length): a box, a
+ * frustum, or another convex region. Without planes it is all of space. Each face is clipped in double, so a
+ * face that crosses every plane outside of the region is not listed. Nothing touches a region with a NaN or
+ * an infinite number, or with more than FCT_BVH_PLANES planes. */
+FCT_API uint32_t fct_bvh_faces_in_planes(const fct_bvh *bvh, uint32_t count, const double *planes,
+                                         uint32_t capacity, uint32_t *faces, fct_visits *visits);
 
 /* The distance between two surfaces (Garland 1999, (2.7) and (2.8)): e_avg is the mean squared distance of
  * all samples, e_max the largest distance. _ab: samples of a, measured to b. Samples are the vertices that

@@ -111,6 +111,31 @@ static fct_result create_embree(const fct_env *env) {
     return create_bvh_with(env, FCT_BACKEND_EMBREE);
 }
 
+static fct_result build_bvh(const fct_env *env) {
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_SIGN | FCT_BVH_PAIRS;
+    fct_bvh *bvh;
+    fct_result result = STARVE(fct_bvh_build(env, inputs.tree, &def, &bvh));
+    assert_int_equal(bvh != NULL, result == FCT_OK);
+    fct_bvh_destroy(bvh);
+    return result;
+}
+
+static fct_result find_touching(const fct_env *env) {
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_PAIRS;
+    fct_body bodies[3] = {{NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}};
+    fct_bvh *bvh;
+    assert_int_equal(fct_bvh_build(&inputs.env, inputs.tree, &def, &bvh), FCT_OK);
+    for (int i = 0; i < 3; ++i) bodies[i].bvh = bvh;
+    fct_body_pair pairs[3];
+    size_t found;
+    fct_result result = STARVE(fct_bodies_touching(env, 3, bodies, 3, pairs, &found));
+    assert_int_equal(found, result == FCT_OK ? 3 : 0);
+    fct_bvh_destroy(bvh);
+    return result;
+}
+
 static fct_result check_bvh(const fct_env *env) {
     fct_ray rays[24];
     fct_ray_check check;
@@ -137,6 +162,8 @@ const memory_call tree_calls[] = {{"fct_tree_build", "rounds", build_rounds, fal
                                   {"fct_tree_build_file", "obj", build_file_of_text, false},
                                   {"fct_bvh_create", "obb", create_bvh, false},
                                   {"fct_bvh_create", "embree", create_embree, true},
+                                  {"fct_bvh_build", "all parts", build_bvh, false},
+                                  {"fct_bodies_touching", "", find_touching, false},
                                   {"fct_bvh_check", "", check_bvh, false},
                                   {"fct_mesh_compare", "", compare_meshes, false},
                                   {NULL, NULL, NULL, false}};

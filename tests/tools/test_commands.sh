@@ -144,6 +144,12 @@ check "nearest points of a cube" test "$(awk '{ print $2, $3, $4, $5 }' out | he
 holds "$(awk 'NR == 2 { print $5 }' out) > .0999 && $(awk 'NR == 2 { print $5 }' out) < .1001"
 expect 0 closest cube.off --points points.txt --max-distance 1 -o near.txt
 check "-1 where nothing is near" test "$(head -n 1 near.txt)" = -1
+expect 0 closest cube.off --points points.txt --signed
+holds "$(awk 'NR == 1 { print $5 }' out) == 2"
+holds "$(awk 'NR == 2 { print $5 }' out) < -.0999 && $(awk 'NR == 2 { print $5 }' out) > -.1001"
+expect 0 closest cube.off --points points.txt --signed --max-distance 1 --json
+keys points found inside seconds
+holds "$(value points) == 2 && $(value found) == 1 && $(value inside) == 1"
 printf '1 2\n' >bad.txt
 expect 65 closest cube.off --points bad.txt
 says "bad.txt:1: expected 3 numbers, found 2"

@@ -105,7 +105,7 @@ expect 64 raycast cube.off --rays r --backend bvh
 expect 64 raycast - --rays -
 expect 64 raycast scene.json --check
 expect 64 closest cube.off
-expect 64 closest cube.off --points p --signed
+expect 64 closest scene.json --points p --signed
 expect 64 closest cube.off --points p --max-distance -1
 expect 64 compare cube.off
 expect 64 compare cube.off cube.off --samples -5

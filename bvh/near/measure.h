@@ -1,0 +1,198 @@
+/* bvh/near/measure.h: distances from a point to eight boxes or eight triangles at a time, in float. For
+ * kernel files.
+ *
+ * A triangle is measured between two bounds that hold whatever the rounding:
+ *
+ *   1. The cases of Ericson (2005, section 5.1.5) give weights v, w >= 0 with v + w <= 1, and the point q of
+ *      the triangle. The distance of q is an upper bound.
+ *   2. Each corner c has (c - p).q' / |q'| of its way from p along q' = q - p. The least of the three is a
+ *      lower bound, because the triangle lies beyond that plane. If q is the nearest point, both are equal.
+ *
+ * Rounding in step 1 makes the bounds differ, but never wrong. With u = 2^-24 and every corner within R of p,
+ * q errs by at most 20 u R, and the products of step 2 by 6 u R. FCT_MEASURE_MARGIN is 32 u.
+ */
+#ifndef FCT_BVH_MEASURE_H
+#define FCT_BVH_MEASURE_H
+
+#include "base/math/round.h"
+#include "base/math/simd.h"
+#include "bvh/model.h"
+
+/* Times the distance to the farthest point of the model: the error of either bound. */
+#define FCT_MEASURE_MARGIN 0x1p-19
+
+/* Farther points move to this distance from the centre, along each axis. */
+#define FCT_AT_CLAMP 1e9
+
+/* A point as the boxes and triangles see it. */
+typedef struct fct_at {
+    float at[3];       /* the scaled point in float, clamped to a cube around the centre */
+    float centered[3]; /* relative to the centre */
+    double rounding;   /* at least the distance between `at` and the clamped point */
+    double margin;     /* error of the bounds of a triangle */
+} fct_at;
+
+/* Clamping the point to a large cube around the model moves it nearer to everything in the model, so box
+ * distances from the clamped point are lower bounds of those from the point. */
+static inline fct_at fct_at_make(const fct_bvh *bvh, v3 scaled) {
+    fct_at a = {.rounding = 0};
+    double p[3] = {scaled.x, scaled.y, scaled.z}, farthest2 = 0;
+    for (int k = 0; k < 3; ++k) {
+        double c = (double)bvh->center[k],
+               clamped = fct_min(fct_max(p[k], c - FCT_AT_CLAMP), c + FCT_AT_CLAMP);
+        double rounded = fct_round(clamped);
+        a.at[k] = (float)rounded;
+        a.centered[k] = a.at[k] - bvh->center[k];
+        a.rounding += fabs(rounded - clamped);
+        double far = fct_max(fabs((double)bvh->lower[k] - rounded), fabs((double)bvh->upper[k] - rounded));
+        farthest2 += far * far;
+    }
+    a.margin = FCT_MEASURE_MARGIN * sqrt(farthest2);
+    return a;
+}
+
+/* The square of a distance up to which boxes are open: beyond `distance` from the point by float rounding. */
+static inline float fct_box_limit2(const fct_at *a, double distance) {
+    double limit = distance + a->rounding;
+    return distance < INFINITY ? (float)fct_min(limit * limit * 1.0001 + 1e-30, 3e38) : INFINITY;
+}
+
+/* Squared distances of eight axis boxes; bit i of the result: box i is within the limit. */
+static inline uint32_t fct_measure_axis_boxes(const fct_axis_node *node, const fct_at *a, float limit2,
+                                              float distance2[8]) {
+    f8 zero = f8_set(0), sum = zero;
+    for (int k = 0; k < 3; ++k) {
+        f8 p = f8_set(a->at[k]);
+        f8 below = f8_sub(f8_load(node->bounds[k][0]), p), above = f8_sub(p, f8_load(node->bounds[k][1]));
+        f8 d = f8_max(f8_max(below, above), zero);
+        sum = f8_add(sum, f8_mul(d, d));
+    }
+    f8_store(distance2, sum);
+    return f8_le(sum, f8_set(limit2));
+}
+
+/* The same for oriented boxes. A row of a map is an axis of the box over its half extent h, so a distance d
+ * in mapped units is d h = d / |row|. */
+static inline uint32_t fct_measure_oriented_boxes(const fct_oriented_node *node, const fct_at *a,
+                                                  float limit2, float distance2[8]) {
+    f8 zero = f8_set(0), one = f8_set(1), sum = zero;
+    f8 x = f8_set(a->centered[0]), y = f8_set(a->centered[1]), z = f8_set(a->centered[2]);
+    for (int k = 0; k < 3; ++k) {
+        f8 mx = f8_load(node->map[k][0]), my = f8_load(node->map[k][1]), mz = f8_load(node->map[k][2]);
+        f8 q = f8_add(f8_add(f8_mul(mx, x), f8_mul(my, y)), f8_add(f8_mul(mz, z), f8_load(node->map[k][3])));
+        f8 d = f8_max(f8_sub(f8_abs(q), one), zero);
+        f8 row2 = f8_add(f8_add(f8_mul(mx, mx), f8_mul(my, my)), f8_mul(mz, mz));
+        sum = f8_add(sum, f8_div(f8_mul(d, d), f8_max(row2, f8_set(1e-30f))));
+    }
+    f8_store(distance2, sum);
+    return f8_le(sum, f8_set(limit2));
+}
+
+/* Measures the children of a node, of either kind. */
+static inline uint32_t fct_measure_children(const fct_bvh *bvh, uint32_t ref, const fct_at *a, float limit2,
+                                            float distance2[8], const uint32_t **child) {
+    if (ref & FCT_REF_ORIENTED) {
+        const fct_oriented_node *node = fct_bvh_node(bvh, ref);
+        *child = node->child;
+        return fct_measure_oriented_boxes(node, a, limit2, distance2) & node->present;
+    }
+    const fct_axis_node *node = fct_bvh_node(bvh, ref);
+    *child = node->child;
+    return fct_measure_axis_boxes(node, a, limit2, distance2) & node->present;
+}
+
+/* The vertices of a leaf relative to the point. A leaf of eight vertices uses the first half alone. */
+typedef struct fct_near_vertices {
+    f8 x[2], y[2], z[2];
+} fct_near_vertices;
+
+static inline void fct_near_vertices_load(const fct_leaf *leaf, const fct_at *a, fct_near_vertices *out) {
+    const float *rows = fct_leaf_vertices(leaf);
+    uint32_t stride = 8u * leaf->vertex_octets;
+    for (uint32_t i = 0; i < leaf->vertex_octets; ++i) {
+        out->x[i] = f8_sub(f8_load(rows + 8 * i), f8_set(a->at[0]));
+        out->y[i] = f8_sub(f8_load(rows + stride + 8 * i), f8_set(a->at[1]));
+        out->z[i] = f8_sub(f8_load(rows + 2 * stride + 8 * i), f8_set(a->at[2]));
+    }
+}
+
+typedef struct f8x3 {
+    f8 x, y, z;
+} f8x3;
+
+static inline f8x3 f8x3_sub(f8x3 a, f8x3 b) {
+    return (f8x3){f8_sub(a.x, b.x), f8_sub(a.y, b.y), f8_sub(a.z, b.z)};
+}
+static inline f8 f8x3_dot(f8x3 a, f8x3 b) {
+    return f8_add(f8_add(f8_mul(a.x, b.x), f8_mul(a.y, b.y)), f8_mul(a.z, b.z));
+}
+/* a + v b + w c */
+static inline f8x3 f8x3_mix(f8x3 a, f8 v, f8x3 b, f8 w, f8x3 c) {
+    return (f8x3){f8_add(a.x, f8_add(f8_mul(v, b.x), f8_mul(w, c.x))),
+                  f8_add(a.y, f8_add(f8_mul(v, b.y), f8_mul(w, c.y))),
+                  f8_add(a.z, f8_add(f8_mul(v, b.z), f8_mul(w, c.z)))};
+}
+static inline f8x3 f8x3_lookup(const fct_near_vertices *v, uint32_t vertex_octets, i8 index) {
+    if (vertex_octets == 1)
+        return (f8x3){f8_lookup8(v->x[0], index), f8_lookup8(v->y[0], index), f8_lookup8(v->z[0], index)};
+    return (f8x3){f8_lookup16(v->x[0], v->x[1], index), f8_lookup16(v->y[0], v->y[1], index),
+                  f8_lookup16(v->z[0], v->z[1], index)};
+}
+
+/* Both bounds of eight triangles. The lower bound is plane / sqrt(upper2), or 0 if plane is not positive. */
+typedef struct fct_eight_near {
+    f8 upper2; /* squared distance of a point of the triangle */
+    f8 plane;  /* least product of a corner with that point, both relative to the point */
+} fct_eight_near;
+
+/* `corners`: three rows of eight vertex numbers. */
+static inline fct_eight_near fct_measure_triangles(const fct_near_vertices *vertices, uint32_t vertex_octets,
+                                                   const uint8_t *corners) {
+    f8x3 a = f8x3_lookup(vertices, vertex_octets, i8_load_bytes(corners)),
+         b = f8x3_lookup(vertices, vertex_octets, i8_load_bytes(corners + 8)),
+         c = f8x3_lookup(vertices, vertex_octets, i8_load_bytes(corners + 16));
+    f8x3 ab = f8x3_sub(b, a), ac = f8x3_sub(c, a);
+    f8 zero = f8_set(0), one = f8_set(1);
+    /* Ericson's d1 to d6 with the opposite sign, because the point is the origin. */
+    f8 a1 = f8x3_dot(ab, a), a2 = f8x3_dot(ac, a), b1 = f8x3_dot(ab, b), b2 = f8x3_dot(ac, b),
+       c1 = f8x3_dot(ab, c), c2 = f8x3_dot(ac, c);
+    f8 weight_a = f8_max(f8_sub(f8_mul(b1, c2), f8_mul(c1, b2)), zero),
+       weight_b = f8_max(f8_sub(f8_mul(c1, a2), f8_mul(a1, c2)), zero),
+       weight_c = f8_max(f8_sub(f8_mul(a1, b2), f8_mul(b1, a2)), zero);
+    /* The weights of b and c are v and w over `all`. First the inside, then each case replaces those before
+     * it: sides bc, ac, ab, then corners c, b, a. A case holds where high <= low. */
+    f8 v = weight_b, w = weight_c, all = f8_add(f8_add(weight_a, weight_b), weight_c);
+    f8 from_b = f8_sub(b1, b2), from_c = f8_sub(c2, c1); /* along bc; both positive between b and c */
+    f8 low = f8_min(f8_min(from_b, from_c), zero), high = weight_a;
+    v = f8_if_lt(low, high, v, from_c), w = f8_if_lt(low, high, w, from_b);
+    all = f8_if_lt(low, high, all, f8_add(from_b, from_c));
+    low = f8_min(c2, zero), high = f8_max(weight_b, a2);
+    v = f8_if_lt(low, high, v, zero), w = f8_if_lt(low, high, w, f8_sub(zero, a2));
+    all = f8_if_lt(low, high, all, f8_sub(c2, a2));
+    low = f8_min(b1, zero), high = f8_max(weight_c, a1);
+    v = f8_if_lt(low, high, v, f8_sub(zero, a1)), w = f8_if_lt(low, high, w, zero);
+    all = f8_if_lt(low, high, all, f8_sub(b1, a1));
+    low = zero, high = f8_max(c2, f8_sub(c2, c1));
+    v = f8_if_lt(low, high, v, zero), w = f8_if_lt(low, high, w, one);
+    all = f8_if_lt(low, high, all, one);
+    high = f8_max(b1, f8_sub(b1, b2));
+    v = f8_if_lt(low, high, v, one), w = f8_if_lt(low, high, w, zero);
+    all = f8_if_lt(low, high, all, one);
+    low = f8_min(a1, a2), high = zero;
+    v = f8_if_lt(low, high, v, zero), w = f8_if_lt(low, high, w, zero);
+    all = f8_if_lt(low, high, all, one);
+    f8 scale = f8_div(one, f8_max(all, f8_set(1e-37f)));
+    f8x3 q = f8x3_mix(a, f8_mul(v, scale), ab, f8_mul(w, scale), ac);
+    fct_eight_near near;
+    near.upper2 = f8x3_dot(q, q);
+    near.plane = f8_min(f8x3_dot(q, a), f8_min(f8x3_dot(q, b), f8x3_dot(q, c)));
+    return near;
+}
+
+/* Bit i: the lower bound of triangle i is at most sqrt(limit2). */
+static inline uint32_t fct_triangles_within(const fct_eight_near *near, float limit2) {
+    f8 plane = f8_max(near->plane, f8_set(0));
+    return ~f8_lt(f8_mul(f8_set(limit2), near->upper2), f8_mul(plane, plane)) & 0xffu;
+}
+
+#endif

@@ -1,0 +1,63 @@
+/* bvh/near/sign.c: the public queries for winding numbers and signed distances.
+ *
+ * The sign only needs to know whether |w| is above .5. So the first sum uses moments of clusters that are
+ * close to the point. If its result is not clear, a more precise sum follows, and then that of all faces.
+ */
+#include "base/parallel.h"
+#include "bvh/near/nearest.h"
+#include "bvh/near/winding.h"
+
+enum { CHUNK = 256 }; /* points per task */
+
+/* The reach of fct_bvh_winding_number. The greatest errors measured are 2e-4 on the cow and the bunny, and
+ * 5e-4 on a sphere whose vertices are moved by up to .4 of its radius. With 2.5 they are 7e-4 and 1.6e-3. */
+#define NUMBER_REACH 3.5f
+/* The first reach for a sign, and how far from .5 its sum must be: over ten times the greatest error on
+ * scans.
+ */
+#define SIGN_REACH 1.5f
+#define SIGN_CLEAR .15
+/* The same for a sum with NUMBER_REACH. */
+#define NUMBER_CLEAR .01
+
+bool fct_winding_is_inside(const fct_bvh *bvh, v3 point, fct_visits *visits) {
+    double w = fabs(fct_winding_sum(bvh, point, SIGN_REACH, visits));
+    if (fabs(w - .5) < SIGN_CLEAR) w = fabs(fct_winding_sum(bvh, point, NUMBER_REACH, visits));
+    if (fabs(w - .5) < NUMBER_CLEAR) w = fabs(fct_winding_sum(bvh, point, INFINITY, visits));
+    return w > .5;
+}
+
+double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visits *visits) {
+    v3 p = v3_load(point);
+    if (!bvh->has_sign || !(fabs(p.x) + fabs(p.y) + fabs(p.z) < INFINITY)) return NAN;
+    return fct_winding_sum(bvh, p, NUMBER_REACH, visits);
+}
+
+bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max_distance, fct_closest *out,
+                             fct_visits *visits) {
+    *out = (fct_closest){.distance = INFINITY, .face = FCT_NONE};
+    if (!bvh->has_sign || !fct_bvh_closest_point(bvh, point, max_distance, out, visits)) return false;
+    if (out->distance > 0 && fct_winding_is_inside(bvh, v3_load(point), visits))
+        out->distance = -out->distance;
+    return true;
+}
+
+typedef struct point_batch {
+    const fct_bvh *bvh;
+    const float *points;
+    float max_distance;
+    fct_closest *out;
+} point_batch;
+
+static void find_signed_distances(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const point_batch *b = user;
+    for (size_t i = begin; i < end; ++i)
+        fct_bvh_signed_distance(b->bvh, b->points + 3 * i, b->max_distance, &b->out[i], NULL);
+}
+
+void fct_bvh_signed_distances(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
+                              fct_closest *out) {
+    point_batch batch = {.bvh = bvh, .points = points, .max_distance = max_distance, .out = out};
+    fct_parallel_for(bvh->env, count, CHUNK, find_signed_distances, &batch);
+}

@@ -1,0 +1,274 @@
+/* Winding numbers and signed distances against closed forms and the sum of all solid angles. */
+#include "packed.h"
+
+#include "base/math/round.h"
+#include "bvh/near/winding.h"
+
+#define PI 3.14159265358979324
+
+static model make_signed(const fct_env *env, fct_mesh mesh) {
+    model m = {.mesh = mesh};
+    fct_tree_def tree_def = fct_tree_def_default();
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_SIGN;
+    assert_int_equal(fct_tree_build(env, &mesh, &tree_def, NULL, &m.tree), FCT_OK);
+    assert_int_equal(fct_bvh_build(env, m.tree, &def, &m.bvh), FCT_OK);
+    return m;
+}
+
+/* The solid angle of a triangle from its dihedral angles (Girard), another way than the library's. */
+static double brute_angle(const v3 t[3], v3 p) {
+    v3 d[3], n[3];
+    double sum = -PI;
+    for (int i = 0; i < 3; ++i) d[i] = v3_unit(v3_sub(t[i], p));
+    for (int i = 0; i < 3; ++i) n[i] = v3_cross(d[i], d[(i + 1) % 3]);
+    for (int i = 0; i < 3; ++i) {
+        v3 a = v3_scale(n[(i + 2) % 3], -1), b = n[i];
+        sum += atan2(v3_norm(v3_cross(a, b)), v3_dot(a, b));
+    }
+    return v3_dot(d[0], v3_cross(d[1], d[2])) < 0 ? -sum : sum;
+}
+
+static double brute_winding(const fct_mesh *mesh, v3 p) {
+    double sum = 0;
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        v3 t[3];
+        face_corners(mesh, f, t);
+        if (v3_norm(v3_cross(v3_sub(t[1], t[0]), v3_sub(t[2], t[0]))) > 1e-14) sum += brute_angle(t, p);
+    }
+    return sum / (4 * PI);
+}
+
+/* Removes a tenth of the faces. */
+static fct_mesh make_holes(fct_mesh mesh) {
+    uint32_t kept = 0;
+    for (uint32_t f = 0; f < mesh.face_count; ++f)
+        if (f % 10) memmove(mesh.triangles + 3 * kept++, mesh.triangles + 3 * f, 12);
+    mesh.face_count = kept;
+    return mesh;
+}
+
+static void flip_faces(fct_mesh *mesh) {
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        uint32_t kept = mesh->triangles[3 * f];
+        mesh->triangles[3 * f] = mesh->triangles[3 * f + 1];
+        mesh->triangles[3 * f + 1] = kept;
+    }
+}
+
+static void agrees_with_all_faces(const fct_env *env, fct_mesh mesh, v3 offset, double size) {
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v)
+        v3_store(mesh.positions + 3 * v, v3_add(offset, v3_scale(v3_load(mesh.positions + 3 * v), size)));
+    model m = make_signed(env, mesh);
+    uint64_t seed = 6;
+    double worst = 0, worst_exact = 0, squares = 0;
+    fct_visits visits = {0};
+    uint32_t count = 400, negative = 0, checked = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        float point[3];
+        v3_store(point, v3_mad(offset, size * 1.4 * random_unit(&seed), random_direction(&seed)));
+        FCT_KEEP_STORED(point);
+        double expected = brute_winding(&mesh, v3_load(point));
+        double error = fabs(fct_bvh_winding_number(m.bvh, point, &visits) - expected);
+        worst = fmax(worst, error), squares += error * error;
+        double sum = fct_winding_sum(m.bvh, v3_load(point), INFINITY, NULL);
+        worst_exact = fmax(worst_exact, fabs(sum - expected));
+        fct_closest plain, with_sign;
+        assert_true(fct_bvh_closest_point(m.bvh, point, INFINITY, &plain, NULL));
+        assert_true(fct_bvh_signed_distance(m.bvh, point, INFINITY, &with_sign, NULL));
+        if (fabs(fabs(expected) - .5) > 1e-5)
+            ++checked, assert_int_equal(with_sign.distance<0, fabs(expected)> .5);
+        negative += with_sign.distance < 0;
+        with_sign.distance = fabsf(with_sign.distance);
+        assert_memory_equal(&plain, &with_sign, sizeof plain);
+    }
+    assert_true(worst < 6e-4 && sqrt(squares / count) < 2.5e-4 && worst_exact < 1e-5);
+    assert_true(checked > count - 5 && negative < count);
+    assert_true(visits.nodes > count && visits.triangles < count * (uint64_t)mesh.face_count * 2 / 3);
+    model_release(env, &m);
+}
+
+static void winding_numbers_agree_with_all_faces(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    v3 zero = {0, 0, 0}, far = {300, -500, 200};
+    fct_mesh inward = make_pebble(&env, 30, 5);
+    flip_faces(&inward);
+    agrees_with_all_faces(&env, make_pebble(&env, 30, 3), zero, 1);
+    agrees_with_all_faces(&env, make_holes(make_pebble(&env, 30, 4)), zero, 1);
+    agrees_with_all_faces(&env, inward, zero, 1e-3);
+    agrees_with_all_faces(&env, make_bars(&env, 8, 3), zero, 1);
+    agrees_with_all_faces(&env, make_soup(&env, 1500, 3), zero, 1);
+    agrees_with_all_faces(&env, make_pebble(&env, 30, 6), far, 8);
+}
+
+/* The moments alone, without faces: a point far from everything. The next term is smaller by the third power
+ * of radius over distance, against the solid angle of the model. */
+static void moments_carry_the_far_field(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_soup(&env, 1200, 9);
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 8;
+    for (int i = 0; i < 60; ++i) {
+        v3 p = v3_mad(v3_make(.5, .5, .5), 6, random_direction(&seed));
+        fct_visits visits = {0};
+        double expected = brute_winding(&mesh, p), got = fct_winding_sum(m.bvh, p, 3, &visits);
+        assert_int_equal(visits.triangles, 0);
+        assert_true(fabs(got - expected) < 2e-4 * .08 + .01 * fabs(expected));
+    }
+    model_release(&env, &m);
+}
+
+static void closed_forms_hold(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    /* The unit square from a height over its middle: 4 atan(1 / (4 h sqrt(h^2 + 1/2))). */
+    model square = make_signed(&env, make_grid(&env, 24));
+    for (int i = 0; i < 40; ++i) {
+        double h = .01 * pow(1.2, i), expected = atan(1 / (4 * h * sqrt(h * h + .5))) / PI;
+        float above[3] = {.5f, .5f, (float)h}, below[3] = {.5f, .5f, (float)-h};
+        double up = fct_bvh_winding_number(square.bvh, above, NULL),
+               down = fct_bvh_winding_number(square.bvh, below, NULL);
+        assert_true(fabs(fabs(up) - expected) < 1e-4 + 1e-3 * expected && fabs(up + down) < 1e-5);
+    }
+    model_release(&env, &square);
+    /* A sphere of radius 1: all points but those very near have the exact distance within the sagitta. */
+    model sphere = make_signed(&env, make_sphere(&env, 60));
+    uint64_t seed = 2;
+    for (int i = 0; i < 500; ++i) {
+        double radius = 2 * random_unit(&seed);
+        float point[3];
+        fct_closest near;
+        v3_store(point, v3_scale(random_direction(&seed), radius));
+        assert_true(fct_bvh_signed_distance(sphere.bvh, point, INFINITY, &near, NULL));
+        assert_true(fabs((double)near.distance - (radius - 1)) < 2e-3);
+        double w = fct_bvh_winding_number(sphere.bvh, point, NULL);
+        if (fabs(radius - 1) > 2e-3) assert_true(fabs(w - (radius < 1)) < 1e-3);
+    }
+    model_release(&env, &sphere);
+}
+
+/* Points on both sides of each face, at a small fraction of its size. */
+static void signs_are_right_near_the_surface(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_pebble(&env, 24, 7);
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 3;
+    for (uint32_t f = 0; f < mesh.face_count; ++f) {
+        v3 t[3];
+        face_corners(&mesh, f, t);
+        v3 n = v3_unit(v3_cross(v3_sub(t[1], t[0]), v3_sub(t[2], t[0])));
+        double u = .1 + .3 * random_unit(&seed), v = .1 + .3 * random_unit(&seed);
+        v3 at = v3_add(v3_scale(t[0], 1 - u - v), v3_add(v3_scale(t[1], u), v3_scale(t[2], v)));
+        for (int side = -1; side <= 1; side += 2)
+            for (double height = 1e-6; height < 1e-3; height *= 30) {
+                float point[3];
+                fct_closest near;
+                v3_store(point, v3_mad(at, side * height, n));
+                assert_true(fct_bvh_signed_distance(m.bvh, point, INFINITY, &near, NULL));
+                if (fabs((double)near.distance) < height / 2) continue; /* another face is nearer */
+                assert_true((double)near.distance * side > 0);
+            }
+        fct_closest on;
+        assert_true(fct_bvh_signed_distance(m.bvh, mesh.positions + 3 * (size_t)mesh.triangles[3 * f],
+                                            INFINITY, &on, NULL));
+        assert_true(on.distance == 0 && !signbit(on.distance));
+    }
+    model_release(&env, &m);
+}
+
+/* Two overlapping spheres: inside of both the number is 2, and their inner walls are inside too. */
+static void overlaps_count_twice(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh parts[2] = {make_sphere(&env, 20), make_sphere(&env, 20)}, mesh;
+    for (uint32_t v = 0; v < parts[1].vertex_count; ++v) parts[1].positions[3 * v] += 1;
+    assert_int_equal(fct_mesh_join(&env, parts, 2, &mesh), FCT_OK);
+    fct_mesh_release(&env, &parts[0]);
+    fct_mesh_release(&env, &parts[1]);
+    model m = make_signed(&env, mesh);
+    float both[3] = {.5f, .1f, 0}, wall[3] = {.02f, .02f, 0}, one[3] = {-.5f, 0, 0}, none[3] = {.5f, 1.2f, 0};
+    fct_closest near;
+    assert_true(fabs(fct_bvh_winding_number(m.bvh, both, NULL) - 2) < 1e-3);
+    assert_true(fabs(fct_bvh_winding_number(m.bvh, one, NULL) - 1) < 1e-3);
+    assert_true(fabs(fct_bvh_winding_number(m.bvh, none, NULL)) < 1e-3);
+    assert_true(fct_bvh_signed_distance(m.bvh, wall, INFINITY, &near, NULL) && near.distance < 0);
+    assert_true(fct_bvh_signed_distance(m.bvh, none, INFINITY, &near, NULL) && near.distance > 0);
+    model_release(&env, &m);
+}
+
+/* The same bytes on any number of threads and from both variants. */
+static void batches_agree_with_single_points(void **state) {
+    (void)state;
+    enum { COUNT = 2000 };
+    fct_env env = fct_env_default();
+    model m = make_signed(&env, make_holes(make_pebble(&env, 30, 3)));
+    float *points = malloc(3 * COUNT * sizeof *points);
+    fct_closest *out = malloc(COUNT * sizeof *out), single;
+    uint64_t seed = 2;
+    for (size_t i = 0; i < COUNT; ++i)
+        v3_store(points + 3 * i, v3_scale(random_direction(&seed), 1.5 * random_unit(&seed)));
+    for (env.thread_count = 1; env.thread_count < 4; ++env.thread_count) {
+        fct_bvh_signed_distances(m.bvh, COUNT, points, .4f, out);
+        for (size_t i = 0; i < COUNT; ++i) {
+            fct_bvh_signed_distance(m.bvh, points + 3 * i, .4f, &single, NULL);
+            assert_memory_equal(&single, &out[i], sizeof single);
+        }
+    }
+#ifdef FCT_HAS_AVX2
+    for (size_t i = 0; i < COUNT && fct_use_avx2; ++i) {
+        v3 p = v3_load(points + 3 * i);
+        double a = fct_winding_sum_baseline(m.bvh, p, 3, NULL), b = fct_winding_sum_avx2(m.bvh, p, 3, NULL);
+        assert_memory_equal(&a, &b, sizeof a);
+    }
+#endif
+    free(points), free(out);
+    model_release(&env, &m);
+}
+
+static void without_the_part_there_is_no_answer(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    model plain = model_make(&env, make_sphere(&env, 8), FCT_BACKEND_OBB),
+          with_sign = make_signed(&env, make_sphere(&env, 8)), one = make_signed(&env, make_grid(&env, 1));
+    float point[3] = {.1f, .2f, .3f}, bad[3] = {0, NAN, 0}, endless[3] = {0, INFINITY, 0};
+    fct_closest near;
+    assert_true(isnan(fct_bvh_winding_number(plain.bvh, point, NULL)));
+    assert_false(fct_bvh_signed_distance(plain.bvh, point, INFINITY, &near, NULL));
+    assert_true(near.face == FCT_NONE && near.distance == INFINITY);
+    assert_true(isnan(fct_bvh_winding_number(with_sign.bvh, bad, NULL)));
+    assert_true(isnan(fct_bvh_winding_number(with_sign.bvh, endless, NULL)));
+    assert_false(fct_bvh_signed_distance(with_sign.bvh, bad, INFINITY, &near, NULL));
+    assert_false(fct_bvh_signed_distance(with_sign.bvh, point, .01f, &near, NULL));
+    assert_true(fct_bvh_bytes(with_sign.bvh) > fct_bvh_bytes(plain.bvh) + 600);
+    fct_bvh_def def = fct_bvh_def_default();
+    fct_bvh *embree;
+    def.backend = FCT_BACKEND_EMBREE, def.parts = FCT_BVH_SIGN;
+    assert_int_equal(fct_bvh_build(&env, plain.tree, &def, &embree), FCT_OK);
+    assert_true(isnan(fct_bvh_winding_number(embree, point, NULL)));
+    fct_bvh_destroy(embree);
+    /* A model of one leaf, with a point above each face. */
+    for (float h = 1e-4f; h < 1; h *= 10) {
+        float above[3] = {.5f, .25f, h};
+        double w = fct_bvh_winding_number(one.bvh, above, NULL);
+        assert_true(fabs(w - brute_winding(&one.mesh, v3_load(above))) < 1e-6);
+    }
+    model_release(&env, &plain);
+    model_release(&env, &with_sign);
+    model_release(&env, &one);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(winding_numbers_agree_with_all_faces),
+        cmocka_unit_test(moments_carry_the_far_field),
+        cmocka_unit_test(closed_forms_hold),
+        cmocka_unit_test(signs_are_right_near_the_surface),
+        cmocka_unit_test(overlaps_count_twice),
+        cmocka_unit_test(batches_agree_with_single_points),
+        cmocka_unit_test(without_the_part_there_is_no_answer),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
