@@ -7,6 +7,7 @@ int tool_bake(int argc, char **argv);
 int tool_boxes(int argc, char **argv);
 int tool_closest(int argc, char **argv);
 int tool_cluster(int argc, char **argv);
+int tool_collide(int argc, char **argv);
 int tool_convert(int argc, char **argv);
 int tool_compare(int argc, char **argv);
 int tool_info(int argc, char **argv);

@@ -19,6 +19,7 @@ static const struct {
     {"boxes", "write the oriented boxes of clusters", tool_boxes},
     {"raycast", "shoot rays; compare both backends", tool_raycast},
     {"closest", "find the nearest surface points", tool_closest},
+    {"collide", "find where two meshes touch, or how far apart they are", tool_collide},
     {"bake", "compute the radiosity of a scene as vertex colours", tool_bake},
     {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
     {"convert", "write a mesh in another format", tool_convert},

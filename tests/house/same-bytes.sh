@@ -11,13 +11,15 @@ trap 'rm -rf "$here"' EXIT
 cd "$here" || exit 2
 bad=0 runs=0
 
-# make_inputs FOLDER TRIANGLES: a mesh with and without colours, rays, points and a scene.
+# make_inputs FOLDER TRIANGLES: a mesh with and without colours, rays, points, poses and a scene.
 make_inputs() {
     mkdir -p "$1" && cd "$1" || exit 2
     "$program" make bust -o mesh.ply --triangles "$2" --quiet || exit 2
     "$program" make cornell -o cornell --triangles 100 --quiet || exit 2
     awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f 3 %.6f %.6f -1\n", sin(i), cos(3 * i), sin(7 * i) / 3, cos(5 * i) / 3 }' >rays.txt
     awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f %.6f\n", 2 * sin(i), cos(3 * i), 2 * sin(7 * i) }' >points.txt
+    awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.9f %.9f 0 %.6f %.9f %.9f 0 %.6f 0 0 1 %.6f\n",
+        cos(i), -sin(i), 3 * sin(i), sin(i), cos(i), 2 * cos(3 * i), sin(7 * i) }' >poses.txt
     cd "$here" || exit 2
 }
 
@@ -40,6 +42,9 @@ write_outputs() {
         "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" -o "$out/hits.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" -o "$out/closest.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" --signed -o "$out/signed.txt" --quiet
+        for measure in pairs contacts distance; do
+            "$@" collide "$in/mesh.ply" "$in/mesh.ply" --poses "$in/poses.txt" --$measure -o "$out/$measure.txt" --quiet
+        done
         # shellcheck disable=SC2086 # a list of words
         "$@" bake "$in/cornell/scene.json" $light -o "$out/lit.ply" --also "$out/lit.glb" --quiet
         "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --quiet
@@ -61,7 +66,7 @@ fine="--error 1e-3" coarse="--error 1e-2 --max-edge .5" # an emulated processor 
 make_inputs inputs 12000
 make_inputs small 1500
 FACETREE_SIMD=baseline write_outputs inputs first "$fine" "$program"
-[ "$(find first -type f -size +0 | wc -l)" = 17 ] || { echo "expected 17 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
+[ "$(find first -type f -size +0 | wc -l)" = 20 ] || { echo "expected 20 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
 variants=baseline
 FACETREE_SIMD=avx2 "$program" --version >/dev/null 2>&1 && variants="baseline avx2"
 threads() { "$@" --threads "$count"; }

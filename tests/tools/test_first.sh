@@ -113,7 +113,7 @@ same_bake --error 1e-3 --quality fine --- --error 1e-3
 expect 64 bake scene.json -o one.ply --quality best
 
 # Manuals: a line per way to call the command, and examples, also in the help.
-for command in bake boxes closest cluster compare convert info make meshlets partition raycast render simplify; do
+for command in bake boxes closest cluster collide compare convert info make meshlets partition raycast render simplify; do
     expect 0 help --man $command
     check "$command has examples" grep -q '^\.SH EXAMPLES' out
     check "the synopsis of $command is one line per call" test "$(sed -n '/^\.SH SYNOPSIS/,/^\.SH DESC/p' out | grep -c "facetree $command")" -ge 1
@@ -131,7 +131,7 @@ check "bash reads the completion" bash -n completion
 complete_words() { # WORD...: what bash offers for the last word
     bash -c 'source ./completion; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _facetree; printf "%s\n" "${COMPREPLY[@]}"' x "$@"
 }
-check "commands" test "$(complete_words facetree c | tr '\n' ' ')" = "cluster closest convert compare "
+check "commands" test "$(complete_words facetree c | tr '\n' ' ')" = "cluster closest collide convert compare "
 check "help of a command" test "$(complete_words facetree help ba)" = bake
 check "options" test "$(complete_words facetree cluster --me)" = --method
 check "common options" test "$(complete_words facetree info --js)" = --json

@@ -12,7 +12,9 @@ cat >scene.json <<'END'
                {"name": "ball", "model": "ball", "material": "grey", "translate": [0, 0, -0.7]},
                {"name": "lamp", "model": "lamp", "material": "light", "translate": [0, 0, 1.6], "scale": 0.3}]}
 END
+awk 'BEGIN { for (i = 0; i < 300; ++i) printf "1 0 0 %.6f 0 1 0 %.6f 0 0 1 %.6f\n", 2 * sin(i), cos(3 * i), sin(7 * i) }' >poses.txt
 for threads in 1 2 5; do
+    expect 0 collide bumpy.off bumpy.off --poses poses.txt -o $threads-touching.txt --threads $threads
     expect 0 cluster bumpy.off -o $threads.fct --threads $threads --quiet
     expect 0 simplify bumpy.off --ratio .1 -o $threads.ply --threads $threads --quiet
     expect 0 bake scene.json -o $threads.glb --error $error --threads $threads --quiet
@@ -22,7 +24,7 @@ for threads in 1 2 5; do
     sed -i '/^seconds/d' $threads.txt
 done
 for threads in 2 5; do
-    for file in .fct .ply .glb -lit.ply .txt; do
+    for file in .fct .ply .glb -lit.ply .txt -touching.txt; do
         check "$threads threads make the same $file as one" cmp -s 1$file $threads$file
     done
 done

@@ -1,6 +1,6 @@
 # tests/tools/test_usage.sh: help, version, and every kind of wrong command line.
 source "$(dirname "$0")/support.sh"
-commands="bake boxes closest cluster compare convert info make partition raycast render simplify"
+commands="bake boxes closest cluster collide compare convert info make partition raycast render simplify"
 
 expect 0 --version
 check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+ \((baseline|avx2)\)$' out
@@ -37,7 +37,7 @@ says "did you mean 'cluster'?"
 expect 64 qwertzuiop
 says "'facetree help' lists them"
 expect 64 --nothing
-for later in collide relight form-factor level; do
+for later in relight form-factor level; do
     expect 64 "$later" a b
     says "unknown command '$later'"
 done

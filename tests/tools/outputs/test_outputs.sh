@@ -14,6 +14,7 @@ outputs() { # of each command that writes: with FILE as the output
     echo "boxes cube.off -k 2 -o $file.glb"
     echo "raycast cube.off --rays rays.txt -o $file.txt"
     echo "closest cube.off --points points.txt -o $file.txt"
+    echo "collide cube.off cube.off -o $file.txt"
     echo "simplify cube.off --faces 6 -o $file.obj"
     echo "bake cube.off -o $file.glb"
     echo "bake cube.off -o $file.ply"
@@ -42,6 +43,7 @@ if [ -w /dev/full ]; then
     expect 73 partition cube.off -k 2 -o full.txt
     expect 73 boxes cube.off -k 2 -o full.json
     expect 73 raycast cube.off --rays rays.txt -o full.txt
+    expect 73 collide cube.off cube.off --contacts -o full.txt
     expect 73 cluster cube.off -o full.fct
     "$program" info cube.off >/dev/full 2>err
     code=$?

@@ -7,6 +7,7 @@ ln -s copy.off soft.off
 mkdir sub
 printf '0 0 9 0 0 -1\n' >rays.txt
 printf '0 0 9\n' >points.txt
+echo 1 0 0 0 0 1 0 0 0 0 1 0 >poses.txt
 
 # kept FILE COMMAND...: the command is refused, names --in-place, and leaves the file.
 kept() {
@@ -25,6 +26,7 @@ done
 kept copy.off bake copy.off -o copy.off
 kept copy.off bake copy.off -o new.ply --also copy.off
 kept rays.txt raycast cube.off --rays rays.txt -o rays.txt
+kept poses.txt collide cube.off cube.off --poses poses.txt -o poses.txt
 kept points.txt closest cube.off --points points.txt -o ./points.txt
 expect 0 cluster cube.off -o cube.fct
 kept cube.fct cluster cube.fct -o cube.fct
@@ -83,6 +85,7 @@ refuses partition cube.off -k 2 -o bad.stl
 refuses partition cube.off -k 2 -o ok.txt --adjacency bad.ply
 refuses boxes cube.off -k 2 -o bad.fct
 refuses raycast cube.off --rays rays.txt -o bad.ply
+refuses collide cube.off cube.off -o bad.ply
 refuses closest cube.off --points points.txt -o bad.json
 refuses meshlets cube.off -o bad.txt
 refuses meshlets cube.off -o bad.stl
@@ -103,6 +106,7 @@ commands() { # of each command that writes: with $1 as the output
     echo "boxes cube.off -k 2 -o $1"
     echo "raycast cube.off --rays rays.txt -o $1"
     echo "closest cube.off --points points.txt -o $1"
+    echo "collide cube.off cube.off -o $1"
     echo "meshlets cube.off -o $1"
     echo "bake scene/scene.json --error 1 --final none -o $1"
     echo "make sphere -o $1"

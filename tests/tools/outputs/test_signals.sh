@@ -10,6 +10,7 @@ cat >lit.json <<'END'
  "materials": {"lamp": {"reflectance": [0.5, 0.5, 0.5], "emission": [1, 1, 1]}},
  "instances": [{"name": "ball", "model": "ball", "material": "lamp"}]}
 END
+for i in $(seq 2000); do echo "1 0 0 0 0 1 0 0 0 0 1 0"; done >poses.txt
 mkfifo pipe
 
 now() { date +%s%N; }
@@ -45,6 +46,7 @@ for preloaded in '' $preload; do
         ends $name .2 raycast ball.ply --rays pipe -o new.txt
     done
     ends TERM .3 compare ball.ply ground.ply --samples 100000
+    ends INT .5 collide ball.ply ball.ply --poses poses.txt --pairs -o new.txt
     ends HUP .4 make bust -o new.ply --triangles 4000000
     ends TERM .5 cluster ball.ply ground.ply pipe --format ply -o .
     unset LD_PRELOAD
