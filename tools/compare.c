@@ -7,11 +7,12 @@
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
 
-enum { KEY_SAMPLES = TOOL_KEY, KEY_BUDGET };
+enum { KEY_SAMPLES = TOOL_KEY, KEY_BUDGET, KEY_HAUSDORFF };
 
 typedef struct compare_options {
     uint32_t samples; /* per face; UINT32_MAX: from the budget */
     uint64_t budget;  /* samples over all faces */
+    bool hausdorff;
 } compare_options;
 
 enum { USUAL_SAMPLES = 100 }; /* per face, as in Garland's dissertation */
@@ -23,12 +24,19 @@ static const struct argp_option compare_options_table[] = {
      "Without --samples: at most N random samples over both meshes, but at least one per face (default "
      "4000000)",
      0},
+    {"hausdorff", KEY_HAUSDORFF, NULL, 0,
+     "Also find the largest distance of any point, within 1 % and 1e-5 of the diameter", 0},
     {0}};
+
+/* Tolerances of the Hausdorff distance, of itself and of the diameter. */
+#define HAUSDORFF_RELATIVE .01
+#define HAUSDORFF_ABSOLUTE 1e-5
 
 static error_t parse_compare(int key, char *text, struct argp_state *state) {
     compare_options *o = state->input;
     if (key == KEY_SAMPLES) return tool_parse_count32(state, "--samples", text, 0, 1000000, &o->samples);
     if (key == KEY_BUDGET) return tool_parse_count(state, "--budget", text, 1, UINT64_MAX, &o->budget);
+    if (key == KEY_HAUSDORFF) return o->hausdorff = true, 0;
     return ARGP_ERR_UNKNOWN;
 }
 
@@ -47,6 +55,14 @@ static json_t *report_error(const fct_mesh_error *e, uint32_t samples, double se
                      "e_max_relative", e->e_max / d, "diameter", e->diameter, "color_rms", e->color_rms,
                      "color_max", e->color_max, "color_rms_relative", e->color_rms_relative, "samples",
                      (json_int_t)e->samples, "samples_per_face", (json_int_t)samples, "seconds", seconds);
+}
+
+static json_t *report_hausdorff(const fct_hausdorff *h) {
+    return json_pack("{s:f, s:f, s:f, s:[f,f,f], s:[f,f,f], s:I, s:I}", "hausdorff", h->distance,
+                     "hausdorff_ab", h->distance_ab, "hausdorff_ba", h->distance_ba, "farthest_a",
+                     h->point_a[0], h->point_a[1], h->point_a[2], "farthest_b", h->point_b[0], h->point_b[1],
+                     h->point_b[2], "farthest_face_a", (json_int_t)h->face_a, "farthest_face_b",
+                     (json_int_t)h->face_b);
 }
 
 /* Builds the second tree again, relative to the origin of the first, if their origins differ. */
@@ -73,6 +89,7 @@ static int run_compare(tool *t, void *options) {
     fct_tree *trees[2] = {NULL, NULL};
     fct_bvh *bvhs[2] = {NULL, NULL};
     fct_mesh_error error;
+    fct_hausdorff hausdorff;
     int code = TOOL_DONE;
     for (int i = 0; i < 2 && code == TOOL_DONE; ++i) code = tool_open_tree(t, t->inputs[i], NULL, &trees[i]);
     if (code == TOOL_DONE) code = share_origin(t, trees);
@@ -83,7 +100,15 @@ static int run_compare(tool *t, void *options) {
         samples = choose_samples(options, trees[0], trees[1]);
         code = tool_result(t, fct_mesh_compare(&t->env, bvhs[0], bvhs[1], samples, t->seed, &error));
     }
-    if (code == TOOL_DONE) code = tool_print(t, report_error(&error, samples, tool_seconds() - start));
+    const compare_options *o = options;
+    if (code == TOOL_DONE && o->hausdorff)
+        code = tool_result(t, fct_mesh_hausdorff(&t->env, bvhs[0], bvhs[1], HAUSDORFF_RELATIVE,
+                                                 HAUSDORFF_ABSOLUTE * error.diameter, &hausdorff));
+    if (code == TOOL_DONE) {
+        json_t *report = report_error(&error, samples, tool_seconds() - start);
+        if (o->hausdorff && report) json_object_update_new(report, report_hausdorff(&hausdorff));
+        code = tool_print(t, report);
+    }
     for (int i = 0; i < 2; ++i) {
         fct_bvh_destroy(bvhs[i]);
         fct_tree_destroy(trees[i]);
@@ -106,11 +131,15 @@ int tool_compare(int argc, char **argv) {
                 "e_avg divided by the squared diameter, e_max_relative is "
                 "e_max divided by the diameter, where the diameter is the "
                 "diagonal of A's bounds. Colours are compared if both "
-                "meshes have them on their vertices.\n\n"
+                "meshes have them on their vertices. --hausdorff adds the "
+                "largest distance of all points, not only of samples, with "
+                "the points and faces where it is.\n\n"
                 "JSON keys: e_avg, e_max, e_avg_ab, e_avg_ba, e_max_ab, "
                 "e_max_ba, e_avg_relative, e_max_relative, diameter, "
                 "color_rms, color_max, color_rms_relative, samples, "
-                "samples_per_face, seconds.",
+                "samples_per_face, seconds; with --hausdorff: hausdorff, "
+                "hausdorff_ab, hausdorff_ba, farthest_a, farthest_b, "
+                "farthest_face_a, farthest_face_b.",
         .examples = "  facetree compare bunny.obj bunny-small.ply\n"
                     "  facetree compare bunny.obj bunny-small.ply --samples 100 --json",
         .options = compare_options_table,

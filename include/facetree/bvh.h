@@ -189,6 +189,20 @@ typedef struct fct_mesh_error {
 FCT_API fct_result fct_mesh_compare(const fct_env *env, const fct_bvh *a, const fct_bvh *b,
                                     uint32_t samples_per_face, uint64_t seed, fct_mesh_error *out);
 
+/* The Hausdorff distance: the largest distance of any point of one surface, not only of samples, from the
+ * other. */
+typedef struct fct_hausdorff {
+    double distance, distance_ab,
+        distance_ba;               /* the larger of the two; of points of a from b; of points of b from a */
+    double point_a[3], point_b[3]; /* the point of a that is farthest from b, and the other way round */
+    uint32_t face_a, face_b;       /* on these faces, input ids */
+} fct_hausdorff;
+/* The distances are those of the points named, and at most relative * distance + absolute (or 1e-7 of the
+ * diagonal) below the true ones. Both with the OBB backend. Errors: DATA (a negative tolerance, the other
+ * backend), MEMORY, CANCELLED. */
+FCT_API fct_result fct_mesh_hausdorff(const fct_env *env, const fct_bvh *a, const fct_bvh *b, double relative,
+                                      double absolute, fct_hausdorff *out);
+
 #ifdef __cplusplus
 }
 #endif
