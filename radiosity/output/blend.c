@@ -244,11 +244,11 @@ void fct_anchors_variance(const fct_anchors *t, const fct_elements *set, const f
                           const float normal[3], float offset, bool flat, double variance[3],
                           uint64_t *rays) {
     blend b;
-    double total = 0, squares = 0;
+    double squares = 0;
     variance[0] = variance[1] = variance[2] = 0;
     if (!find_blend(t, set, point, normal, offset, flat, &b, rays)) return;
     measure_residuals(t, v3_load(point), v3_load(normal), &b, variance);
     fit_weights(t, v3_load(point), v3_load(normal), &b);
-    for (int i = 0; i < b.near.count; ++i) total += b.weights[i], squares += b.weights[i] * b.weights[i];
-    for (int c = 0; c < 3; ++c) variance[c] *= squares / (total * total);
+    for (int i = 0; i < b.near.count; ++i) squares += b.weights[i] * b.weights[i];
+    for (int c = 0; c < 3; ++c) variance[c] *= squares; /* the sum of the weights is 1 */
 }

@@ -12,7 +12,7 @@
 
 static tool test_tool;
 
-/* Separate triangles in a row. Face i has the area 2^i, light i + 1 and the error errors[i]. */
+/* Separate triangles in a row. Face i has the area 2^i, light count - i and the error errors[i]. */
 static void make_faces(uint32_t count, const float *errors, drawing *d) {
     *d = (drawing){.shading = DRAWING_AUTO};
     assert_int_equal(
@@ -25,7 +25,7 @@ static void make_faces(uint32_t count, const float *errors, drawing *d) {
             const size_t v = 3 * (size_t)f + k;
             d->mesh.triangles[v] = (uint32_t)v;
             d->mesh.error[v] = errors[f];
-            for (size_t c = 0; c < 3; ++c) d->mesh.colors[3 * v + c] = (float)(f + 1);
+            for (size_t c = 0; c < 3; ++c) d->mesh.colors[3 * v + c] = (float)(count - f);
         }
     }
 }
@@ -35,7 +35,7 @@ static void release(drawing *d) {
     tool_release(&test_tool, d->values);
 }
 
-/* Areas 1, 2, 4, 8: the median light is that of the largest face, 4; 98 % of the area end in it too. */
+/* Areas 8, 4, 2, 1 with light 1 to 4: the largest face has 53 % of the area, so the median light is its 1. */
 static void errors_are_shares_of_the_median(void **state) {
     (void)state;
     static const float errors[4] = {.02F, .3F, 0, .04F};
@@ -43,15 +43,15 @@ static void errors_are_shares_of_the_median(void **state) {
     double end = 0;
     make_faces(4, errors, &d);
     assert_int_equal(drawing_show_errors(&test_tool, "x", &d, &end), TOOL_DONE);
-    /* Of the area with errors, 1 + 2 + 8, the face with the largest error has 18 %: .3 / 4 = 7.5 %. */
-    assert_true(end == 10 && d.shading == DRAWING_LIGHT);
-    for (size_t v = 0; v < 12; ++v) assert_float_equal(d.values[v], errors[v / 3] / 4 * 100 / 10, 1e-6);
+    /* Of the area with errors, 1 + 2 + 8, the face with the largest error has 18 %: .3 / 1 = 30 %. */
+    assert_true(end == 50 && d.shading == DRAWING_LIGHT);
+    for (size_t v = 0; v < 12; ++v) assert_float_equal(d.values[v], errors[v / 3] * 100 / 50, 1e-6);
     release(&d);
     make_faces(4, errors, &d);
     end = 4;
     assert_int_equal(drawing_show_errors(&test_tool, "x", &d, &end), TOOL_DONE);
     assert_true(end == 4);
-    assert_float_equal(d.values[11], .04 / 4 * 100 / 4, 1e-6);
+    assert_float_equal(d.values[11], .04 * 100 / 4, 1e-6);
     release(&d);
 }
 
@@ -61,7 +61,7 @@ static void ends_are_round(void **state) {
     static const struct {
         float error;
         double end;
-    } cases[] = {{1e-4F, .005}, {.0011F, .05}, {.0039F, .1}, {.0041F, .2}, {.15F, 5}, {.21F, 10}, {6, 200}};
+    } cases[] = {{1e-4F, .005}, {.0011F, .05}, {.0039F, .1}, {.0041F, .2}, {.084F, 5}, {.21F, 10}, {6, 200}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         /* The first two faces have 3 / 255 of the area. */
         const float errors[8] = {9, 9, 0, 0, 0, 0, 0, cases[i].error};
