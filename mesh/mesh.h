@@ -18,7 +18,7 @@ typedef struct fct_mesh_array {
     unsigned bit;  /* FCT_MESH_, 0 for positions and triangles */
     bool of_faces; /* an element per face, else per vertex */
 } fct_mesh_array;
-enum { FCT_MESH_ARRAYS = 13 };
+enum { FCT_MESH_ARRAYS = 14 };
 /* Lists all arrays, also those that are NULL. */
 void fct_mesh_arrays(fct_mesh *mesh, fct_mesh_array out[FCT_MESH_ARRAYS]);
 /* The FCT_MESH_ bits of the arrays that the mesh has. */

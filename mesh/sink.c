@@ -22,7 +22,8 @@ void fct_note_left_out(const fct_sink *sink, unsigned arrays) {
                {FCT_MESH_MATERIALS, m->materials, "materials"},
                {FCT_MESH_IRRADIANCE, m->irradiance, "irradiance"},
                {FCT_MESH_DIRECT, m->direct, "direct light"},
-               {FCT_MESH_INDIRECT, m->indirect, "indirect light"}};
+               {FCT_MESH_INDIRECT, m->indirect, "indirect light"},
+               {FCT_MESH_ERROR, m->error, "the error of light"}};
     char text[192] = "";
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         if ((arrays & all[i].flag) && all[i].there) strcat(strcat(text, *text ? ", " : ""), all[i].name);

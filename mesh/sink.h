@@ -22,8 +22,9 @@ typedef struct fct_sink {
     const float *radiosity; /* the floats to write beside the colours for display, which are mesh->colors */
 } fct_sink;
 
-/* The lights that stand beside the colours. */
-#define FCT_MESH_LIGHTS ((unsigned)(FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT))
+/* The lights that stand beside the colours, and the error of the light. */
+#define FCT_MESH_LIGHTS                                                                                      \
+    ((unsigned)(FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_ERROR))
 
 /* Sends one note that names the arrays of the mesh which the format cannot store. arrays: FCT_MESH_ bits. */
 void fct_note_left_out(const fct_sink *sink, unsigned arrays);

@@ -12,6 +12,7 @@ void fct_soup_release(const fct_env *env, fct_soup *soup) {
     fct_release(env, soup->irradiance);
     fct_release(env, soup->direct);
     fct_release(env, soup->indirect);
+    fct_release(env, soup->error);
     fct_release(env, soup->corners);
     fct_release(env, soup->starts);
     fct_release(env, soup->texcoords);
@@ -86,6 +87,7 @@ static void drop_wrong_attributes(const fct_env *env, const char *name, fct_soup
     drop_if_not_finite(env, name, "vertex", "irradiance", &soup->irradiance, vertices, 3);
     drop_if_not_finite(env, name, "vertex", "direct light", &soup->direct, vertices, 3);
     drop_if_not_finite(env, name, "vertex", "indirect light", &soup->indirect, vertices, 3);
+    drop_if_not_finite(env, name, "vertex", "errors", &soup->error, vertices, 1);
     drop_if_not_finite(env, name, "vertex", "normals", &soup->normals, vertices, 3);
     drop_if_not_finite(env, name, "corner", "texture coordinates", &soup->texcoords, soup->corner_count, 2);
     drop_if_not_finite(env, name, "face", "face colours", &soup->polygon_colors, polygons, 3);
@@ -101,10 +103,11 @@ static void move_shared(fct_soup *soup, fct_mesh *out) {
     out->irradiance = soup->irradiance;
     out->direct = soup->direct;
     out->indirect = soup->indirect;
+    out->error = soup->error;
     out->material_count = soup->material_count;
     out->material_names = soup->material_names;
     soup->positions = soup->colors = soup->normals = NULL;
-    soup->irradiance = soup->direct = soup->indirect = NULL;
+    soup->irradiance = soup->direct = soup->indirect = soup->error = NULL;
     soup->material_names = NULL;
     soup->material_count = 0;
 }

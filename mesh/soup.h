@@ -36,6 +36,7 @@ typedef struct fct_soup {
     float *colors;      /* vertex_count x 3, linear, or NULL */
     float *normals;     /* vertex_count x 3 or NULL */
     float *irradiance, *direct, *indirect; /* vertex_count x 3 or NULL */
+    float *error;                          /* vertex_count or NULL */
     uint32_t *corners;                     /* corner_count vertex indices, possibly out of range */
     uint32_t *starts;      /* polygon_count + 1 places in corners, ascending, or NULL: three corners each */
     float *texcoords;      /* corner_count x 2 or NULL */

@@ -66,7 +66,7 @@ static bool ask_stop(void *user, const char *phase, double done) {
 /* Whether the bake can end with an early solution. */
 static bool can_stop(const fct_bake_def *def) {
     return def->stop && def->method == FCT_BAKE_FACE &&
-           !(def->outputs & (FCT_MESH_DIRECT | FCT_MESH_INDIRECT));
+           !(def->outputs & (FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_ERROR));
 }
 
 static void set_env(fct_bake *bake, const fct_env *env) {

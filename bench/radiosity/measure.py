@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Bakes the scenes of scenes.py and measures what a viewer shows, colours interpolated inside triangles, against paths.
-usage: measure.py FACETREE OUT [--scenes NAME,...] [--points N] [--paths N] [--bake "OPTIONS"] [--csv FILE]
+usage: measure.py FACETREE OUT [--scenes NAME,...] [--points N] [--paths N] [--bake "OPTIONS"] [--csv FILE] [--map]
 Prints per scene: RMS, bias and 99th percentile of the error over the mean, also of the worst object of at least .5 % of the
-area; rays per vertex, times, and the estimate of the bake itself. Emitters are left out. Needs numpy."""
+area; rays per vertex, times, and the estimate of the bake itself. Emitters are left out. With --map also how well the error of
+each vertex predicts: the error at the points in ten groups of the same size, from the least to the largest prediction. Needs
+numpy."""
 import argparse
 import csv
 import json
@@ -25,7 +27,7 @@ def run_json(command):
 
 
 def read_ply(path):
-    """Positions, radiosities, triangles and shading normals of a baked PLY."""
+    """Positions, radiosities, triangles, shading normals and errors of a baked PLY."""
     with open(path, "rb") as file:
         data = file.read()
     end = data.index(b"end_header\n") + 11
@@ -41,18 +43,18 @@ def read_ply(path):
     f = np.frombuffer(data, np.dtype([("n", "u1"), ("v", "<u4", 3)]), faces, end + v.nbytes)
     return (np.stack([v[k] for k in "xyz"], 1).astype(float),
             np.stack([v["radiosity_" + k] for k in "rgb"], 1).astype(float), f["v"],
-            np.stack([v["n" + k] for k in "xyz"], 1).astype(float))
+            np.stack([v["n" + k] for k in "xyz"], 1).astype(float), v["error"].astype(float)[:, None])
 
 
 def pick_points(path, count, random):
-    """Points by area: positions, interpolated shading normals, shown radiosities; and the area."""
-    p, light, t, smooth = read_ply(path)
+    """Points by area: positions, interpolated shading normals, shown radiosities, predicted errors; and the area."""
+    p, light, t, smooth, error = read_ply(path)
     area = np.linalg.norm(np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]]), axis=1) / 2
     face = random.choice(len(t), count, p=area / area.sum())
     u = np.sort(random.random((count, 2)), 1)
     w = np.stack([u[:, 0], u[:, 1] - u[:, 0], 1 - u[:, 1]], 1)
     mix = lambda x: (x[t[face]] * w[:, :, None]).sum(1)
-    return mix(p), mix(smooth), mix(light), area.sum()
+    return mix(p), mix(smooth), mix(light), mix(error)[:, 0], area.sum()
 
 
 def trace_points(tool, scene, path, paths):
@@ -74,12 +76,21 @@ def judge(shown, halves, area):
             "square": square, "p99": np.percentile(np.abs(shown - truth).max(1), 99) / mean}
 
 
+def print_map(picks, halves, mean):
+    """True RMS errors over the mean, in ten groups of points by predicted error, and the predicted ones."""
+    shown, predicted = (np.concatenate([p[k] for p in picks]) for k in (2, 3))
+    square = ((shown - halves[0]) * (shown - halves[1])).mean(1)
+    groups = np.array_split(np.argsort(predicted), 10)
+    for name, values in (("true", square), ("predicted", predicted ** 2)):
+        print(f"    {name:9}", *("%6.2f" % (100 * max(values[g].mean(), 0) ** .5 / mean) for g in groups), "%")
+
+
 def measure_scene(tool, out, name, options):
     folder = scenes.make_scene(tool, out, name)
     scene, baked = f"{folder}/scene.json", f"{out}/baked/{name}"
     subprocess.run(["rm", "-rf", baked], check=True)
     os.makedirs(baked)
-    stats = run_json([tool, "bake", scene, "-o", baked + "/", "--light", "radiosity,normal",
+    stats = run_json([tool, "bake", scene, "-o", baked + "/", "--light", "radiosity,error,normal",
                       *options.bake.split()])
     with open(scene, encoding="ascii") as file:
         document = json.load(file)
@@ -92,7 +103,7 @@ def measure_scene(tool, out, name, options):
     halves = trace_points(tool, scene, f"{baked}/points", options.paths)
     rows, n = {}, options.points
     for i, (file, pick) in enumerate(zip(files, picks)):
-        rows[file["object"]] = judge(pick[2], [h[i * n:(i + 1) * n] for h in halves], pick[3])
+        rows[file["object"]] = judge(pick[2], [h[i * n:(i + 1) * n] for h in halves], pick[4])
     area = sum(r["area"] for r in rows.values())
     weigh = lambda key: sum(r[key] * r["area"] for r in rows.values()) / area
     big = {k: r for k, r in rows.items() if r["area"] > .005 * area}
@@ -109,6 +120,8 @@ def measure_scene(tool, out, name, options):
           "%d vertices, %.1f s" % (name, 100 * total, 100 * bias, worst, 100 * result["worst_rms"],
                                    100 * result["worst_bias"], 100 * result["p99"], 100 * result["estimate"],
                                    result["rays_per_vertex"], stats["vertices"], seconds["total"]), flush=True)
+    if options.map:
+        print_map(picks, halves, weigh("mean"))
     if options.objects:
         for key, row in sorted(big.items(), key=lambda item: -item[1]["rms"])[:8]:
             print(f"    {key}: {100 * row['rms']:.1f} % (bias {100 * row['bias']:+.1f})")
@@ -125,6 +138,7 @@ def main():
     parser.add_argument("--bake", default="")
     parser.add_argument("--csv")
     parser.add_argument("--objects", action="store_true")
+    parser.add_argument("--map", action="store_true")
     options = parser.parse_args()
     rows = [measure_scene(options.tool, options.out, name, options) for name in options.scenes.split(",")]
     if options.csv:

@@ -18,13 +18,14 @@ extern "C" {
 typedef struct fct_mesh {
     uint32_t vertex_count;
     uint32_t face_count;
-    float *positions;      /* vertex_count x 3, finite */
-    uint32_t *triangles;   /* face_count x 3, each < vertex_count */
-    float *colors;         /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
-    float *irradiance;     /* vertex_count x 3: the light that arrives per area, or NULL */
-    float *direct;         /* vertex_count x 3: its part straight from the lamps, or NULL */
-    float *indirect;       /* vertex_count x 3: its other part, or NULL */
-    float *normals;        /* vertex_count x 3, or NULL */
+    float *positions;    /* vertex_count x 3, finite */
+    uint32_t *triangles; /* face_count x 3, each < vertex_count */
+    float *colors;       /* vertex_count x 3, linear light (radiosity in a baked mesh), or NULL */
+    float *irradiance;   /* vertex_count x 3: the light that arrives per area, or NULL */
+    float *direct;       /* vertex_count x 3: its part straight from the lamps, or NULL */
+    float *indirect;     /* vertex_count x 3: its other part, or NULL */
+    float *error;        /* vertex_count: expected RMS error of the light in `colors`, in its unit, or NULL */
+    float *normals;      /* vertex_count x 3, or NULL */
     float *corner_normals; /* face_count x 3 x 3, per corner, or NULL: for vertices with several normals; then
                               `normals` is NULL. fct_scene_add_object alone uses them */
     float *texcoords;      /* face_count x 3 x 2, per corner, so seams need no extra vertices, or NULL */
@@ -51,7 +52,8 @@ enum {
     FCT_MESH_IRRADIANCE = 128,
     FCT_MESH_DIRECT = 256,
     FCT_MESH_INDIRECT = 512,
-    FCT_MESH_CORNER_NORMALS = 1024
+    FCT_MESH_CORNER_NORMALS = 1024,
+    FCT_MESH_ERROR = 2048
 };
 
 /* Allocates the arrays (contents undefined). On failure *out is all zero. Errors: MEMORY. */
@@ -104,7 +106,8 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
  * another light, else COLOR_0; buffers in the folder of the file or below, anywhere with env->allow_outside).
  * The ending of the name selects the format. "-" reads a PLY from standard input. Integer colours are sRGB
  * and become linear. Float colours are linear, those of OBJ sRGB. radiosity_r/g/b of a PLY replace its other
- * colours; without them irradiance_r/g/b do, or direct_, or indirect_. A mesh without faces is valid.
+ * colours; without them irradiance_r/g/b do, or direct_, or indirect_. The error of light is `error` of a PLY
+ * and _ERROR of glTF. A mesh without faces is valid.
  * Messages name the data that a mesh cannot store (lines, normals that differ by corner, ...). docs/mesh.md
  * lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
@@ -139,9 +142,9 @@ FCT_API fct_mesh_save_def fct_mesh_save_def_default(void);
 /* Writes .ply (binary little endian; colours as sRGB bytes and float radiosity_r/g/b), .obj, .off, .stl, .om
  * or .glb (unlit; COLOR_0 exposed, clamped and linear, and float _RADIOSITY). "-" writes a PLY to standard
  * output, and a pipe or a device without such an ending receives a PLY. Replaces the target as a whole:
- * temporary file, fsync, rename. PLY and GLB also write irradiance, direct and indirect light as floats
- * (irradiance_r/g/b, ...; _IRRADIANCE, ...). PLY keeps every array except source_faces and source_uv, bit for
- * bit; fct_mesh_load skips these two. A note names the
+ * temporary file, fsync, rename. PLY and GLB also write irradiance, direct and indirect light and their error
+ * as floats (irradiance_r/g/b, ..., error; _IRRADIANCE, ..., _ERROR). PLY keeps every array except
+ * source_faces and source_uv, bit for bit; fct_mesh_load skips these two. A note names the
  * arrays that the format cannot store. GLB groups faces by material and splits vertices whose texture
  * coordinates differ. OM keeps colours as bytes. def may be NULL. Errors: OUTPUT, DATA (unknown ending,
  * invalid mesh, a display that the mesh does not have), MEMORY, CANCELLED. */

@@ -53,9 +53,12 @@ typedef struct fct_bake_def {
     uint64_t seed;    /* of all random numbers; equal seeds give equal results */
     bool indirect_only;  /* the output leaves out emission and direct light */
     unsigned outputs;    /* arrays of the lit meshes beside the colours: FCT_MESH_IRRADIANCE, FCT_MESH_DIRECT,
-                            FCT_MESH_INDIRECT, FCT_MESH_NORMALS; default 0. REFERENCE knows the irradiance alone,
-                            and NONE does not know its parts. indirect_only leaves the direct part out of the
-                            irradiance too */
+                            FCT_MESH_INDIRECT, FCT_MESH_ERROR, FCT_MESH_NORMALS; default 0. REFERENCE knows
+                            the irradiance alone, and NONE knows neither its parts nor the error.
+                            indirect_only leaves the direct part out of the irradiance too. The error of a
+                            vertex is the expected RMS error of its radiosity over the channels, in the unit
+                            of radiosity: large where the light is uncertain. Over the area of a surface its
+                            RMS is about fct_bake_error.error times light */
     fct_keep keep;       /* default NONE. FACE has no outputs beside the colours and the normals */
     bool sources;        /* fct_bake_mesh also gives source_faces and source_uv; default false */
     fct_normals normals; /* default FILE */
@@ -66,8 +69,8 @@ typedef struct fct_bake_def {
     /* Asked between steps, in the calling thread; true ends the bake early. If a pass of the links was
      * solved, calls still succeed, with stats.interrupted: the solution is that of the last complete pass or
      * gather, and further instances have the light of FCT_FINAL_NONE, without an error estimate. Otherwise
-     * fct_bake_create gives CANCELLED. NULL: not asked. Nor is it with REFERENCE, or with outputs DIRECT and
-     * INDIRECT, which the links do not tell apart. */
+     * fct_bake_create gives CANCELLED. NULL: not asked. Nor is it with REFERENCE, or with outputs DIRECT,
+     * INDIRECT and ERROR, which the links do not know. */
     bool (*stop)(void *user);
     void *stop_user;
     double max_edge; /* longest edge of the output's triangles far from other surfaces, world units; 0: a

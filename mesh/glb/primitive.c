@@ -86,6 +86,8 @@ static fct_result grow_vertices(fct_glb_builder *b, size_t count) {
         result = fct_grow(env_of(b), (void **)&soup->colors, &b->color_capacity, room, 3 * sizeof(float));
     if (result == FCT_OK && b->has_normals)
         result = fct_grow(env_of(b), (void **)&soup->normals, &b->normal_capacity, room, 3 * sizeof(float));
+    if (result == FCT_OK && b->has_errors)
+        result = fct_grow(env_of(b), (void **)&soup->error, &b->error_capacity, room, sizeof(float));
     return result;
 }
 
@@ -115,6 +117,12 @@ static fct_result append_vertices(fct_glb_builder *b, const fct_glb_transform *t
             for (int k = 0; k < 3; ++k) to[3 * v + k] = index < 0 ? 1 : (float)fct_glb_value(values, v, k);
         for (size_t v = 0; index >= 0 && index == p->color && values->width == 4 && v < positions->count; ++v)
             b->clear += fct_glb_value(values, v, 3) < 1;
+    }
+    if (b->has_errors) {
+        result = get_array(b, p->error, 1, 1, positions->count, &values);
+        if (result != FCT_OK) return result;
+        for (size_t v = 0; v < positions->count; ++v)
+            soup->error[soup->vertex_count + v] = (float)fct_glb_value(values, v, 0);
     }
     soup->vertex_count += (uint32_t)positions->count;
     return FCT_OK;
@@ -193,7 +201,7 @@ static fct_result append_triangles(fct_glb_builder *b, const fct_glb_primitive *
 
 bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b) {
     return a->position == b->position && a->normal == b->normal && a->color == b->color &&
-           a->light == b->light;
+           a->light == b->light && a->error == b->error;
 }
 
 const char *fct_glb_find_light(json_t *attributes) {
@@ -203,12 +211,23 @@ const char *fct_glb_find_light(json_t *attributes) {
     return NULL;
 }
 
+/* The name may mean something else in the file of another program: then it is absent. */
+static int64_t find_error(const fct_glb *glb, json_t *attributes) {
+    json_t *index = json_object_get(attributes, "_ERROR");
+    if (!json_is_integer(index) || json_integer_value(index) < 0) return FCT_GLB_ABSENT;
+    json_t *accessors = json_object_get(glb->root, "accessors");
+    json_t *accessor = json_array_get(accessors, (size_t)json_integer_value(index));
+    const char *type = json_string_value(json_object_get(accessor, "type"));
+    return type && !strcmp(type, "SCALAR") ? json_integer_value(index) : FCT_GLB_ABSENT;
+}
+
 fct_result fct_glb_read_primitive(const fct_glb *glb, json_t *object, fct_glb_primitive *out) {
     json_t *attributes = json_object_get(object, "attributes");
     fct_result result = fct_glb_index(glb, attributes, "POSITION", &out->position);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "NORMAL", &out->normal);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "COLOR_0", &out->color);
     out->light_name = fct_glb_find_light(attributes), out->light = FCT_GLB_ABSENT;
+    out->error = find_error(glb, attributes);
     if (result == FCT_OK && out->light_name)
         result = fct_glb_index(glb, attributes, out->light_name, &out->light);
     if (result == FCT_OK) result = fct_glb_index(glb, attributes, "TEXCOORD_0", &out->texcoord);
@@ -234,7 +253,7 @@ static bool is_left_out(const fct_glb_builder *b, int64_t mode) {
 
 fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
     json_t *mesh, *object, *material;
-    size_t i, j, primitives = 0, with_normals = 0;
+    size_t i, j, primitives = 0, with_normals = 0, with_errors = 0;
     *unnamed = false;
     json_array_foreach(json_object_get(b->glb->root, "meshes"), i, mesh)
         json_array_foreach(json_object_get(mesh, "primitives"), j, object) {
@@ -244,6 +263,7 @@ fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
         if (p.position == FCT_GLB_ABSENT || is_left_out(b, p.mode)) continue;
         ++primitives;
         with_normals += p.normal >= 0;
+        with_errors += p.error >= 0;
         b->has_colors |= p.color >= 0 || p.light >= 0;
         b->has_texcoords |= p.texcoord >= 0;
         *unnamed |= p.material < 0;
@@ -253,6 +273,7 @@ fct_result fct_glb_choose_arrays(fct_glb_builder *b, bool *unnamed) {
         b->has_materials |= json_is_string(json_object_get(material, "name")) || p.material > 0;
     }
     b->has_normals = with_normals && with_normals == primitives;
+    b->has_errors = with_errors && with_errors == primitives;
     if (with_normals && !b->has_normals)
         fct_glb_warn(b->glb, "%zu of %zu primitives have no normals, so all normals are left out",
                      primitives - with_normals, primitives);

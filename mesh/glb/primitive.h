@@ -6,7 +6,7 @@
 
 /* The accessors of a primitive; FCT_GLB_ABSENT: none. */
 typedef struct fct_glb_primitive {
-    int64_t position, normal, color, light, texcoord, indices, material, mode;
+    int64_t position, normal, color, light, error, texcoord, indices, material, mode;
     const char *light_name; /* the attribute of `light`: _RADIOSITY, or another quantity of a bake */
 } fct_glb_primitive;
 
@@ -16,7 +16,7 @@ typedef struct fct_glb_builder {
     fct_soup *soup;
     /* The arrays that the soup gets. has_normals: primitives have normals; those
      * without get zeros. */
-    bool has_colors, has_normals, has_texcoords, has_materials;
+    bool has_colors, has_normals, has_errors, has_texcoords, has_materials;
     uint32_t unnamed; /* number of the material that primitives without one get */
     /* Faces get the number of their primitive of triangles instead of a material, and points are left out. */
     bool by_primitive;
@@ -28,8 +28,8 @@ typedef struct fct_glb_builder {
     size_t clear;                           /* vertices whose colour has an alpha below 1 */
     size_t incomplete;                      /* primitives that end with an incomplete triangle */
 
-    size_t vertex_capacity, color_capacity, normal_capacity, corner_capacity, texcoord_capacity,
-        material_capacity;
+    size_t vertex_capacity, color_capacity, normal_capacity, error_capacity, corner_capacity,
+        texcoord_capacity, material_capacity;
 } fct_glb_builder;
 
 /* The name of the light that a primitive's attributes hold: _RADIOSITY, else _IRRADIANCE, _DIRECT or
@@ -40,7 +40,8 @@ const char *fct_glb_find_light(json_t *attributes);
 bool fct_glb_share_vertices(const fct_glb_primitive *a, const fct_glb_primitive *b);
 
 /* Decides which arrays the soup has: colours, texture coordinates and materials if any primitive has them,
- * normals if all primitives have them. *unnamed: a primitive has no material. Errors: DATA. */
+ * normals and the error of the light if all primitives have them. *unnamed: a primitive has no material.
+ * Errors: DATA. */
 fct_result fct_glb_choose_arrays(fct_glb_builder *builder, bool *unnamed);
 
 /* Reads the members of a primitive. An absent mode is 4. Errors: DATA. */

@@ -12,7 +12,17 @@ typedef struct group {
     fct_ply_kind kind;
     const char *names[3];
     size_t width;
-    enum { POSITIONS, NORMALS, COLORS, TEXCOORDS, POLYGON_COLORS, IRRADIANCE, DIRECT, INDIRECT } destination;
+    enum {
+        POSITIONS,
+        NORMALS,
+        COLORS,
+        TEXCOORDS,
+        POLYGON_COLORS,
+        IRRADIANCE,
+        DIRECT,
+        INDIRECT,
+        ERROR
+    } destination;
 } group;
 
 static const group groups[] = {
@@ -29,6 +39,7 @@ static const group groups[] = {
     {FCT_PLY_VERTICES, {"irradiance_r", "irradiance_g", "irradiance_b"}, 3, IRRADIANCE},
     {FCT_PLY_VERTICES, {"direct_r", "direct_g", "direct_b"}, 3, DIRECT},
     {FCT_PLY_VERTICES, {"indirect_r", "indirect_g", "indirect_b"}, 3, INDIRECT},
+    {FCT_PLY_VERTICES, {"error"}, 1, ERROR},
     {FCT_PLY_VERTICES, {"texture_u", "texture_v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"u", "v"}, 2, TEXCOORDS},
     {FCT_PLY_VERTICES, {"s", "t"}, 2, TEXCOORDS},
@@ -119,8 +130,9 @@ fct_result fct_ply_bind(const fct_text *t, const fct_ply_header *header, const f
                             .indices = FCT_PLY_NOWHERE,
                             .texcoords = FCT_PLY_NOWHERE,
                             .material = FCT_PLY_NOWHERE};
-    float **arrays[] = {&soup->positions,      &soup->normals,    &soup->colors, vertex_texcoords,
-                        &soup->polygon_colors, &soup->irradiance, &soup->direct, &soup->indirect};
+    float **arrays[] = {&soup->positions, &soup->normals,        &soup->colors,
+                        vertex_texcoords, &soup->polygon_colors, &soup->irradiance,
+                        &soup->direct,    &soup->indirect,       &soup->error};
     for (size_t i = 0; i < sizeof groups / sizeof *groups; ++i) {
         if (groups[i].kind != out->kind) continue;
         fct_result result = bind_group(t->env, groups + i, properties, element, soup->origin,

@@ -1,7 +1,7 @@
 /* mesh/ply/write.c: writes every array of an fct_mesh as PLY. The reader restores the same bits.
  *
  *   vertex: x y z [nx ny nz] [red green blue] [radiosity_r radiosity_g radiosity_b] [irradiance_r ...]
- *           [direct_r ...] [indirect_r ...]
+ *           [direct_r ...] [indirect_r ...] [error]
  *   face:   vertex_indices [texcoord, six floats] [red green blue radiosity_r ...] [material_index]
  *           [source_face] [source_uv, six floats]
  *
@@ -50,6 +50,7 @@ static void write_header(const fct_sink *sink, FILE *stream) {
     if (m->colors) fputs(colors, stream);
     for (int i = 0; i < LIGHTS; ++i)
         if (lights[i]) print_properties(stream, names[i]);
+    if (m->error) fprintf(stream, "property float error\n");
     fprintf(stream, "element face %u\nproperty list uchar int vertex_indices\n", m->face_count);
     if (m->texcoords) fprintf(stream, "property list uchar float texcoord\n");
     if (m->face_colors) {
@@ -109,7 +110,7 @@ static unsigned char *put_vertex(unsigned char *p, const fct_sink *sink, size_t 
     list_lights(sink, lights);
     for (int i = 0; i < LIGHTS; ++i)
         if (lights[i]) p = put_floats(p, lights[i] + 3 * v, 3);
-    return p;
+    return m->error ? put_floats(p, m->error + v, 1) : p;
 }
 
 static unsigned char *put_face(unsigned char *p, const fct_sink *sink, size_t f) {
@@ -200,6 +201,7 @@ static fct_result write_ascii(const fct_sink *sink, FILE *stream) {
         if (m->colors) print_bytes(sink, stream, m->colors + 3 * v);
         for (int i = 0; i < LIGHTS; ++i)
             if (lights[i]) print_floats(stream, " ", lights[i] + 3 * v, 3);
+        if (m->error) print_floats(stream, " ", m->error + v, 1);
         fputc('\n', stream);
     }
     for (size_t f = 0; f < m->face_count; ++f) print_face(sink, stream, f);

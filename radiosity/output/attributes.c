@@ -5,16 +5,20 @@
 
 #include "base/env.h"
 
-#define KNOWN (FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_NORMALS)
+#define KNOWN (FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_NORMALS | FCT_MESH_ERROR)
 #define PARTS (FCT_MESH_DIRECT | FCT_MESH_INDIRECT)
 
 fct_result fct_attributes_check(const fct_env *env, const fct_bake_def *def) {
     if (def->outputs & ~(unsigned)KNOWN)
         return fct_fail(env, FCT_ERROR_DATA,
-                        "outputs are irradiance, direct and indirect light and normals, found bits %#x",
+                        "outputs are irradiance, direct and indirect light, error and normals, found bits "
+                        "%#x",
                         def->outputs);
     if (def->outputs & ~(unsigned)FCT_MESH_NORMALS && def->keep == FCT_KEEP_FACE)
         return fct_fail(env, FCT_ERROR_DATA, "faces have one colour, the radiosity; found other outputs");
+    if (def->outputs & FCT_MESH_ERROR && (def->method == FCT_BAKE_REFERENCE || def->final == FCT_FINAL_NONE))
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "the error of the light needs the method face with a final direct or gather");
     if (!(def->outputs & PARTS)) return FCT_OK;
     if (def->method == FCT_BAKE_REFERENCE)
         return fct_fail(env, FCT_ERROR_DATA,

@@ -9,6 +9,9 @@
  * with the weighted RMS distance of the anchors as the unit of length. So E = sum v_i E_i(n), with sum v = 1.
  * The weight of the farthest anchor is nearly zero, so E hardly changes where one anchor replaces another
  * among the nearest ones.
+ *
+ * The anchors differ from f because of the noise of their rays, and because light changes more quickly than f
+ * can. If those differences are independent, the variance of E is their mean square times sum v^2.
  */
 #include "radiosity/output/blend.h"
 
@@ -127,9 +130,9 @@ static bool list_terms(const fct_anchors *t, v3 p, v3 n, const blend *b,
     return true;
 }
 
-/* Solves A z = (1, 0, ...). A is symmetric and positive definite, so elimination needs no pivots. */
-static void solve_first_column(double a[TERMS][TERMS], double z[TERMS]) {
-    for (int j = 0; j < TERMS; ++j) z[j] = j == 0;
+/* Solves A z = b, with b in z at first. A is symmetric and positive definite, so elimination needs no pivots.
+ * A changes. */
+static void solve_terms(double a[TERMS][TERMS], double z[TERMS]) {
     for (int j = 0; j < TERMS; ++j)
         for (int k = j + 1; k < TERMS; ++k) {
             const double factor = a[k][j] / a[j][j];
@@ -142,11 +145,11 @@ static void solve_first_column(double a[TERMS][TERMS], double z[TERMS]) {
     }
 }
 
-/* Replaces the weights w by the v of the sum above: v_i = w_i f_i . z with (F^T W F + penalties) z = (1, 0,
- * ...), where f_i are the terms at anchor i. */
-static void fit_weights(const fct_anchors *t, v3 p, v3 n, blend *b) {
-    double terms[FCT_NEAREST_ANCHORS][TERMS], a[TERMS][TERMS] = {{0}}, z[TERMS], total = 0;
-    if (!list_terms(t, p, n, b, terms)) return;
+/* F^T W F + penalties, where row i of F has the terms at anchor i. */
+static void sum_matrix(const blend *b, const double terms[FCT_NEAREST_ANCHORS][TERMS],
+                       double a[TERMS][TERMS]) {
+    double total = 0;
+    memset(a, 0, TERMS * sizeof *a);
     for (int i = 0; i < b->near.count; ++i) {
         total += b->weights[i];
         for (int j = 0; j < TERMS; ++j)
@@ -154,7 +157,15 @@ static void fit_weights(const fct_anchors *t, v3 p, v3 n, blend *b) {
     }
     for (int j = 1; j < TERMS; ++j)
         a[j][j] += total * (j < LINEAR_TERMS ? LINEAR_PENALTY : QUADRATIC_PENALTY);
-    solve_first_column(a, z);
+}
+
+/* Replaces the weights w by the v of the sum above: v_i = w_i f_i . z with (F^T W F + penalties) z = (1, 0,
+ * ...), where f_i are the terms at anchor i. */
+static void fit_weights(const fct_anchors *t, v3 p, v3 n, blend *b) {
+    double terms[FCT_NEAREST_ANCHORS][TERMS], a[TERMS][TERMS], z[TERMS] = {1};
+    if (!list_terms(t, p, n, b, terms)) return;
+    sum_matrix(b, terms, a);
+    solve_terms(a, z);
     for (int i = 0; i < b->near.count; ++i) {
         double sum = 0;
         for (int j = 0; j < TERMS; ++j) sum += terms[i][j] * z[j];
@@ -178,18 +189,66 @@ static void sum_values(const blend *b, double irradiance[3]) {
     }
 }
 
+/* Finds the anchors, their values and their weights w. Returns false without any anchor. */
+static bool find_blend(const fct_anchors *t, const fct_elements *set, const float point[3],
+                       const float normal[3], float offset, bool flat, blend *b, uint64_t *rays) {
+    fct_anchors_nearest(t, point, normal, &b->near);
+    if (b->near.count == 0) return false;
+    weigh_anchors(t, v3_load(point), v3_load(normal), b);
+    if (flat && b->near.count > 1) drop_hidden_anchors(t, set, point, normal, offset, b, rays);
+    double total = 0;
+    for (int i = 0; i < b->near.count; ++i) total += b->weights[i];
+    if (total <= 0) b->weights[0] = 1; /* all are hidden: the nearest one decides */
+    return true;
+}
+
 void fct_anchors_irradiance(const fct_anchors *t, const fct_elements *set, const float point[3],
                             const float normal[3], float offset, bool flat, double irradiance[3],
                             uint64_t *rays) {
     blend b;
     irradiance[0] = irradiance[1] = irradiance[2] = 0;
-    fct_anchors_nearest(t, point, normal, &b.near);
-    if (b.near.count == 0) return;
-    weigh_anchors(t, v3_load(point), v3_load(normal), &b);
-    if (flat && b.near.count > 1) drop_hidden_anchors(t, set, point, normal, offset, &b, rays);
-    double total = 0;
-    for (int i = 0; i < b.near.count; ++i) total += b.weights[i];
-    if (total <= 0) b.weights[0] = 1; /* all are hidden: the nearest one decides */
+    if (!find_blend(t, set, point, normal, offset, flat, &b, rays)) return;
     fit_weights(t, v3_load(point), v3_load(normal), &b);
     sum_values(&b, irradiance);
+}
+
+/* The coefficients of the polynomial of a channel: (F^T W F + penalties) z = F^T W E. */
+static void fit_polynomial(const blend *b, const double terms[FCT_NEAREST_ANCHORS][TERMS], int channel,
+                           double z[TERMS]) {
+    double a[TERMS][TERMS];
+    sum_matrix(b, terms, a);
+    for (int j = 0; j < TERMS; ++j) z[j] = 0;
+    for (int i = 0; i < b->near.count; ++i)
+        for (int j = 0; j < TERMS; ++j) z[j] += b->weights[i] * terms[i][j] * b->values[i][channel];
+    solve_terms(a, z);
+}
+
+/* The weighted mean square, per channel, of the anchors' differences from the polynomial; 0 if no anchor is
+ * beside p. */
+static void measure_residuals(const fct_anchors *t, v3 p, v3 n, const blend *b, double squares[3]) {
+    double terms[FCT_NEAREST_ANCHORS][TERMS], z[TERMS], total = 0;
+    squares[0] = squares[1] = squares[2] = 0;
+    if (!list_terms(t, p, n, b, terms)) return;
+    for (int i = 0; i < b->near.count; ++i) total += b->weights[i];
+    for (int c = 0; c < 3; ++c) {
+        fit_polynomial(b, terms, c, z);
+        for (int i = 0; i < b->near.count; ++i) {
+            double apart = b->values[i][c];
+            for (int j = 0; j < TERMS; ++j) apart -= z[j] * terms[i][j];
+            squares[c] += b->weights[i] / total * apart * apart;
+        }
+    }
+}
+
+void fct_anchors_variance(const fct_anchors *t, const fct_elements *set, const float point[3],
+                          const float normal[3], float offset, bool flat, double variance[3],
+                          uint64_t *rays) {
+    blend b;
+    double squares = 0;
+    variance[0] = variance[1] = variance[2] = 0;
+    if (!find_blend(t, set, point, normal, offset, flat, &b, rays)) return;
+    measure_residuals(t, v3_load(point), v3_load(normal), &b, variance);
+    fit_weights(t, v3_load(point), v3_load(normal), &b);
+    for (int i = 0; i < b.near.count; ++i) squares += b.weights[i] * b.weights[i];
+    for (int c = 0; c < 3; ++c) variance[c] *= squares; /* the sum of the weights is 1 */
 }

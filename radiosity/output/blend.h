@@ -13,4 +13,10 @@ void fct_anchors_irradiance(const fct_anchors *anchors, const fct_elements *set,
                             const float normal[3], float offset, bool flat, double irradiance[3],
                             uint64_t *rays);
 
+/* An estimate of the variance of this irradiance, per channel, from how much the anchors differ from the
+ * light that the blend fits to them: from the noise of their rays, and from changes that the fit does not
+ * follow. 0 with one anchor. The visibility is tested again and adds to *rays. */
+void fct_anchors_variance(const fct_anchors *anchors, const fct_elements *set, const float point[3],
+                          const float normal[3], float offset, bool flat, double variance[3], uint64_t *rays);
+
 #endif

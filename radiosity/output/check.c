@@ -147,6 +147,7 @@ fct_result fct_check_surface(const fct_solution *s, const fct_surface *surface, 
         if (result == FCT_OK)
             result = fct_parallel_for_progress(env, "check", k.count, POINT_GRAIN, check_chunk, &k);
         for (size_t c = 0; result == FCT_OK && c < chunks; ++c) *rays += k.chunk_rays[c];
+        if (result == FCT_OK) sums->points += k.count;
         for (size_t i = 0; result == FCT_OK && i < k.count; ++i) {
             const double share = area / (double)k.count;
             sums->area += share;

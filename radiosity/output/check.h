@@ -15,6 +15,7 @@
  * radiosity, the mean over channels. */
 typedef struct fct_check {
     double area, light, square, bias; /* area; light, (x - r1)(x - r2) and x - (r1 + r2) / 2 times area */
+    uint64_t points;
 } fct_check;
 
 /* RMS error over the mean light; 0 without light. */

@@ -18,8 +18,9 @@
 /* Weight of a corner of a face without area, against areas: it counts only where no other corner does. */
 #define LEAST_WEIGHT 1e-300
 
-/* The values of vertices that are joined: four kinds of light, and normals. */
-enum { LIGHTS = 5, NORMAL = 4 };
+/* The values of vertices that are joined, and their floats: four kinds of light, normals and the error. */
+enum { LIGHTS = 6 };
+static const size_t widths[LIGHTS] = {3, 3, 3, 3, 3, 1};
 
 /* Twice the area vector of a face. */
 static v3 measure_face(const fct_mesh *m, size_t f, v3 *centre) {
@@ -117,7 +118,7 @@ static uint32_t source_vertex(const fct_model *model, uint32_t v) {
 
 static void list_lights(const fct_mesh *mesh, float *out[LIGHTS]) {
     out[0] = mesh->colors, out[1] = mesh->irradiance, out[2] = mesh->direct, out[3] = mesh->indirect;
-    out[NORMAL] = mesh->normals;
+    out[4] = mesh->normals, out[5] = mesh->error;
 }
 
 /* Positions of the part's vertices, also of those without faces, and places of its faces. */
@@ -155,8 +156,8 @@ static void add_corners(const merging *m, uint32_t part, const fct_mesh *own) {
             t[k] = (uint32_t)v;
             m->weights[v] += weight;
             for (size_t i = 0; i < LIGHTS; ++i)
-                for (size_t c = 0; lights[i] && c < 3; ++c)
-                    m->sums[3 * (LIGHTS * v + i) + c] += weight * (double)lights[i][3 * from + c];
+                for (size_t c = 0; lights[i] && c < widths[i]; ++c)
+                    m->sums[3 * (LIGHTS * v + i) + c] += weight * (double)lights[i][widths[i] * from + c];
         }
     }
 }
@@ -166,8 +167,8 @@ static void store_means(const merging *m) {
     list_lights(m->out, lights);
     for (size_t v = 0; v < m->out->vertex_count; ++v)
         for (size_t i = 0; i < LIGHTS; ++i)
-            for (size_t c = 0; lights[i] && c < 3; ++c)
-                lights[i][3 * v + c] =
+            for (size_t c = 0; lights[i] && c < widths[i]; ++c)
+                lights[i][widths[i] * v + c] =
                     m->weights[v] > 0 ? (float)(m->sums[3 * (LIGHTS * v + i) + c] / m->weights[v]) : 0;
     for (size_t v = 0; v < m->out->vertex_count; ++v) {
         float *n = m->out->normals + 3 * v;
@@ -215,10 +216,10 @@ static void copy_sides(const merging *m, uint32_t part) {
     list_lights(lit, from);
     list_lights(m->out, to);
     for (size_t v = 0; v < lit->vertex_count; ++v) {
-        const size_t number = 3 * (size_t)m->numbers[v];
-        copy_floats(m->out->positions + number, lit->positions + 3 * v, 3);
+        const size_t number = m->numbers[v];
+        copy_floats(m->out->positions + 3 * number, lit->positions + 3 * v, 3);
         for (int i = 0; i < LIGHTS; ++i)
-            if (from[i] && to[i]) copy_floats(to[i] + number, from[i] + 3 * v, 3);
+            if (from[i] && to[i]) copy_floats(to[i] + widths[i] * number, from[i] + widths[i] * v, widths[i]);
     }
     for (size_t c = 0; c < 3 * (size_t)lit->face_count; ++c)
         m->out->triangles[3 * (size_t)lit->source_faces[c / 3] + c % 3] = m->numbers[lit->triangles[c]];
@@ -243,7 +244,7 @@ static fct_result create_out(merging *m, fct_keep keep) {
     float *lights[LIGHTS];
     list_lights(m->out, lights);
     for (int i = 0; i < LIGHTS; ++i)
-        if (lights[i]) memset(lights[i], 0, 3 * (size_t)vertices * sizeof(float));
+        if (lights[i]) memset(lights[i], 0, widths[i] * (size_t)vertices * sizeof(float));
     memcpy(m->out->origin, m->lit[0].origin, sizeof m->out->origin);
     return FCT_OK;
 }

@@ -7,7 +7,7 @@
  * 3. Split edges across which the light changes, cut new covers, and light the new vertices, up to
  * BORDER_ROUNDS times. So the edges of the mesh follow shadow borders.
  * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices show their emission alone.
- * 5. Check the result at random points (check.h).
+ * 5. Check the result at random points (check.h), and map the error if it is an output (error_map.h).
  */
 #include "radiosity/output/output.h"
 
@@ -17,6 +17,7 @@
 #include "radiosity/output/anchor.h"
 #include "radiosity/output/attributes.h"
 #include "radiosity/output/blend.h"
+#include "radiosity/output/error_map.h"
 #include "radiosity/output/keep.h"
 #include "radiosity/output/smooth.h"
 #include "radiosity/surface/cover.h"
@@ -87,25 +88,14 @@ static void gather_lamps(const lighting *l, size_t v, const float normal[3], uin
                         irradiance, rays);
 }
 
-/* The normal on the side that receives the light. */
-static void load_normal(const lighting *l, size_t v, float normal[3]) {
-    for (size_t c = 0; c < 3; ++c)
-        normal[c] = l->back ? -l->surface->normals[3 * v + c] : l->surface->normals[3 * v + c];
-}
-
-static bool has_surface(const lighting *l, size_t v) {
-    const float *n = l->surface->normals + 3 * v;
-    return l->surface->places[v] != FCT_NONE && (n[0] != 0 || n[1] != 0 || n[2] != 0);
-}
-
 static void cover_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     lighting *l = user;
     const fct_surface *f = l->surface;
     (void)thread;
     for (size_t v = l->first + begin; v < l->first + end; ++v) {
         float normal[3];
-        load_normal(l, v, normal);
-        l->covered[v] = has_surface(l, v) &&
+        fct_surface_normal(l->surface, v, l->back, normal);
+        l->covered[v] = fct_surface_is_solid(l->surface, v) &&
                         fct_point_is_covered(l->s->scene, f->sample_points + 3 * v, normal, f->offsets[v],
                                              fct_hash3(l->s->def.seed + 3, l->instance, v), &l->nearest[v],
                                              &l->chunk_rays[chunk]);
@@ -119,8 +109,8 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t v = l->first + begin; v < l->first + end; ++v) {
         float normal[3];
         double direct[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
-        load_normal(l, v, normal);
-        if (has_surface(l, v) && !l->covered[v]) {
+        fct_surface_normal(l->surface, v, l->back, normal);
+        if (fct_surface_is_solid(l->surface, v) && !l->covered[v]) {
             if (l->s->def.final == FCT_FINAL_NONE) {
                 gather_links(l, v, normal, indirect);
             } else {
@@ -141,7 +131,7 @@ static void doubt_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
         if (!l->again[v]) continue;
         float normal[3];
         double direct[3];
-        load_normal(l, v, normal);
+        fct_surface_normal(l->surface, v, l->back, normal);
         for (size_t c = 0; c < 3; ++c) direct[c] = l->direct[3 * v + c];
         gather_lamps(l, v, normal, l->again[v], direct, &l->chunk_rays[chunk]);
         for (size_t c = 0; c < 3; ++c) l->direct[3 * v + c] = (float)direct[c];
@@ -166,7 +156,7 @@ static void load_mean_reflectance(const fct_solution *s, uint32_t instance, floa
 static void color_vertex(const lighting *l, size_t v, const float reflectance[3], float color[3]) {
     double irradiance[3];
     color[0] = color[1] = color[2] = 0;
-    if (!has_surface(l, v)) return;
+    if (!fct_surface_is_solid(l->surface, v)) return;
     for (size_t c = 0; c < 3; ++c)
         irradiance[c] = (double)l->direct[3 * v + c] + (double)l->indirect[3 * v + c];
     fct_solution_radiosity(l->s, l->instance, reflectance, irradiance, color);
@@ -277,15 +267,15 @@ static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
     const uint32_t from = l->covered[a] ? b : a, to = l->covered[a] ? a : b;
     if (l->covered[a] == l->covered[b] || l->cut[to]) return 0; /* the border is beside a covered cut */
     if (a < l->first && b < l->first) return 0;                 /* an earlier round looked at this edge */
-    if (!has_surface(l, a) || !has_surface(l, b)) return 0;
+    if (!fct_surface_is_solid(l->surface, a) || !fct_surface_is_solid(l->surface, b)) return 0;
     const v3 p = v3_load(f->mesh.positions + 3 * (size_t)from);
     const v3 way = v3_sub(v3_load(f->mesh.positions + 3 * (size_t)to), p);
     const float offset = fmaxf(f->offsets[a], f->offsets[b]);
     const uint64_t seed = fct_hash3(l->s->def.seed + 4, l->instance, from);
     float normals[2][3], normal[3], point[3];
     double bare = 0, covered = 1;
-    load_normal(l, from, normals[0]);
-    load_normal(l, to, normals[1]);
+    fct_surface_normal(l->surface, from, l->back, normals[0]);
+    fct_surface_normal(l->surface, to, l->back, normals[1]);
     while (covered - bare > CUT_WIDTH) {
         const double middle = .5 * (bare + covered);
         const v3 first = v3_scale(v3_load(normals[0]), 1 - middle);
@@ -332,10 +322,28 @@ static fct_result finish_colors(const lighting *l) {
     return result;
 }
 
-/* Measures the error of the final light. */
+/* Measures the error of the final light, and maps it if it is an output. */
 static fct_result check_light(lighting *l, fct_check *check, uint64_t *rays) {
-    for (size_t i = 0; i < 3 * (size_t)l->surface->mesh.vertex_count; ++i) l->direct[i] += l->indirect[i];
-    return fct_check_surface(l->s, l->surface, l->instance, l->back, l->direct, l->covered, check, rays);
+    fct_mesh *mesh = &l->surface->mesh;
+    fct_check own = {0};
+    for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; ++i) l->direct[i] += l->indirect[i];
+    fct_result result =
+        fct_check_surface(l->s, l->surface, l->instance, l->back, l->direct, l->covered, &own, rays);
+    if (result == FCT_OK && l->s->def.outputs & FCT_MESH_ERROR) {
+        const fct_error_map_def def = {.solution = l->s,
+                                       .surface = l->surface,
+                                       .instance = l->instance,
+                                       .back = l->back,
+                                       .anchors = l->anchors,
+                                       .light = l->direct,
+                                       .covered = l->covered,
+                                       .check = &own};
+        result = fct_error_map_add(&def, mesh, rays);
+    }
+    check->area += own.area, check->light += own.light;
+    check->square += own.square, check->bias += own.bias;
+    check->points += own.points;
+    return result;
 }
 
 bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity) {

@@ -33,6 +33,18 @@ fct_result fct_surface_allocate(const fct_env *env, uint32_t vertex_count, uint3
                                 fct_surface *out);
 void fct_surface_release(const fct_env *env, fct_surface *surface);
 
+/* Whether a vertex has a face and a normal, so that it can receive light. */
+static inline bool fct_surface_is_solid(const fct_surface *surface, size_t vertex) {
+    const float *n = surface->normals + 3 * vertex;
+    return surface->places[vertex] != FCT_NONE && (n[0] != 0 || n[1] != 0 || n[2] != 0);
+}
+
+/* The normal of a vertex on the side that receives the light. */
+static inline void fct_surface_normal(const fct_surface *surface, size_t vertex, bool back, float normal[3]) {
+    for (size_t c = 0; c < 3; ++c)
+        normal[c] = back ? -surface->normals[3 * vertex + c] : surface->normals[3 * vertex + c];
+}
+
 /* Stores the foothold of a vertex; the foothold's face is a face of the surface. */
 void fct_surface_place(fct_surface *surface, uint32_t vertex, const fct_foothold *at);
 

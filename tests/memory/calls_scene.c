@@ -222,7 +222,7 @@ static fct_result bake_instance_with(const fct_env *env, fct_bake_method method,
 
 static fct_result bake_lights(const fct_env *env) {
     fct_bake_def def = coarse(FCT_BAKE_FACE, FCT_FINAL_DIRECT);
-    def.outputs = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT;
+    def.outputs = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_ERROR;
     fct_bake *bake;
     fct_mesh mesh;
     assert_int_equal(fct_bake_create(env, inputs.scene, &def, &bake), FCT_OK);

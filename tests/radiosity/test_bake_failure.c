@@ -288,9 +288,12 @@ static void a_stopped_bake_keeps_its_light(void **state) {
     }
     printf("    nothing %ld times, early light %ld times\n", nothing, early);
     assert_true(nothing >= 2 && early > 20);
-    /* The links do not tell direct from indirect light: it is not asked. */
+    /* The links do not tell direct from indirect light, nor its error: it is not asked. */
     def.outputs = FCT_MESH_DIRECT;
     assert_true(bake_stopped(scene, def, 1, 1, &mesh, &stats) && !stats.interrupted && mesh.direct);
+    fct_mesh_release(&plain, &mesh);
+    def.outputs = FCT_MESH_ERROR;
+    assert_true(bake_stopped(scene, def, 1, 1, &mesh, &stats) && !stats.interrupted && mesh.error);
     fct_mesh_release(&plain, &mesh);
     fct_mesh_release(&plain, &whole);
     fct_scene_destroy(scene);

@@ -237,6 +237,7 @@ static double measure_area(output *o, json_t *primitive) {
  * every value: equal sums of 64 random functions. */
 static void expect_same_light(const fct_mesh *a, const fct_mesh *b) {
     assert_int_equal(a->face_count, b->face_count);
+    assert_int_equal(a->error != NULL, b->error != NULL);
     for (uint64_t k = 0; k < 64; ++k) {
         double sums[2] = {0, 0}, scale = 0;
         for (int m = 0; m < 2; ++m) {
@@ -249,6 +250,7 @@ static void expect_same_light(const fct_mesh *a, const fct_mesh *b) {
                     phase += (fct_uniform(fct_hash2(k, j)) - .5) * ((double)p[j] + x->origin[j]);
                     light += fct_uniform(fct_hash2(k, 3 + j)) * (double)q[j];
                 }
+                if (x->error) light += fct_uniform(fct_hash2(k, 6)) * (double)x->error[x->triangles[c]];
                 sums[m] += sin(phase) * (1 + light), scale += fabs(1 + light) / 2;
             }
         }
@@ -411,7 +413,7 @@ static void scenes_become_nodes(void **state) {
         fct_scene_set_camera(scene, &camera);
         assert_int_equal(fct_scene_commit(scene), FCT_OK);
         fct_bake_def def = fct_bake_def_default();
-        def.error = 1e-3, def.outputs = FCT_MESH_IRRADIANCE, def.max_edge = .4;
+        def.error = 1e-3, def.outputs = FCT_MESH_IRRADIANCE | FCT_MESH_ERROR, def.max_edge = .4;
         fct_mesh_save_def save = fct_mesh_save_def_default();
         save.display = FCT_MESH_IRRADIANCE;
         assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_OK);

@@ -54,6 +54,15 @@ draws scene_boxes 1000 "$scene" --boxes 30
 draws camera 1000 sphere.ply --scene "$scene" --background '#102030'
 draws eye 1000 sphere.ply --camera 0,0,3,0,0,0,40
 draws lit 1000 lit.ply
+"$facetree" bake "$scene" -o errors.glb --light radiosity,error --quality draft --also errors.ply --quiet || exit 2
+for kind in ply glb; do
+    draws errors_$kind 1500 errors.$kind --scene "$scene" --show error
+    cmp -s errors_$kind.png scene.png && fail "the error of a $kind looks like light"
+done
+draws coarse 1500 errors.ply --scene "$scene" --show error --range 50
+cmp -s errors_ply.png coarse.png && fail "--range makes no difference"
+cmp -s errors_ply.png errors_glb.png || fail "errors of .ply and .glb differ"
+"$facetree" render errors.ply --show error --range 12.5 --size 400x300 --json -o out.png | grep -q '"range": 12.5' || fail "no range in the JSON"
 draws empty 100 empty.off
 for view in corner front back left right top bottom; do draws $view 1500 sphere.ply --view $view --up z; done
 for tone in soft filmic clamp; do draws $tone 1000 lit.ply --tone $tone --exposure 3; done
@@ -80,6 +89,15 @@ refuses 64 sphere.ply --tone warm
 refuses 64 sphere.ply --background blue
 refuses 64 sphere.ply --samples 65
 refuses 64 sphere.ply other.ply
+refuses 64 sphere.ply --show noise
+refuses 64 sphere.ply --range 5
+refuses 64 errors.ply --show error --range 0
+refuses 64 errors.ply --show error --clusters 5
+refuses 64 errors.ply --show error --shading flat
+for input in sphere.ply sphere.fct lit.ply "$scene"; do
+    refuses 65 "$input" --show error
+    grep -q 'bake --light radiosity,error' errors || fail "$input without error: $(cat errors)"
+done
 refuses 66 missing.ply
 refuses 66 sphere.ply --scene missing.json
 refuses 65 empty.off --clusters 3

@@ -82,6 +82,49 @@ static void the_palette_has_twelve_even_hues(void **state) {
     }
 }
 
+/* Equal steps have equal lengths in OKLab and become lighter, no channel leaves [0, 1], and the ends hold
+ * outside of [0, 1]. */
+static void false_colors_are_even(void **state) {
+    (void)state;
+    enum { STEPS = 64 };
+    double before[3], shortest = INFINITY, longest = 0;
+    float rgb[3], end[3];
+    for (int i = 0; i <= STEPS; ++i) {
+        double lab[3], square = 0;
+        drawing_false_color((double)i / STEPS, rgb);
+        for (int k = 0; k < 3; ++k) assert_true(rgb[k] > 0 && rgb[k] <= 1);
+        to_oklab(rgb, lab);
+        for (int k = 0; k < 3 && i; ++k) square += pow(lab[k] - before[k], 2);
+        if (i) {
+            assert_true(lab[0] > before[0] + .9 * .66 / STEPS);
+            shortest = fmin(shortest, sqrt(square)), longest = fmax(longest, sqrt(square));
+        }
+        memcpy(before, lab, sizeof lab);
+    }
+    if (longest > 1.02 * shortest) fail_msg("steps of %g to %g", shortest, longest);
+    assert_true(STEPS * longest > .75);
+    drawing_false_color(7, end);
+    assert_memory_equal(end, rgb, sizeof rgb);
+    drawing_false_color(-1, end), drawing_false_color(0, rgb);
+    assert_memory_equal(end, rgb, sizeof rgb);
+}
+
+/* Values are interpolated before they become a colour, without exposure and tone. */
+static void values_are_shown_as_false_colors(void **state) {
+    (void)state;
+    float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, values[3] = {.1F, .5F, .9F}, rgb[3], expected[3];
+    uint32_t triangles[3] = {0, 1, 2};
+    const drawing d = {
+        .mesh = {.vertex_count = 3, .face_count = 1, .positions = positions, .triangles = triangles},
+        .values = values,
+        .shading = DRAWING_LIGHT,
+        .exposure = 3};
+    const raster_point point = {.weight = {.5, .25, .25}};
+    drawing_shade((void *)&d, &point, rgb);
+    drawing_false_color(.05 + .125 + .225, expected);
+    assert_rgb(rgb, (double)expected[0], (double)expected[1], (double)expected[2], 1e-6);
+}
+
 /* Two squares that meet along the y axis; the right one is turned up by `degrees`. */
 static drawing make_roof(double degrees, float *positions, uint32_t *triangles) {
     double turn = degrees * 3.14159265358979323846 / 180, c = cos(turn), s = sin(turn);
@@ -296,6 +339,8 @@ int main(void) {
         cmocka_unit_test(the_soft_curve_bends_above_the_knee),
         cmocka_unit_test(the_filmic_curve_is_narkowiczs),
         cmocka_unit_test(the_palette_has_twelve_even_hues),
+        cmocka_unit_test(false_colors_are_even),
+        cmocka_unit_test(values_are_shown_as_false_colors),
         cmocka_unit_test(normals_are_smooth_below_the_crease_angle),
         cmocka_unit_test(normals_are_sums_of_area_vectors),
         cmocka_unit_test(clusters_have_the_rarest_color_around),

@@ -115,6 +115,18 @@ holds "$(value color_rms) < .02"
 expect 0 bake furnace.json -o some.glb --light direct,radiosity
 for name in _DIRECT _RADIOSITY KHR_materials_unlit; do check "$name" grep -qa "$name" some.glb; done
 expect 0 info some.glb
+expect 0 bake furnace.json -o some.ply --light radiosity,error --json
+check "the error is listed" grep -q '"error"' out
+check "its property" grep -qa '^property float error$' some.ply
+check "lit.ply has none" test "$(grep -ca 'property float error' lit.ply)" = 0
+expect 0 bake furnace.json -o some.glb --light radiosity,error
+check "its attribute" grep -qa _ERROR some.glb
+expect 64 bake furnace.json -o x.ply --light error,radiosity
+says "found 'error'"
+expect 64 bake furnace.json -o x.ply --light irradiance,error
+says "needs it"
+expect 65 bake furnace.json -o x.ply --light radiosity,error --method reference
+expect 65 bake furnace.json -o x.ply --light radiosity,error --final none
 expect 64 bake furnace.json -o x.ply --light direct,direct
 says "'direct' twice"
 expect 64 bake furnace.json -o x.ply --light ''

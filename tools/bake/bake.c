@@ -102,8 +102,9 @@ static const struct argp_option bake_options_table[] = {
      "light that arrives, before the surface's own colour; direct and indirect, the two parts of the "
      "irradiance. All are per area, in the unit of the scene's emission. The first one makes the colours, "
      "and "
-     "all are written as floats. reference gives radiosity and irradiance. Behind these, normal: the shading "
-     "normals, which a .glb always has",
+     "all are written as floats. reference gives radiosity and irradiance. Behind these, error: the expected "
+     "error of the radiosity at each vertex, in its unit, which render --show error draws; and normal: the "
+     "shading normals, which a .glb always has",
      0},
     {"normals", KEY_NORMALS, "RULE", 0,
      "What the light of a vertex faces. file (default): the normals of the file; corners with different "

@@ -8,11 +8,9 @@
 static const struct output {
     const char *name;
     unsigned light;
-} outputs_table[] = {{"radiosity", FCT_MESH_COLORS},
-                     {"irradiance", FCT_MESH_IRRADIANCE},
-                     {"direct", FCT_MESH_DIRECT},
-                     {"indirect", FCT_MESH_INDIRECT},
-                     {"normal", FCT_MESH_NORMALS}};
+} outputs_table[] = {{"radiosity", FCT_MESH_COLORS}, {"irradiance", FCT_MESH_IRRADIANCE},
+                     {"direct", FCT_MESH_DIRECT},    {"indirect", FCT_MESH_INDIRECT},
+                     {"error", FCT_MESH_ERROR},      {"normal", FCT_MESH_NORMALS}};
 
 enum { OUTPUTS = sizeof outputs_table / sizeof *outputs_table };
 
@@ -31,16 +29,20 @@ error_t bake_parse_outputs(struct argp_state *state, const char *text, bake_outp
         const unsigned light = find_light(name, length);
         if (!light || light & out->lights)
             return tool_usage(state,
-                              "--light: expected a list of radiosity, irradiance, direct, indirect and "
-                              "normal, found '%.*s'%s",
+                              "--light: expected a list of radiosity, irradiance, direct, indirect, "
+                              "error and normal, found '%.*s'%s",
                               (int)length, name, light ? " twice" : "");
-        if (!out->first && light == FCT_MESH_NORMALS)
-            return tool_usage(state, "--light: the first quantity makes the colours, found 'normal'");
+        if (!out->first && light & (FCT_MESH_NORMALS | FCT_MESH_ERROR))
+            return tool_usage(state, "--light: the first quantity makes the colours, found '%.*s'",
+                              (int)length, name);
         if (!out->first) out->first = light;
         out->lights |= light;
         name += length;
-        if (!*name) return 0;
+        if (!*name) break;
     }
+    if (out->lights & FCT_MESH_ERROR && !(out->lights & FCT_MESH_COLORS))
+        return tool_usage(state, "--light: error is that of radiosity, and needs it in the list");
+    return 0;
 }
 
 json_t *bake_list_outputs(const bake_outputs *outputs) {

@@ -7,7 +7,7 @@
 #include "facetree/radiosity.h"
 #include "tools/kit/env.h"
 
-/* FCT_MESH_ bits; FCT_MESH_COLORS is the radiosity. Normals are never the first. */
+/* FCT_MESH_ bits; FCT_MESH_COLORS is the radiosity. Neither normals nor the error are the first. */
 typedef struct bake_outputs {
     unsigned lights;
     unsigned first; /* the one that makes the colours */

@@ -354,6 +354,7 @@ void drawing_release(tool *t, drawing *d) {
     tool_release(t, d->labels);
     tool_release(t, d->lines);
     tool_release(t, d->normals);
+    tool_release(t, d->values);
     tool_release(t, d->starts);
     fct_scene_destroy(d->scene);
 }

@@ -21,6 +21,7 @@ typedef struct drawing {
     uint32_t *labels; /* face_count: the cluster of each face, ascending, or NULL */
     uint8_t *lines;   /* face_count: bit i draws the side opposite corner i, or NULL */
     float *normals;   /* face_count x 3 x 3: a unit normal per corner; NULL: flat shading */
+    float *values;    /* vertex_count: numbers that false colours show, in place of light; or NULL */
     drawing_shading shading;
     fct_camera camera; /* of the scene, if the input is one */
     fct_scene *scene;  /* of painted materials, or NULL: `paint` holds the whole reflectance */

@@ -3,6 +3,15 @@
 
 #include <math.h>
 
+#define TURN (2 * 3.14159265358979323846)
+
+/* Ends of the false colours. The chroma is the largest that sRGB has all the way. */
+#define DARKEST   .27
+#define LIGHTEST  .93
+#define CHROMA    .13
+#define FIRST_HUE (275. / 360 * TURN)
+#define LAST_HUE  (465. / 360 * TURN)
+
 /* OKLCH to linear sRGB (Ottosson 2020). In OKLCH, equal steps look equal for every hue. */
 static void convert_oklch(double lightness, double chroma, double hue, float rgb[3]) {
     double a = chroma * cos(hue), b = chroma * sin(hue);
@@ -16,7 +25,12 @@ static void convert_oklch(double lightness, double chroma, double hue, float rgb
 }
 
 void drawing_color(uint32_t i, float rgb[3]) {
-    const double turn = 2 * 3.14159265358979323846;
     uint32_t hue = i % PALETTE * 5 % PALETTE;
-    convert_oklch(hue % 2 ? .68 : .80, hue % 2 ? .12 : .10, (hue + .4) / PALETTE * turn, rgb);
+    convert_oklch(hue % 2 ? .68 : .80, hue % 2 ? .12 : .10, (hue + .4) / PALETTE * TURN, rgb);
+}
+
+/* A helix around the axis of greys: in OKLab, equal steps have equal lengths. */
+void drawing_false_color(double value, float rgb[3]) {
+    const double t = fmin(fmax(value, 0), 1);
+    convert_oklch(DARKEST + (LIGHTEST - DARKEST) * t, CHROMA, FIRST_HUE + (LAST_HUE - FIRST_HUE) * t, rgb);
 }

@@ -7,6 +7,8 @@
 #include "tools/kit/command.h"
 #include "tools/kit/options.h"
 #include "tools/render/camera.h"
+#include "tools/render/errors.h"
+#include "tools/render/legend.h"
 #include "tools/render/shade.h"
 
 enum {
@@ -18,9 +20,11 @@ enum {
     KEY_CULL,
     KEY_EXPOSURE,
     KEY_FOV,
+    KEY_RANGE,
     KEY_SAMPLES,
     KEY_SCENE,
     KEY_SHADING,
+    KEY_SHOW,
     KEY_SIZE,
     KEY_TONE,
     KEY_UP,
@@ -37,6 +41,8 @@ typedef struct render_options {
     drawing_frame frame;
     const char *scene, *camera;
     int shading, tone, cull;
+    int show;     /* 1: the error of the light */
+    double range; /* percent; 0: chosen */
     bool wireframe, has_background;
     picture_background background;
 } render_options;
@@ -45,6 +51,16 @@ static const struct argp_option render_options_table[] = {
     {NULL, 0, NULL, 0, "Subject:", 1},
     {"clusters", KEY_CLUSTERS, "K", 0, "Draw the surface with a colour per cluster, in K clusters", 1},
     {"boxes", KEY_BOXES, "K", 0, "Draw the oriented boxes of K clusters", 1},
+    {"show", KEY_SHOW, "WHAT", 0,
+     "light (default), or error: the expected error of a bake with --light radiosity,error as false colours, "
+     "in "
+     "percent of the median light, with a legend. Half of the lit area is brighter than the median",
+     1},
+    {"range", KEY_RANGE, "PERCENT", 0,
+     "With --show error: the end of the legend, .001 to 1000; larger errors have its colour (default: a "
+     "round "
+     "number that 2 % of the area exceeds)",
+     1},
     {"wireframe", KEY_WIREFRAME, NULL, 0, "Also draw the sides of the triangles", 1},
     {NULL, 0, NULL, 0, "Camera:", 2},
     {"camera", KEY_CAMERA, "EX,EY,EZ,TX,TY,TZ[,FOV]", 0,
@@ -126,6 +142,7 @@ static error_t parse_look_option(struct argp_state *state, int key, const char *
     static const char *const tones[] = {"soft", "filmic", "clamp", NULL};
     static const char *const shadings[] = {"auto", "light", "smooth", "flat", NULL};
     static const char *const culls[] = {"auto", "back", "none", NULL};
+    static const char *const shows[] = {"light", "error", NULL};
     switch (key) {
     case KEY_SAMPLES:
         return tool_parse_count32(state, "--samples", text, 1, RASTER_MAX_SAMPLES, &o->samples);
@@ -133,6 +150,10 @@ static error_t parse_look_option(struct argp_state *state, int key, const char *
         return tool_parse_real(state, "--exposure", text, 0, 1e30, &o->exposure);
     case KEY_TONE:
         return tool_parse_choice(state, "--tone", text, tones, &o->tone);
+    case KEY_SHOW:
+        return tool_parse_choice(state, "--show", text, shows, &o->show);
+    case KEY_RANGE:
+        return tool_parse_real(state, "--range", text, .001, 1000, &o->range);
     case KEY_SHADING:
         return tool_parse_choice(state, "--shading", text, shadings, &o->shading);
     case KEY_CULL:
@@ -169,8 +190,10 @@ static error_t parse_render(int key, char *text, struct argp_state *state) {
     case KEY_CREASE:
     case KEY_CULL:
     case KEY_EXPOSURE:
+    case KEY_RANGE:
     case KEY_SAMPLES:
     case KEY_SHADING:
+    case KEY_SHOW:
     case KEY_TONE:
         return parse_look_option(state, key, text, o);
     case ARGP_KEY_END:
@@ -181,6 +204,9 @@ static error_t parse_render(int key, char *text, struct argp_state *state) {
                 o->camera);
         if ((o->camera != NULL) + (o->scene != NULL) + (o->frame.view >= 0) > 1)
             return tool_usage(state, "expected only one of --camera, --scene and --view");
+        if (o->show && (o->subject != DRAWING_SURFACE || o->shading != DRAWING_AUTO))
+            return tool_usage(state, "--show error: expected none of --clusters, --boxes and --shading");
+        if (o->range > 0 && !o->show) return tool_usage(state, "--range: expected --show error");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -228,10 +254,12 @@ static picture_background choose_background(const drawing *d) {
 static int report_render(tool *t, const render_options *o, const drawing *d, const double seconds[4]) {
     tool_say(t, "%s: %u x %u pixels of %u triangles in %.2f s", t->output, o->width, o->height,
              d->mesh.face_count, seconds[3]);
-    return tool_json(t, json_pack("{s:i, s:i, s:I, s:{s:f, s:f, s:f, s:f}, s:I}", "width", (int)o->width,
-                                  "height", (int)o->height, "faces", (json_int_t)d->mesh.face_count,
-                                  "seconds", "read", seconds[0], "draw", seconds[1], "write", seconds[2],
-                                  "total", seconds[3], "peak_bytes", (json_int_t)tool_peak_bytes()));
+    json_t *object = json_pack("{s:i, s:i, s:I, s:{s:f, s:f, s:f, s:f}, s:I}", "width", (int)o->width,
+                               "height", (int)o->height, "faces", (json_int_t)d->mesh.face_count, "seconds",
+                               "read", seconds[0], "draw", seconds[1], "write", seconds[2], "total",
+                               seconds[3], "peak_bytes", (json_int_t)tool_peak_bytes());
+    if (object && o->show) json_object_set_new(object, "range", json_real(o->range));
+    return tool_json(t, object);
 }
 
 static int draw_image(tool *t, const render_options *o, drawing *d, float *image) {
@@ -260,7 +288,10 @@ static int run_render(tool *t, void *input) {
     float *image = tool_allocate(t, (size_t)o->width * o->height, 4 * sizeof *image);
     int code = image ? drawing_load(t, &source, &d) : TOOL_MEMORY;
     seconds[0] = tool_seconds() - start;
+    if (code == TOOL_DONE && o->show) code = drawing_show_errors(t, t->inputs[0], &d, &o->range);
     if (code == TOOL_DONE) code = draw_image(t, o, &d, image);
+    if (code == TOOL_DONE && o->show)
+        picture_draw_legend("error, % of the median light", o->range, o->width, o->height, image);
     seconds[1] = tool_seconds() - start - seconds[0];
     picture_background background = o->has_background ? o->background : choose_background(&d);
     if (code == TOOL_DONE) code = picture_save(t, t->output, o->width, o->height, image, &background);
@@ -284,10 +315,12 @@ int tool_render(int argc, char **argv) {
                 "surfaces look like plaster in a studio, in the colours of their materials if a scene has "
                 "some. In a scene, the "
                 "models share the K clusters or boxes by how much their surfaces turn.\n\n"
-                "JSON keys: width, height, faces, seconds{read, draw, write, total}, peak_bytes.",
+                "JSON keys: width, height, faces, range (with --show error: the end of the legend, percent), "
+                "seconds{read, draw, write, total}, peak_bytes.",
         .examples = "  facetree render bunny.obj -o bunny.png\n"
                     "  facetree render bunny.fct --clusters 200 -o clusters.png\n"
-                    "  facetree render lit.glb --scene scene.json -o lit.png",
+                    "  facetree render lit.glb --scene scene.json -o lit.png\n"
+                    "  facetree render lit.glb --scene scene.json --show error -o error.png",
         .options = render_options_table,
         .parse = parse_render,
         .run = run_render,

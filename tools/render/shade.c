@@ -266,8 +266,14 @@ static void add_lines(const drawing *d, const raster_point *point, float rgb[3])
     for (int k = 0; k < 3; ++k) rgb[k] *= 1 - .8F * cover;
 }
 
-void drawing_shade(void *user, const raster_point *point, float rgb[3]) {
-    const drawing *d = user;
+static void shade_value(const drawing *d, const raster_point *point, float rgb[3]) {
+    const uint32_t *t = d->mesh.triangles + 3 * (size_t)point->face;
+    double value = 0;
+    for (int k = 0; k < 3; ++k) value += point->weight[k] * d->values[t[k]];
+    drawing_false_color(value, rgb);
+}
+
+static void shade_light(const drawing *d, const raster_point *point, float rgb[3]) {
     find_paint(d, point, rgb);
     if (d->shading != DRAWING_LIGHT) add_studio_light(d, point, rgb);
     for (int k = 0; k < 3; ++k) {
@@ -275,5 +281,10 @@ void drawing_shade(void *user, const raster_point *point, float rgb[3]) {
         rgb[k] *= d->exposure;
     }
     picture_apply_tone(d->tone, rgb);
+}
+
+void drawing_shade(void *user, const raster_point *point, float rgb[3]) {
+    const drawing *d = user;
+    (d->values ? shade_value : shade_light)(d, point, rgb);
     if (d->lines) add_lines(d, point, rgb);
 }

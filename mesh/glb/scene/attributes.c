@@ -116,8 +116,8 @@ static bool begins_with(const char *text, const char *start) {
 
 /* True if the attribute is not copied: it is written anew, or belongs to a skin, which is left out. */
 static bool is_replaced(const char *name) {
-    static const char *const names[] = {"POSITION", "NORMAL",      "_RADIOSITY",
-                                        "_DIRECT",  "_IRRADIANCE", "_INDIRECT"};
+    static const char *const names[] = {"POSITION",    "NORMAL",    "_RADIOSITY", "_DIRECT",
+                                        "_IRRADIANCE", "_INDIRECT", "_ERROR"};
     for (size_t i = 0; i < FCT_LENGTH(names); ++i)
         if (!strcmp(name, names[i])) return true;
     return begins_with(name, "JOINTS_") || begins_with(name, "WEIGHTS_");

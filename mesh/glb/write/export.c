@@ -18,7 +18,7 @@ typedef struct array {
     bool there;
 } array;
 
-enum { FIXED = 8, ARRAYS = FIXED + FCT_GLB_EXTRAS, LIGHTS = 4 };
+enum { FIXED = 9, ARRAYS = FIXED + FCT_GLB_EXTRAS, LIGHTS = 4 };
 
 /* The float lights of a geometry, in the order of their attributes; NULL: absent. */
 static void list_lights(const fct_glb_geometry *g, const float *out[LIGHTS]) {
@@ -39,6 +39,7 @@ static void list_arrays(const fct_glb_geometry *g, array out[ARRAYS]) {
                                  {"_IRRADIANCE", "VEC3", "", 5126, 12, lights[1] != NULL},
                                  {"_DIRECT", "VEC3", "", 5126, 12, lights[2] != NULL},
                                  {"_INDIRECT", "VEC3", "", 5126, 12, lights[3] != NULL},
+                                 {"_ERROR", "SCALAR", "", 5126, 4, m->error != NULL},
                                  {"TEXCOORD_0", "VEC2", "", 5126, 8, g->layout.texcoords != NULL}};
     memcpy(out, arrays, sizeof arrays);
     for (size_t i = 0; i < FCT_GLB_EXTRAS; ++i) {
@@ -221,6 +222,8 @@ static void write_geometry(const fct_sink *sink, const fct_glb_geometry *g, FILE
     for (int k = 0; k < LIGHTS; ++k)
         for (uint32_t i = 0; lights[k] && i < l->vertex_count; ++i)
             write_floats(stream, lights[k] + 3 * find_origin(l, i), 3);
+    for (uint32_t i = 0; m->error && i < l->vertex_count; ++i)
+        write_floats(stream, m->error + find_origin(l, i), 1);
     if (l->texcoords)
         for (uint32_t i = 0; i < l->vertex_count; ++i) write_floats(stream, l->texcoords + 2 * (size_t)i, 2);
     for (size_t k = 0; k < g->extra_count; ++k)

@@ -2,7 +2,7 @@
 #include "mesh/mesh.h"
 #include "mesh/mesh_support.h"
 
-enum { VERTICES = 40, FACES = 30, FLOATS = 10 };
+enum { VERTICES = 40, FACES = 30, FLOATS = 11 };
 
 typedef struct floats {
     const char *what;
@@ -11,13 +11,14 @@ typedef struct floats {
 } floats;
 
 static const floats kinds[FLOATS] = {
-    {"positions", 3, false}, {"colors", 3, false},       {"irradiance", 3, false}, {"direct", 3, false},
-    {"indirect", 3, false},  {"normals", 3, false},      {"texcoords", 6, true},   {"face_colors", 3, true},
-    {"source_uv", 6, true},  {"corner_normals", 9, true}};
+    {"positions", 3, false},  {"colors", 3, false},   {"irradiance", 3, false},   {"direct", 3, false},
+    {"indirect", 3, false},   {"error", 1, false},    {"normals", 3, false},      {"texcoords", 6, true},
+    {"face_colors", 3, true}, {"source_uv", 6, true}, {"corner_normals", 9, true}};
 
 static void list_floats(const fct_mesh *m, const float *out[FLOATS]) {
-    const float *all[FLOATS] = {m->positions, m->colors,    m->irradiance,  m->direct,    m->indirect,
-                                m->normals,   m->texcoords, m->face_colors, m->source_uv, m->corner_normals};
+    const float *all[FLOATS] = {m->positions,   m->colors,    m->irradiance,    m->direct,
+                                m->indirect,    m->error,     m->normals,       m->texcoords,
+                                m->face_colors, m->source_uv, m->corner_normals};
     memcpy(out, all, sizeof all);
 }
 
@@ -193,11 +194,36 @@ static void ply_shows_the_display(void **state) {
     unlink(path);
 }
 
+/* GLB stores the errors; OBJ and OFF name them among the arrays that they leave out. */
+static void glb_keeps_errors(void **state) {
+    (void)state;
+    static const char *const paths[] = {"errors.glb", "errors.obj", "errors.off"};
+    recorder r = {0};
+    fct_env env = recorder_env(&r);
+    fct_mesh m = make_loaded(&env, 1, ~(unsigned)(FCT_MESH_COLORS | FCT_MESH_ERROR | FCT_MESH_SOURCE_FACES)),
+             back;
+    m.origin[1] = 0, m.material_count = 0;
+    for (int k = 0; k < 3; ++k) {
+        r.text[0] = 0;
+        assert_int_equal(fct_mesh_save(&env, paths[k], &m, NULL), FCT_OK);
+        assert_int_equal(strstr(r.text, "the error of light") != NULL, k > 0);
+        assert_int_equal(fct_mesh_load(&env, paths[k], &back), FCT_OK);
+        assert_int_equal(back.error != NULL, k == 0);
+        if (back.error) assert_memory_equal(back.error, m.error, sizeof(float) * VERTICES);
+        fct_mesh_release(&env, &back);
+        unlink(paths[k]);
+    }
+    m.error[3] = NAN;
+    assert_int_equal(fct_mesh_save(&env, paths[0], &m, NULL), FCT_ERROR_DATA);
+    fct_mesh_release(&env, &m);
+    assert_int_equal(r.alive, 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(copies_have_all),       cmocka_unit_test(joins_follow_each_other),
         cmocka_unit_test(turns_swap_corners),    cmocka_unit_test(ply_keeps_lights),
-        cmocka_unit_test(ply_shows_the_display),
+        cmocka_unit_test(ply_shows_the_display), cmocka_unit_test(glb_keeps_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -287,6 +287,41 @@ static void chooses_the_scene(void **state) {
     }
 }
 
+/* _ERROR is one number per vertex. An attribute of this name with vectors is another program's. */
+static void reads_errors(void **state) {
+    (void)state;
+    unsigned char binary[72];
+    static const float errors[4] = {.5F, 0, 2, .25F};
+    fill_square(binary);
+    memcpy(binary + 56, errors, sizeof errors);
+    for (int accessor = 0; accessor < 4; ++accessor) {
+        char json[1500];
+        messages m;
+        fct_mesh mesh;
+        snprintf(json, sizeof json,
+                 "{\"buffers\":[{\"byteLength\":72}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},"
+                 "{\"buffer\":0,\"byteOffset\":48,\"byteLength\":8},{\"buffer\":0,\"byteOffset\":56,"
+                 "\"byteLength\":16}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,"
+                 "\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5121,\"count\":6,\"type\":"
+                 "\"SCALAR\"},{\"bufferView\":2,\"componentType\":5126,\"count\":4,\"type\":\"SCALAR\"}],"
+                 "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"_ERROR\":%d},\"indices\":"
+                 "1}]}]," ASSET,
+                 accessor);
+        const fct_result result = parse(json, binary, sizeof binary, &m, &mesh);
+        if (accessor == 1) { /* six numbers for four vertices */
+            assert_int_equal(result, FCT_ERROR_DATA);
+            continue;
+        }
+        if (result != FCT_OK) fail_msg("%s", m.text);
+        assert_int_equal(mesh.error != NULL, accessor == 2);
+        if (mesh.error) assert_memory_equal(mesh.error, errors, sizeof errors);
+        fct_env env = fct_env_default();
+        fct_mesh_release(&env, &mesh);
+        bytes b = make_glb(json, binary, sizeof binary);
+        starve("glb", b.data, b.size);
+    }
+}
+
 static void reports_each_feature_once(void **state) {
     (void)state;
     static const struct {
@@ -472,6 +507,7 @@ int main(void) {
         cmocka_unit_test(reads_only_files_of_the_folder),
         cmocka_unit_test(replaces_sparse_elements),
         cmocka_unit_test(chooses_the_scene),
+        cmocka_unit_test(reads_errors),
         cmocka_unit_test(reports_each_feature_once),
         cmocka_unit_test(leaves_out_incomplete_primitives),
         cmocka_unit_test(reads_a_padded_glb),

@@ -3,7 +3,7 @@
 #include "facetree/radiosity.h"
 
 static fct_env plain; /* outlives every scene */
-enum { ALL = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT };
+enum { ALL = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_ERROR };
 
 static const float reflectance[3] = {.6F, .3F, 0}, emission[3] = {.5F, 0, .25F};
 
@@ -99,6 +99,16 @@ static void others_know_the_irradiance(void **state) {
     }
     fct_bake *bake;
     fct_bake_def def = fct_bake_def_default();
+    for (int kind = 0; kind < 3; ++kind) {
+        def = fct_bake_def_default();
+        def.outputs = FCT_MESH_ERROR;
+        if (kind == 0) def.method = FCT_BAKE_REFERENCE;
+        if (kind == 1) def.final = FCT_FINAL_NONE;
+        if (kind == 2) def.keep = FCT_KEEP_FACE;
+        assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_ERROR_DATA);
+        assert_non_null(strstr(r.text, kind < 2 ? "error of the light needs" : "found other outputs"));
+    }
+    def = fct_bake_def_default();
     def.outputs = FCT_MESH_TEXCOORDS;
     assert_int_equal(fct_bake_create(&plain, scene, &def, &bake), FCT_ERROR_DATA);
     def.outputs = FCT_MESH_DIRECT, def.indirect_only = true;
@@ -123,6 +133,7 @@ static void joined_meshes_have_all(void **state) {
         const size_t first = all.vertex_count - part.vertex_count, face = counts[0] + counts[1];
         assert_memory_equal(all.direct + 3 * first, part.direct, 12 * (size_t)part.vertex_count);
         assert_memory_equal(all.irradiance + 3 * first, part.irradiance, 12 * (size_t)part.vertex_count);
+        assert_memory_equal(all.error + first, part.error, 4 * (size_t)part.vertex_count);
         assert_int_equal(all.source_faces && all.source_uv, sources);
         if (sources)
             assert_memory_equal(all.source_uv + 6 * face, part.source_uv, 24 * (size_t)part.face_count);

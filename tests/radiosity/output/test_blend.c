@@ -212,10 +212,12 @@ enum { NEAR = FCT_NEAREST_ANCHORS, TERMS = 6 };
 
 /* The value at p of the polynomial that minimizes sum w_i (e_i - f(p_i))^2 / sum w + .02 |linear terms|^2 +
  * .1 |quadratic terms|^2: least squares over one row per anchor and one per penalty, by Gram and Schmidt.
- * The quadratic terms are half the second derivatives H along the axes: |H|^2 = Hxx^2 + 2 Hxy^2 + Hyy^2. */
+ * The quadratic terms are half the second derivatives H along the axes: |H|^2 = Hxx^2 + 2 Hxy^2 + Hyy^2.
+ * *square: the first of these sums alone. */
 static double fit_plainly(int count, const fct_anchor *const near[], const double *w, const double *e, v3 p,
-                          v3 n) {
-    double rows[NEAR + TERMS][TERMS + 1] = {{0}}, total = 0, spread = 0, r[TERMS][TERMS + 1];
+                          v3 n, double *square) {
+    double rows[NEAR + TERMS][TERMS + 1] = {{0}}, f[NEAR][TERMS + 1], total = 0, spread = 0,
+                                      r[TERMS][TERMS + 1];
     const v3 s = v3_unit(v3_cross(n, v3_make(.3, .8, -.5))), t = v3_cross(n, s);
     for (int i = 0; i < count; ++i) {
         const v3 d = v3_sub(v3_load(near[i]->position), p);
@@ -223,8 +225,9 @@ static double fit_plainly(int count, const fct_anchor *const near[], const doubl
     }
     for (int i = 0; i < count; ++i) {
         const v3 d = v3_scale(v3_sub(v3_load(near[i]->position), p), sqrt(total / spread));
-        const double x = v3_dot(d, s), y = v3_dot(d, t), f[7] = {1, x, y, x * x, 2 * x * y, y * y, e[i]};
-        for (int j = 0; j <= TERMS; ++j) rows[i][j] = sqrt(w[i] / total) * f[j];
+        const double x = v3_dot(d, s), y = v3_dot(d, t), row[7] = {1, x, y, x * x, 2 * x * y, y * y, e[i]};
+        memcpy(f[i], row, sizeof row);
+        for (int j = 0; j <= TERMS; ++j) rows[i][j] = sqrt(w[i] / total) * row[j];
     }
     for (int j = 1; j < TERMS; ++j) rows[count + j][j] = sqrt(j < 3 ? .02 : j == 4 ? .2 : .1);
     for (int j = 0; j < TERMS; ++j)
@@ -241,13 +244,19 @@ static double fit_plainly(int count, const fct_anchor *const near[], const doubl
         for (int k = j + 1; k < TERMS; ++k) z[j] -= r[j][k] * z[k];
         z[j] /= r[j][j];
     }
+    *square = 0;
+    for (int i = 0; i < count; ++i) {
+        double value = 0;
+        for (int j = 0; j < TERMS; ++j) value += z[j] * f[i][j];
+        *square += w[i] / total * (e[i] - value) * (e[i] - value);
+    }
     return z[0];
 }
 
 /* blend.h and the formulas at the top of blend.c, over all anchors. Returns the number of rays. *turned:
  * counts points whose normal no anchor has within 37 degrees; *clamped: values outside the anchors' range. */
 static int blend_plainly(const room *r, const fct_anchors *t, v3 p, v3 n, double offset, bool flat,
-                         double e[3], int *turned, int *clamped) {
+                         double e[3], double variance[3], int *turned, int *clamped) {
     double x[NEAR], w[NEAR], values[3][NEAR], total = 0, mean = 0, farthest = 0, far2[NEAR];
     const fct_anchor *near[NEAR];
     int count = 0, rays = 0;
@@ -294,10 +303,18 @@ static int blend_plainly(const room *r, const fct_anchors *t, v3 p, v3 n, double
         double lowest = INFINITY, highest = 0;
         for (int i = 0; i < count; ++i)
             if (w[i] > 0) lowest = fmin(lowest, values[c][i]), highest = fmax(highest, values[c][i]);
-        e[c] = fit_plainly(count, near, w, values[c], p, n);
+        e[c] = fit_plainly(count, near, w, values[c], p, n, &variance[c]);
         *clamped += e[c] < lowest - 1e-9 || e[c] > highest + 1e-9;
         e[c] = fmin(fmax(e[c], lowest), highest);
     }
+    /* The weight of an anchor in the value is the value for light at that anchor alone. */
+    double squares = 0, unused;
+    for (int i = 0; i < count; ++i) {
+        double alone[NEAR] = {0};
+        alone[i] = 1;
+        squares += pow(fit_plainly(count, near, w, alone, p, n, &unused), 2);
+    }
+    for (int c = 0; c < 3; ++c) variance[c] *= squares;
     return rays;
 }
 
@@ -328,13 +345,16 @@ static void blends_equal_the_formula(void **state) {
             for (uint64_t k = 0; k < 3; ++k)
                 p[k] = (float)((2 * pick(seed, q, 51 + k) - 1) * (k == 2 ? .3 : 1));
             v3_store(n, v3_unit(v3_make(pick(seed, q, 54) - .5, pick(seed, q, 55) - .5, q % 9 ? 1 : .2)));
-            double expected[3], found[3];
+            double expected[3], variance[3], found[3];
             uint64_t rays = 5;
-            int sent =
-                blend_plainly(&r, &t, v3_load(p), v3_load(n), offset, q % 2, expected, &turned, &clamped);
+            int sent = blend_plainly(&r, &t, v3_load(p), v3_load(n), offset, q % 2, expected, variance,
+                                     &turned, &clamped);
             fct_anchors_irradiance(&t, &r.set, p, n, offset, q % 2, found, &rays);
             assert_int_equal(rays, 5 + sent);
             for (int c = 0; c < 3; ++c) assert_near(found[c], expected[c], 1e-6);
+            fct_anchors_variance(&t, &r.set, p, n, offset, q % 2, found, &rays);
+            assert_int_equal(rays, 5 + 2 * sent);
+            for (int c = 0; c < 3; ++c) assert_near(found[c], variance[c], 1e-6 * variance[c] + 1e-12);
             rays_of_all += sent;
         }
         fct_anchors_release(&plain, &t);

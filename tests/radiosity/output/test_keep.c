@@ -5,7 +5,7 @@
 
 static fct_env plain; /* outlives every scene */
 
-enum { ALL = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT };
+enum { ALL = FCT_MESH_IRRADIANCE | FCT_MESH_DIRECT | FCT_MESH_INDIRECT | FCT_MESH_ERROR };
 static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 static const float mirror[12] = {-1, 0, .25F, 3, 0, 1.5F, 0, 0, 0, 0, 1, .2F};
 
@@ -103,21 +103,27 @@ static double area_of(const fct_mesh *m, size_t f) {
                                  v3_sub(v3_load(m->positions + 3 * (size_t)t[2]), a)));
 }
 
-static void expect_mean(const fct_mesh *sides, const float *of_sides, const fct_mesh *means,
-                        const float *of_means) {
+static void expect_means(const fct_mesh *sides, const float *of_sides, const fct_mesh *means,
+                         const float *of_means, size_t width) {
     for (uint32_t v = 0; v < means->vertex_count; ++v) {
         double sum[3] = {0, 0, 0}, weight = 0;
         for (size_t c = 0; c < 3 * (size_t)means->face_count; ++c) {
             if (means->triangles[c] != v) continue;
             const double area = area_of(means, c / 3);
-            for (size_t k = 0; k < 3; ++k) sum[k] += area * of_sides[3 * (size_t)sides->triangles[c] + k];
+            for (size_t k = 0; k < width; ++k)
+                sum[k] += area * (double)of_sides[width * sides->triangles[c] + k];
             weight += area;
         }
-        for (size_t k = 0; k < 3; ++k) {
-            const double mean = weight > 0 ? sum[k] / weight : 0, found = of_means[3 * (size_t)v + k];
+        for (size_t k = 0; k < width; ++k) {
+            const double mean = weight > 0 ? sum[k] / weight : 0, found = of_means[width * v + k];
             if (!(fabs(found - mean) <= 1e-5 * mean)) fail_msg("vertex %u: %g, expected %g", v, found, mean);
         }
     }
+}
+
+static void expect_mean(const fct_mesh *sides, const float *of_sides, const fct_mesh *means,
+                        const float *of_means) {
+    expect_means(sides, of_sides, means, of_means, 3);
 }
 
 /* One material or two, plain and mirrored: the sides of a crease, and their means. */
@@ -142,6 +148,7 @@ static void vertices_have_the_mean_of_their_sides(void **state) {
         expect_mean(&sides, sides.irradiance, &means, means.irradiance);
         expect_mean(&sides, sides.direct, &means, means.direct);
         expect_mean(&sides, sides.indirect, &means, means.indirect);
+        expect_means(&sides, sides.error, &means, means.error, 1);
         double lowest = INFINITY, highest = 0;
         for (size_t i = 0; i < 3 * (size_t)box.vertex_count; i += 3)
             lowest = fmin(lowest, means.colors[i]), highest = fmax(highest, means.colors[i]);

@@ -513,9 +513,67 @@ static void parts_refine_each_other(void **state) {
     }
 }
 
+/* A tile that lies a little above a plate is no continuation of it: both are split where they are near. */
+static void low_steps_refine(void **state) {
+    (void)state;
+    const double longest = 1, shortest = longest / 4;
+    const v3 low = v3_make(-.3, -.3, .03), high = v3_make(.3, .3, .03);
+    fct_mesh mesh;
+    fct_scene *scene = begin();
+    assert_int_equal(fct_mesh_create(&plain, 8, 4, 0, &mesh), FCT_OK);
+    put_rectangle(&mesh, 0, 0, v3_make(-2, -2, 0), v3_make(4, 0, 0), v3_make(0, 4, 0));
+    put_rectangle(&mesh, 4, 2, low, v3_make(.6, 0, 0), v3_make(0, .6, 0));
+    place_mesh(scene, &mesh, place_material(scene, .5, 0, false), NULL);
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    fct_surface s = build(scene, 0, longest);
+    uint32_t near = 0, tile = 0;
+    for (size_t c = 0; c < 3 * (size_t)s.mesh.face_count; ++c) {
+        const v3 a = at(&s, s.mesh.triangles[c]), b = at(&s, s.mesh.triangles[c % 3 == 2 ? c - 2 : c + 1]);
+        const double length = v3_norm(v3_sub(b, a));
+        tile += s.mesh.source_faces[c / 3] >= 2;
+        if (s.mesh.source_faces[c / 3] >= 2 || box_distance(v3_scale(v3_add(a, b), .5), low, high) > .1)
+            continue;
+        assert_true(length <= 1.01 * shortest);
+        ++near;
+    }
+    assert_true(near > 10 && tile > 3 * 8);
+    fct_surface_release(&plain, &s);
+    fct_mesh_release(&plain, &mesh);
+    fct_scene_destroy(scene);
+}
+
+/* The faces of a fold share two corners, whatever their order in each face, so they are one part and do not
+ * refine each other. A far triangle is another part. */
+static void folds_are_one_part(void **state) {
+    (void)state;
+    static const float positions[21] = {0, 0, 0, 0, 4, 0, 4, 2, 0, 0, 2, 4, 90, 0, 0, 91, 0, 0, 90, 1, 0};
+    static const uint8_t orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+    static const uint32_t faces[2][3] = {{2, 1, 0}, {0, 1, 3}};
+    for (int order = 0; order < 36; ++order) {
+        fct_mesh mesh;
+        fct_scene *scene = begin();
+        assert_int_equal(fct_mesh_create(&plain, 7, 3, 0, &mesh), FCT_OK);
+        memcpy(mesh.positions, positions, sizeof positions);
+        for (uint32_t k = 0; k < 3; ++k) {
+            mesh.triangles[k] = faces[0][orders[order / 6][k]];
+            mesh.triangles[3 + k] = faces[1][orders[order % 6][k]];
+            mesh.triangles[6 + k] = 4 + k;
+        }
+        place_mesh(scene, &mesh, place_material(scene, .5, 0, false), NULL);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_surface s = build(scene, 0, 6);
+        assert_int_equal(s.mesh.face_count, 3);
+        fct_surface_release(&plain, &s);
+        fct_mesh_release(&plain, &mesh);
+        fct_scene_destroy(scene);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_refine_each_other),
+        cmocka_unit_test(low_steps_refine),
+        cmocka_unit_test(folds_are_one_part),
         cmocka_unit_test(cube_is_split_evenly),
         cmocka_unit_test(splits_conform),
         cmocka_unit_test(dense_models_pass),
