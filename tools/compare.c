@@ -25,12 +25,12 @@ static const struct argp_option compare_options_table[] = {
      "4000000)",
      0},
     {"hausdorff", KEY_HAUSDORFF, NULL, 0,
-     "Also find the largest distance of any point, within 1 % and 1e-5 of the diameter", 0},
+     "Also find the largest distance of any point, within 1 % and 1e-4 of the diameter", 0},
     {0}};
 
 /* Tolerances of the Hausdorff distance, of itself and of the diameter. */
 #define HAUSDORFF_RELATIVE .01
-#define HAUSDORFF_ABSOLUTE 1e-5
+#define HAUSDORFF_ABSOLUTE 1e-4
 
 static error_t parse_compare(int key, char *text, struct argp_state *state) {
     compare_options *o = state->input;

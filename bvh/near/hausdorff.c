@@ -59,16 +59,25 @@ static double distance_from_face(const fct_bvh *to, uint32_t place, v3 point) {
     return v3_norm(v3_sub(fct_triangle_closest(point, p[0], p[1], p[2], &u, &v), point));
 }
 
-static double bound_triangle(const fct_bvh *to, const triangle *t) {
-    double least = INFINITY;
-    for (int i = 0; i < 3; ++i) {
-        double most = 0;
-        for (int k = 0; k < 3; ++k)
-            most = fct_max(most, k == i ? t->corner[k].distance
-                                        : distance_from_face(to, t->corner[i].place, t->corner[k].point));
-        least = fct_min(least, most);
+/* The largest distance of the corners from one face. */
+static double bound_by_face(const fct_bvh *to, uint32_t place, const triangle *t) {
+    double most = 0;
+    for (int k = 0; k < 3; ++k) {
+        const sample *corner = &t->corner[k];
+        most = fct_max(most, corner->place == place ? corner->distance
+                                                    : distance_from_face(to, place, corner->point));
     }
-    return least;
+    return most;
+}
+
+/* Whether no point of the triangle is farther than `limit`, by the faces nearest to its corners and its
+ * middle. *middle receives the middle if it was measured; else its distance stays. */
+static bool stays_within(const fct_bvh *to, const triangle *t, double limit, sample *middle) {
+    for (int i = 0; i < 3; ++i)
+        if (bound_by_face(to, t->corner[i].place, t) <= limit) return true;
+    v3 sum = v3_add(t->corner[0].point, v3_add(t->corner[1].point, t->corner[2].point));
+    *middle = measure_point(to, v3_scale(sum, 1. / 3));
+    return middle->distance <= limit && bound_by_face(to, middle->place, t) <= limit;
 }
 
 /* Replaces t by two halves; returns whether it is large enough. */
@@ -91,15 +100,21 @@ static double tolerance_of(const hausdorff_job *job, double distance) {
     return fct_max(job->relative * distance + job->absolute, job->least);
 }
 
+static void keep_farther(sample *best, const sample *s, uint32_t place) {
+    if (s->distance > best->distance) *best = *s, best->place = place;
+}
+
 static void search_triangle(const hausdorff_job *job, const triangle *whole, uint32_t place, sample *best) {
     triangle stack[STACK];
     uint32_t height = 1;
     stack[0] = *whole;
     while (height) {
         triangle t = stack[--height];
-        for (int c = 0; c < 3; ++c)
-            if (t.corner[c].distance > best->distance) *best = t.corner[c], best->place = place;
-        if (bound_triangle(job->to, &t) <= best->distance + tolerance_of(job, best->distance)) continue;
+        sample middle = {.distance = -1};
+        for (int c = 0; c < 3; ++c) keep_farther(best, &t.corner[c], place);
+        bool within = stays_within(job->to, &t, best->distance + tolerance_of(job, best->distance), &middle);
+        keep_farther(best, &middle, place);
+        if (within) continue;
         if (height + 2 <= STACK && halve_triangle(job, &t, stack + height)) height += 2;
     }
 }
