@@ -270,6 +270,41 @@ static void signs_are_right_near_the_surface(void **state) {
     model_release(&env, &m);
 }
 
+/* Over an open bowl |w| = .5 is a surface in the air. Next to it moments give wrong signs, and the sum of all
+ * faces must decide. */
+static void all_faces_decide_near_one_half(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_sphere(&env, 24);
+    uint32_t kept = 0, misled = 0;
+    for (uint32_t f = 0; f < mesh.face_count; ++f)
+        if (mesh.positions[3 * (size_t)mesh.triangles[3 * f] + 2] < .3f)
+            memmove(mesh.triangles + 3 * kept++, mesh.triangles + 3 * f, 12);
+    mesh.face_count = kept;
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 4;
+    for (int i = 0; i < 60; ++i) {
+        v3 in = {0, 0, -.5}, out = {random_unit(&seed) - .5, random_unit(&seed) - .5, 2};
+        double low = 0, high = 1;
+        for (int round = 0; round < 24; ++round) {
+            double middle = (low + high) / 2;
+            bool inside = brute_winding(&mesh, v3_mad(in, middle, v3_sub(out, in))) > .5;
+            *(inside ? &low : &high) = middle;
+        }
+        for (int side = -1; side <= 1; side += 2) {
+            float point[3];
+            fct_closest near;
+            v3_store(point, v3_mad(in, low + side * 2e-5, v3_sub(out, in)));
+            FCT_KEEP_STORED(point);
+            assert_true(fct_bvh_signed_distance(m.bvh, point, INFINITY, &near, NULL));
+            assert_int_equal(near.distance < 0, side < 0);
+            misled += (fct_bvh_winding_number(m.bvh, point, NULL) > .5) != (side < 0);
+        }
+    }
+    assert_true(misled > 5);
+    model_release(&env, &m);
+}
+
 /* Two overlapping spheres: inside of both the number is 2, and their inner walls are inside too. */
 static void overlaps_count_twice(void **state) {
     (void)state;
@@ -358,6 +393,7 @@ int main(void) {
         cmocka_unit_test(moments_carry_the_far_field),
         cmocka_unit_test(closed_forms_hold),
         cmocka_unit_test(signs_are_right_near_the_surface),
+        cmocka_unit_test(all_faces_decide_near_one_half),
         cmocka_unit_test(overlaps_count_twice),
         cmocka_unit_test(batches_agree_with_single_points),
         cmocka_unit_test(without_the_part_there_is_no_answer),
