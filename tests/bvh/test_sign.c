@@ -270,6 +270,26 @@ static void signs_are_right_near_the_surface(void **state) {
     model_release(&env, &m);
 }
 
+/* Close to a side of a face both terms of its fraction vanish, and float would lose the angle. */
+static void sums_are_right_near_sides(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_holes(make_pebble(&env, 16, 7));
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 3;
+    for (uint32_t f = 0; f < mesh.face_count; f += 2) {
+        v3 t[3];
+        float point[3];
+        face_corners(&mesh, f, t);
+        v3 side = v3_mad(t[0], random_unit(&seed), v3_sub(t[1], t[0]));
+        v3_store(point, v3_mad(side, pow(10, -2 - 4 * random_unit(&seed)), random_direction(&seed)));
+        FCT_KEEP_STORED(point);
+        double sum = fct_winding_sum(m.bvh, v3_load(point), INFINITY, NULL);
+        assert_true(fabs(sum - brute_winding(&mesh, v3_load(point))) < 2e-5);
+    }
+    model_release(&env, &m);
+}
+
 /* Over an open bowl |w| = .5 is a surface in the air. Next to it moments give wrong signs, and the sum of all
  * faces must decide. */
 static void all_faces_decide_near_one_half(void **state) {
@@ -393,6 +413,7 @@ int main(void) {
         cmocka_unit_test(moments_carry_the_far_field),
         cmocka_unit_test(closed_forms_hold),
         cmocka_unit_test(signs_are_right_near_the_surface),
+        cmocka_unit_test(sums_are_right_near_sides),
         cmocka_unit_test(all_faces_decide_near_one_half),
         cmocka_unit_test(overlaps_count_twice),
         cmocka_unit_test(batches_agree_with_single_points),
