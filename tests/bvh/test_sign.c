@@ -2,6 +2,7 @@
 #include "packed.h"
 
 #include "base/math/round.h"
+#include "bvh/near/sign/moments.h"
 #include "bvh/near/sign/winding.h"
 
 #define PI 3.14159265358979324
@@ -102,6 +103,93 @@ static void winding_numbers_agree_with_all_faces(void **state) {
     agrees_with_all_faces(&env, make_pebble(&env, 30, 6), far, 8);
 }
 
+/* Integrals over the faces under a child, about its centre. */
+typedef struct integrals {
+    v3 center;
+    double area, n[3], nx[3][3], nxx[3][3][3], radius2;
+} integrals;
+
+/* The middles of the sides, with a third of the area each, integrate quadratic functions exactly. */
+static void integrate_face(const v3 t[3], integrals *out) {
+    v3 cross = v3_scale(v3_cross(v3_sub(t[1], t[0]), v3_sub(t[2], t[0])), .5);
+    double n[3] = {cross.x, cross.y, cross.z};
+    out->area += v3_norm(cross);
+    for (int c = 0; c < 3; ++c) {
+        v3 middle = v3_sub(v3_scale(v3_add(t[c], t[(c + 1) % 3]), .5), out->center);
+        double x[3] = {middle.x, middle.y, middle.z};
+        out->radius2 = fmax(out->radius2, v3_norm2(v3_sub(t[c], out->center)));
+        for (int i = 0; i < 3; ++i) {
+            out->n[i] += n[i] / 3;
+            for (int j = 0; j < 3; ++j) {
+                out->nx[i][j] += n[i] * x[j] / 3;
+                for (int k = 0; k < 3; ++k) out->nxx[i][j][k] += n[i] * x[j] * x[k] / 3;
+            }
+        }
+    }
+}
+
+static void integrate_child(const fct_bvh *bvh, uint32_t child, integrals *out) {
+    if (is_leaf(child)) {
+        const fct_leaf *leaf = fct_bvh_leaf(bvh, child);
+        for (uint32_t i = 0; i < leaf->count; ++i) {
+            v3 t[3];
+            fct_leaf_triangle(leaf, i, t);
+            integrate_face(t, out);
+        }
+        return;
+    }
+    for (uint32_t i = 0; i < 8; ++i)
+        if (bvh->moments[child].present >> i & 1) integrate_child(bvh, bvh->moments[child].child[i], out);
+}
+
+/* The traceless symmetric part of nx. */
+static double second_moment(const integrals *m, int i, int j) {
+    double trace = m->nx[0][0] + m->nx[1][1] + m->nx[2][2];
+    return (m->nx[i][j] + m->nx[j][i]) / 2 - (i == j ? trace / 3 : 0);
+}
+
+static double symmetric_third(const integrals *m, int i, int j, int k) {
+    return (m->nxx[i][j][k] + m->nxx[j][i][k] + m->nxx[k][i][j]) / 3;
+}
+
+static double third_moment(const integrals *m, int i, int j, int k) {
+    double trace[3] = {0};
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) trace[a] += symmetric_third(m, a, b, b);
+    return symmetric_third(m, i, j, k) -
+           ((i == j ? trace[k] : 0) + (i == k ? trace[j] : 0) + (j == k ? trace[i] : 0)) / 5;
+}
+
+static void moments_are_integrals_over_the_surface(void **state) {
+    (void)state;
+    static const int second[5][2] = {{0, 0}, {1, 1}, {0, 1}, {0, 2}, {1, 2}};
+    static const int third[7][3] = {{0, 0, 0}, {1, 1, 1}, {0, 0, 1}, {0, 1, 1},
+                                    {0, 0, 2}, {1, 1, 2}, {0, 1, 2}};
+    fct_env env = fct_env_default();
+    model m = make_signed(&env, make_holes(make_pebble(&env, 24, 3)));
+    size_t count = m.bvh->moment_bytes / sizeof(fct_moment_node);
+    assert_true(count > 20);
+    for (size_t i = 0; i < count; ++i)
+        for (uint32_t k = 0; k < 8; ++k) {
+            const fct_moment_node *node = &m.bvh->moments[i];
+            if (!(node->present >> k & 1)) continue;
+            integrals sum = {.center = {node->center[0][k], node->center[1][k], node->center[2][k]}};
+            integrate_child(m.bvh, node->child[k], &sum);
+            double radius2 = (double)node->radius2[k], radius = sqrt(radius2);
+            assert_true(sum.radius2 <= radius2 && radius2 < 2.5 * sum.radius2);
+            for (int a = 0; a < 3; ++a)
+                assert_true(fabs((double)node->dipole[a][k] - sum.n[a]) < 1e-6 * sum.area);
+            for (int a = 0; a < 5; ++a)
+                assert_true(fabs((double)node->quadrupole[a][k] -
+                                 second_moment(&sum, second[a][0], second[a][1])) < 1e-6 * sum.area * radius);
+            for (int a = 0; a < 7; ++a)
+                assert_true(fabs((double)node->octupole[a][k] -
+                                 third_moment(&sum, third[a][0], third[a][1], third[a][2])) <
+                            1e-6 * sum.area * radius2);
+        }
+    model_release(&env, &m);
+}
+
 /* The moments alone, without faces: a point far from everything. The next term is smaller by the third power
  * of radius over distance, against the solid angle of the model. */
 static void moments_carry_the_far_field(void **state) {
@@ -167,6 +255,9 @@ static void signs_are_right_near_the_surface(void **state) {
                 float point[3];
                 fct_closest near;
                 v3_store(point, v3_mad(at, side * height, n));
+                FCT_KEEP_STORED(point);
+                double sum = fct_winding_sum(m.bvh, v3_load(point), INFINITY, NULL);
+                if (f % 20 == 0) assert_true(fabs(sum - brute_winding(&mesh, v3_load(point))) < 2e-5);
                 assert_true(fct_bvh_signed_distance(m.bvh, point, INFINITY, &near, NULL));
                 if (fabs((double)near.distance) < height / 2) continue; /* another face is nearer */
                 assert_true((double)near.distance * side > 0);
@@ -176,6 +267,61 @@ static void signs_are_right_near_the_surface(void **state) {
                                             INFINITY, &on, NULL));
         assert_true(on.distance == 0 && !signbit(on.distance));
     }
+    model_release(&env, &m);
+}
+
+/* Close to a side of a face both terms of its fraction vanish, and float would lose the angle. */
+static void sums_are_right_near_sides(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_holes(make_pebble(&env, 16, 7));
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 3;
+    for (uint32_t f = 0; f < mesh.face_count; f += 2) {
+        v3 t[3];
+        float point[3];
+        face_corners(&mesh, f, t);
+        v3 side = v3_mad(t[0], random_unit(&seed), v3_sub(t[1], t[0]));
+        v3_store(point, v3_mad(side, pow(10, -2 - 4 * random_unit(&seed)), random_direction(&seed)));
+        FCT_KEEP_STORED(point);
+        double sum = fct_winding_sum(m.bvh, v3_load(point), INFINITY, NULL);
+        assert_true(fabs(sum - brute_winding(&mesh, v3_load(point))) < 2e-5);
+    }
+    model_release(&env, &m);
+}
+
+/* Over an open bowl |w| = .5 is a surface in the air. Next to it moments give wrong signs, and the sum of all
+ * faces must decide. */
+static void all_faces_decide_near_one_half(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_sphere(&env, 24);
+    uint32_t kept = 0, misled = 0;
+    for (uint32_t f = 0; f < mesh.face_count; ++f)
+        if (mesh.positions[3 * (size_t)mesh.triangles[3 * f] + 2] < .3f)
+            memmove(mesh.triangles + 3 * kept++, mesh.triangles + 3 * f, 12);
+    mesh.face_count = kept;
+    model m = make_signed(&env, mesh);
+    uint64_t seed = 4;
+    for (int i = 0; i < 60; ++i) {
+        v3 in = {0, 0, -.5}, out = {random_unit(&seed) - .5, random_unit(&seed) - .5, 2};
+        double low = 0, high = 1;
+        for (int round = 0; round < 24; ++round) {
+            double middle = (low + high) / 2;
+            bool inside = brute_winding(&mesh, v3_mad(in, middle, v3_sub(out, in))) > .5;
+            *(inside ? &low : &high) = middle;
+        }
+        for (int side = -1; side <= 1; side += 2) {
+            float point[3];
+            fct_closest near;
+            v3_store(point, v3_mad(in, low + side * 2e-5, v3_sub(out, in)));
+            FCT_KEEP_STORED(point);
+            assert_true(fct_bvh_signed_distance(m.bvh, point, INFINITY, &near, NULL));
+            assert_int_equal(near.distance < 0, side < 0);
+            misled += (fct_bvh_winding_number(m.bvh, point, NULL) > .5) != (side < 0);
+        }
+    }
+    assert_true(misled > 5);
     model_release(&env, &m);
 }
 
@@ -263,9 +409,12 @@ static void without_the_part_there_is_no_answer(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(winding_numbers_agree_with_all_faces),
+        cmocka_unit_test(moments_are_integrals_over_the_surface),
         cmocka_unit_test(moments_carry_the_far_field),
         cmocka_unit_test(closed_forms_hold),
         cmocka_unit_test(signs_are_right_near_the_surface),
+        cmocka_unit_test(sums_are_right_near_sides),
+        cmocka_unit_test(all_faces_decide_near_one_half),
         cmocka_unit_test(overlaps_count_twice),
         cmocka_unit_test(batches_agree_with_single_points),
         cmocka_unit_test(without_the_part_there_is_no_answer),

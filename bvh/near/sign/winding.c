@@ -7,8 +7,8 @@
  *     tan(angle / 2) = a.(b x c) / (|a| |b| |c| + (a.b) |c| + (b.c) |a| + (c.a) |b|)
  *
  * for corners a, b, c relative to the point. Where both terms of the fraction are small against |a| |b| |c|,
- * the point lies close to the face or to its rim. Such a face is measured again in double. So a half angle
- * errs by at most 3e-5, on nearly all faces by less than 1e-6.
+ * the point lies close to a side of the face. Such a face is measured again in double. So a half angle errs
+ * by at most 3e-5, on nearly all faces by less than 1e-6.
  */
 #include "bvh/near/sign/winding.h"
 
