@@ -1,24 +1,20 @@
 /* bvh/build/collapse.c: collapses the binary top to nodes of eight children at the least cost.
  *
  * Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,
- * section 3.2. The cost of a tree is the area of each node times NODE_COST, plus the area of each leaf times
- * its cost: proportional to the expected work of a random ray. For each node n of the top, from the leaves
- * up:
+ * section 3.2. The cost is the sum of the areas of the nodes: proportional to the nodes that a random ray
+ * visits. Leaves cost the same in every collapse, so they count 0. For each node n of the top, from the
+ * leaves up:
  *
  *     C(n, i) = least cost of the subtree as at most i children of one wide node
  *     D(n, i) = min over k of C(left, k) + C(right, i - k), where 0 < k < i
- *     C(n, 1) = area NODE_COST + D(n, 8)           n becomes a wide node
+ *     C(n, 1) = area + D(n, 8)                     n becomes a wide node
  *     C(n, i) = min(D(n, i), C(n, i - 1))          1 < i < 8
- *     C(leaf, i) = area times the cost of the leaf
+ *     C(leaf, i) = 0
  *
  * The choices then lead from the root down. O(leaves). Nodes are numbered depth first, so that a node lies
  * near its first child in memory.
  */
 #include "bvh/build/collapse.h"
-
-/* Work per visit, in units of a visit of a node. */
-#define NODE_COST 1.0f
-#define LEAF_COST .8f
 
 /* Choices of a node of the top. split[i - 1]: the left child takes this many of i places; 0: i - 1 places
  * cost no more. split[0] belongs to D(n, 8). */
@@ -47,14 +43,10 @@ static void choose_splits(const fct_top *top, choice *choices) {
     for (uint32_t n = top->node_count; n-- > 0;) {
         const fct_top_node *node = &top->nodes[n];
         choice *c = &choices[n];
-        float area = bounds_area(node->bounds);
         *c = (choice){{0}, {0}};
-        if (node->left == FCT_NONE) {
-            for (int i = 0; i < 7; ++i) c->cost[i] = LEAF_COST * area;
-            continue;
-        }
+        if (node->left == FCT_NONE) continue;
         const choice *left = &choices[node->left], *right = &choices[node->right];
-        c->cost[0] = NODE_COST * area + split_places(left, right, 8, &c->split[0]);
+        c->cost[0] = bounds_area(node->bounds) + split_places(left, right, 8, &c->split[0]);
         for (uint32_t i = 2; i < 8; ++i) {
             uint8_t k = 1;
             float cost = split_places(left, right, i, &k);

@@ -10,8 +10,8 @@
 #include "bvh/build/boxes.h"
 
 /* What a visit of an oriented node costs above that of an axis node, in visits of a child. Measured with .3,
- * .5 and .7: rays on scans take the same time within 3 %, bytes per triangle are 32.4, 31.0 and 29.6, and
- * primary rays on diagonal beams visit 9.9, 10.7 and 12.0 nodes. */
+ * .5 and .7: bytes per triangle of a scan are 32.3, 30.8 and 29.5, primary rays on diagonal beams visit 9.9,
+ * 10.7 and 12.0 nodes, and times on scans differ by less than the noise. */
 #define ORIENTED_COST .5
 
 enum { NODE_CHUNK = 256 /* nodes per task */ };

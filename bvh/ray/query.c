@@ -25,19 +25,55 @@ bool fct_ray_closest(const fct_bvh *bvh, const fct_ray *ray, fct_raw_hit *hit, d
     return true;
 }
 
+static void report_miss(fct_hit *hit) {
+    *hit = (fct_hit){.t = INFINITY, .face = FCT_NONE, .place = FCT_NONE};
+}
+
+static void report_hit(const fct_bvh *bvh, const fct_ray *ray, const fct_raw_hit *raw, double t,
+                       fct_hit *hit) {
+    hit->t = fct_ray_clamp_t(ray, t);
+    hit->u = raw->u, hit->v = raw->v;
+    hit->place = raw->place;
+    hit->face = bvh->view.face_ids[raw->place];
+    unscale_normal(bvh, raw->normal, hit->normal);
+}
+
 bool fct_bvh_closest_hit(const fct_bvh *bvh, const fct_ray *ray, fct_hit *hit, fct_visits *visits) {
     fct_raw_hit raw;
     double t;
-    if (!fct_ray_closest(bvh, ray, &raw, &t, visits)) {
-        *hit = (fct_hit){.t = INFINITY, .face = FCT_NONE, .place = FCT_NONE};
-        return false;
-    }
-    hit->t = fct_ray_clamp_t(ray, t);
-    hit->u = raw.u, hit->v = raw.v;
-    hit->place = raw.place;
-    hit->face = bvh->view.face_ids[raw.place];
-    unscale_normal(bvh, raw.normal, hit->normal);
+    bool found = fct_ray_closest(bvh, ray, &raw, &t, visits);
+    if (found)
+        report_hit(bvh, ray, &raw, t, hit);
+    else
+        report_miss(hit);
+    return found;
+}
+
+bool fct_bvh_closest_hit_except(const fct_bvh *bvh, const fct_ray *ray, uint32_t face, fct_hit *hit,
+                                fct_visits *visits) {
+    fct_raw_hit raw;
+    fct_prepared_ray prepared;
+    report_miss(hit);
+    if (bvh->embree || !fct_ray_prepare(bvh, ray, &prepared)) return false;
+    prepared.except = face;
+    if (!fct_traverse_closest(bvh, &prepared, &raw, visits)) return false;
+    report_hit(bvh, ray, &raw, fct_ray_unscale_t(&prepared, raw.t), hit);
     return true;
+}
+
+size_t fct_bvh_all_hits(const fct_bvh *bvh, const fct_ray *ray, size_t capacity, fct_hit *hits,
+                        fct_visits *visits) {
+    fct_prepared_ray prepared;
+    if (bvh->embree || !fct_ray_prepare(bvh, ray, &prepared)) return 0;
+    size_t found = fct_traverse_all(bvh, ray, &prepared, capacity, hits, visits);
+    for (size_t i = 0; i < found && i < capacity; ++i) {
+        const uint32_t *corners = bvh->view.triangles + 3 * (size_t)hits[i].place;
+        v3 p[3];
+        for (int c = 0; c < 3; ++c)
+            p[c] = fct_bvh_to_scaled(bvh, v3_load(bvh->view.positions + 3 * (size_t)corners[c]));
+        unscale_normal(bvh, v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), hits[i].normal);
+    }
+    return found;
 }
 
 bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits) {

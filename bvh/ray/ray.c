@@ -66,6 +66,7 @@ bool fct_ray_prepare(const fct_bvh *bvh, const fct_ray *ray, fct_prepared_ray *o
         out->direction[i] = (float)dd[i];
     }
     out->factor = 1 / t_factor;
+    out->except = FCT_NONE;
     double t_min = (double)ray->t_min * t_factor, t_max = (double)ray->t_max * t_factor;
     if (near) {
         for (int i = 0; i < 3; ++i) out->origin[i] = (float)od[i];

@@ -17,6 +17,7 @@ typedef struct fct_prepared_ray {
     float shear[3];     /* x/z, y/z, 1/z of the direction along these axes (Woop et al. 2013) */
     double factor, shift; /* the caller's t = (shift + t) factor */
     bool moved;           /* the origin is not the caller's */
+    uint32_t except;      /* input id of a face that the ray passes through; fct_ray_prepare sets FCT_NONE */
 } fct_prepared_ray;
 
 /* In scaled space. */

@@ -13,9 +13,17 @@
 #include "base/key.h"
 #include "base/math/simd.h"
 
+/* The nearest hits so far, sorted. */
+typedef struct hit_list {
+    const fct_ray *ray; /* the caller's */
+    fct_hit *hits;
+    size_t capacity, found; /* found counts all hits */
+} hit_list;
+
 typedef struct traversal {
     const fct_bvh *bvh;
     const fct_prepared_ray *ray;
+    hit_list *all;        /* NULL unless all hits are wanted; then hit.t stays t_max */
     fct_raw_hit hit;      /* the closest so far; hit.t is ray->t_max before the first */
     const fct_leaf *leaf; /* of the hit */
     uint32_t number;      /* of the hit triangle in its leaf */
@@ -176,6 +184,20 @@ static void compute_exact_weights(const octet *o, uint32_t i, double w[3]) {
     }
 }
 
+/* Inserts a hit before those that are farther, or as far with a higher face id. The farthest drops out of a
+ * full list. */
+static void insert_hit(hit_list *list, const fct_hit *hit) {
+    size_t at = list->found < list->capacity ? list->found : list->capacity;
+    ++list->found;
+    while (at > 0) {
+        const fct_hit *before = &list->hits[at - 1];
+        if (before->t < hit->t || (before->t == hit->t && before->face < hit->face)) break;
+        if (at < list->capacity) list->hits[at] = *before;
+        --at;
+    }
+    if (at < list->capacity) list->hits[at] = *hit;
+}
+
 /* Tests triangle i of an octet, which is triangle `number` of the leaf and which the eight-wide test has not
  * rejected. Records a hit that is nearer, or as near with a lower face id. */
 static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t number, const octet *o,
@@ -197,6 +219,16 @@ static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t nu
     if (!(at >= t->ray->t_min && at <= t->hit.t)) return false;
     uint32_t place = leaf->first + number;
     const uint32_t *ids = t->bvh->view.face_ids;
+    if (t->ray->except != FCT_NONE && ids[place] == t->ray->except) return false;
+    if (t->all) {
+        fct_hit hit = {.t = fct_ray_clamp_t(t->all->ray, fct_ray_unscale_t(t->ray, at)),
+                       .u = (float)(s.w[1] / det),
+                       .v = (float)(s.w[2] / det),
+                       .face = ids[place],
+                       .place = place};
+        insert_hit(t->all, &hit);
+        return false;
+    }
     if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
     __builtin_prefetch(ids + place); /* query.c reads it when the traversal ends */
     t->hit.t = at, t->hit.place = place;
@@ -358,4 +390,15 @@ bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visit
     t.visits.boxes = 8 * t.visits.nodes;
     fct_visits_add(visits, &t.visits);
     return found;
+}
+
+size_t fct_traverse_all(const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray,
+                        size_t capacity, fct_hit *hits, fct_visits *visits) {
+    hit_list all = {.ray = caller, .hits = hits, .capacity = capacity};
+    traversal t = begin_traversal(bvh, ray);
+    t.all = &all;
+    traverse_nodes(&t, false);
+    t.visits.boxes = 8 * t.visits.nodes;
+    fct_visits_add(visits, &t.visits);
+    return all.found;
 }

@@ -290,12 +290,12 @@ static void splits_of_the_top_have_the_least_binned_cost(void **state) {
 
 /* ---- The collapse to nodes of eight children ---- */
 
-/* The least cost of node n of the top as at most `places` children, by trying everything: an area counts 1
- * for a node and .8 for a leaf. */
+/* The least cost of node n of the top as at most `places` children, by trying everything: the areas of
+ * nodes, not of leaves. */
 static double least_cost(const fct_top *top, uint32_t n, uint32_t places) {
     const fct_top_node *node = top->nodes + n;
     double area = area_of(node->bounds);
-    if (node->left == FCT_NONE) return .8 * area;
+    if (node->left == FCT_NONE) return 0;
     double best = INFINITY;
     for (uint32_t total = places == 1 ? 8 : places, k = 1; k < total; ++k)
         best = fmin(best, least_cost(top, node->left, k) + least_cost(top, node->right, total - k));
@@ -342,7 +342,6 @@ static void the_collapse_has_the_least_cost(void **state) {
                 assert_int_equal(below & leaves_below(&top, wide->top[i]), 0);
                 below |= leaves_below(&top, wide->top[i]);
                 if (child->left != FCT_NONE) continue;
-                cost += .8 * area_of(child->bounds);
                 ++seen[top.order[child->begin]];
             }
             assert_true(below == leaves_below(&top, own));

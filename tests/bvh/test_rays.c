@@ -239,6 +239,85 @@ static void batches_equal_single_rays_for_every_thread_count(void **state) {
     model_release(&env, &m);
 }
 
+/* The hits of a ray in order of faces, each from a mesh of that face alone. */
+static size_t find_hits_one_by_one(const fct_env *env, const fct_mesh *mesh, const fct_ray *ray,
+                                   fct_hit *hits) {
+    size_t found = 0;
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        fct_mesh one;
+        assert_int_equal(fct_mesh_create(env, 3, 1, 0, &one), FCT_OK);
+        for (uint32_t c = 0; c < 3; ++c) {
+            memcpy(one.positions + 3 * c, mesh->positions + 3 * (size_t)mesh->triangles[3 * f + c], 12);
+            one.triangles[c] = c;
+        }
+        model m = model_make(env, one, FCT_BACKEND_OBB);
+        fct_hit hit;
+        if (fct_bvh_closest_hit(m.bvh, ray, &hit, NULL)) hit.face = f, hits[found++] = hit;
+        model_release(env, &m);
+    }
+    return found;
+}
+
+static void all_hits_are_sorted_and_complete(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    env.thread_count = 1;
+    /* Large faces, so that a ray hits many. */
+    fct_mesh mesh = make_soup(&env, 120, 5);
+    for (uint32_t i = 0; i < 3 * 3 * mesh.face_count; ++i) {
+        float corner = mesh.positions[9 * (i / 9) + i % 3];
+        mesh.positions[i] = corner + 12 * (mesh.positions[i] - corner);
+    }
+    model m = model_make(&env, mesh, FCT_BACKEND_OBB);
+    enum { RAYS = 60 };
+    fct_ray rays[RAYS];
+    fct_hit hits[120], fewer[120], single[120];
+    size_t total = 0, crowded = 0, ties = 0, differ = 0;
+    /* Kinds 3 and 10 aim at the inside of a face. Rays at its rim may decide differently in a mesh of one
+     * face, which has another scale. */
+    fct_ray mixed[12 * RAYS / 2];
+    fct_ray_mix(m.bvh, 4, 12 * RAYS / 2, mixed);
+    for (int r = 0; r < RAYS; ++r) rays[r] = mixed[12 * (r / 2) + (r % 2 ? 3 : 10)];
+    for (int r = 0; r < RAYS; ++r) {
+        size_t count = fct_bvh_all_hits(m.bvh, &rays[r], 120, hits, NULL);
+        size_t expected = find_hits_one_by_one(&env, &m.mesh, &rays[r], single);
+        differ += count != expected;
+        fct_hit closest;
+        assert_int_equal(fct_bvh_closest_hit(m.bvh, &rays[r], &closest, NULL), count > 0);
+        assert_int_equal(fct_bvh_all_hits(m.bvh, &rays[r], 0, NULL, NULL), count);
+        if (count) {
+            assert_true(closest.face == hits[0].face && closest.t == hits[0].t && closest.u == hits[0].u);
+            assert_true(closest.v == hits[0].v && closest.place == hits[0].place);
+            assert_memory_equal(closest.normal, hits[0].normal, sizeof closest.normal);
+            bool other = fct_bvh_closest_hit_except(m.bvh, &rays[r], hits[0].face, &closest, NULL);
+            assert_int_equal(other, count > 1);
+            assert_int_equal(closest.face, count > 1 ? hits[1].face : FCT_NONE);
+            assert_true(fct_bvh_closest_hit_except(m.bvh, &rays[r], FCT_NONE, &closest, NULL));
+            assert_int_equal(closest.face, hits[0].face);
+        }
+        for (size_t i = 0; i + 1 < count; ++i) {
+            ties += hits[i].t == hits[i + 1].t;
+            assert_true(hits[i].t < hits[i + 1].t ||
+                        (hits[i].t == hits[i + 1].t && hits[i].face < hits[i + 1].face));
+        }
+        for (size_t capacity = 1; capacity < count; ++capacity) {
+            memset(fewer, 0x5a, sizeof fewer);
+            assert_int_equal(fct_bvh_all_hits(m.bvh, &rays[r], capacity, fewer, NULL), count);
+            assert_memory_equal(fewer, hits, capacity * sizeof *hits);
+            assert_int_equal(((unsigned char *)&fewer[capacity])[0], 0x5a);
+        }
+        for (size_t i = 0; i < expected && count == expected; ++i) {
+            size_t at = 0;
+            while (at < count && hits[at].face != single[i].face) ++at;
+            assert_true(at < count);
+            assert_true(fabsf(hits[at].t - single[i].t) <= 1e-5f * (1 + fabsf(single[i].t)));
+        }
+        total += count, crowded += count > 4;
+    }
+    assert_true(total > 100 && crowded > 5 && ties > 2 && differ <= 3);
+    model_release(&env, &m);
+}
+
 static void visits_are_added_up(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -316,6 +395,7 @@ int main(void) {
         cmocka_unit_test(equal_t_goes_to_the_lower_face),
         cmocka_unit_test(size_of_the_model_does_not_matter),
         cmocka_unit_test(batches_equal_single_rays_for_every_thread_count),
+        cmocka_unit_test(all_hits_are_sorted_and_complete),
         cmocka_unit_test(visits_are_added_up),
         cmocka_unit_test(every_failed_allocation_is_reported),
         cmocka_unit_test(creation_can_be_cancelled),
