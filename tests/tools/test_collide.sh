@@ -90,13 +90,22 @@ holds "$(paste -d ' ' out apart | awk '$1 > $10 + 1e-4' | wc -l) > 3"
 expect 1 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0'
 expect 0 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0' --distance
 holds "$(column 1) > .39 && $(column 1) < .41"
+for pose in '.5 0 0 .1 0 .5 0 0 0 0 .5 0 b-inside' '2 0 0 .1 0 2 0 0 0 0 2 0 a-inside' '.5 0 0 1 0 .5 0 0 0 0 .5 0 touching' \
+    '.5 0 0 1.6 0 .5 0 0 0 0 .5 0 apart' '-.5 0 0 .1 0 .5 0 0 0 0 .5 0 b-inside' '-2 0 0 .1 0 2 0 0 0 0 2 0 a-inside'; do
+    expect 0 collide sphere.off sphere.off --pose "${pose% *}" --relation
+    check "the relation of spheres: $pose" test "$(cat out)" = "${pose##* }"
+done
+expect 0 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0' --relation --json
+keys results relation found
+holds "$(value found) == 1"
+check "the relation in JSON" test "$(value relation)" = b-inside
 # One pose at a time, and on other threads.
 for i in 7 111 399; do
     expect 0 collide sphere.off sphere.off --pose "$(sed -n ${i}p poses.txt)" --distance
     check "pose $i alone" test "$(cut -d ' ' -f 1 out)" = "$(sed -n ${i}p apart | cut -d ' ' -f 1)"
 done
 for threads in 1 2 5; do
-    for how in '' --distance '--distance --tolerance 1%' --pairs --contacts; do
+    for how in '' --relation --distance '--distance --tolerance 1%' --pairs --contacts; do
         expect 0 collide sphere.off sphere.off --poses poses.txt $how --threads $threads -o "$threads$how.txt"
         check "$threads threads, $how" cmp -s "1$how.txt" "$threads$how.txt"
     done
@@ -235,6 +244,9 @@ expect 64 collide cube.off cube.off --limit 3
 expect 64 collide cube.off cube.off --pairs --limit 0
 expect 64 collide cube.off cube.off --pairs --distance
 expect 64 collide cube.off cube.off --contacts --within 1
+expect 64 collide cube.off cube.off --relation --distance
+expect 64 collide cube.off cube.off --relation --pairs
+expect 64 collide cube.off --self --relation
 expect 64 collide cube.off cube.off --tolerance 1
 expect 64 collide cube.off cube.off --distance --tolerance -1
 expect 64 collide cube.off cube.off --within inch
