@@ -49,6 +49,8 @@ awk 'function size(x) { return x < 0 ? -x : x }
     function off(y, z) { y = size(y - .1); z = size(z - .2); return size((y > z ? y : z) - .5) > 1e-9 }
     $4 != 1 || $7 != 1 || off($5, $6) || off($8, $9) { print }' out >bad
 check "segments of contact" test ! -s bad
+awk '{ sum += sqrt(($4 - $7) ^ 2 + ($5 - $8) ^ 2 + ($6 - $9) ^ 2) } END { print sum }' out >length
+check "the segments make up the outline of B's side" test "$(cat length)" = 4
 awk '{ n = $10 * $10 + $11 * $11 + $12 * $12 } n < .99999999 || n > 1.00000001' out >bad
 check "the shortest ways out have unit directions" test ! -s bad
 awk '$10 > .999999 && $13 > .0999999 && $13 < .1000001' out >found
