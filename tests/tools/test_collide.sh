@@ -131,6 +131,15 @@ for i in 0 10 11 330; do
     cut -d ' ' -f 2,3 out >found
     check "the pairs of pose $i alone" cmp -s found expected
 done
+# Tests of several poses add up.
+boxes=0 triangles=0
+sed -n '1p;12p;331p' poses.txt >three.txt
+while read -r pose; do
+    expect 0 collide sphere.off sphere.off --pose "$pose" --pairs --json
+    boxes=$((boxes + $(value box_tests))) triangles=$((triangles + $(value triangle_tests)))
+done <three.txt
+expect 0 collide sphere.off sphere.off --poses three.txt --pairs --json
+holds "$(value box_tests) == $boxes && $(value triangle_tests) == $triangles"
 check "one pair of many" test "$(cut -d ' ' -f 1 1--pairs.txt | uniq | wc -l)" = "$(grep -c ^1 touching)"
 paste -d ' ' <(cut -d ' ' -f 1-3 1--contacts.txt) 1--pairs.txt | awk '$1 != $4 || $2 != $5 || $3 != $6' >bad
 check "contacts of the same pairs" test ! -s bad
