@@ -225,6 +225,17 @@ check "names of instances" test "$(value name_a),$(value name_b)" = "box,big bal
 sed -e 's/"translate": \[2.9/"translate": [3.1/' -e 's/2.2, 0/6, 0/' scene.json >apart.json
 expect 1 collide apart.json
 check "no pair" test ! -s out
+# A cube of two materials has two parts, which adjoin; cube three touches the part with the side x = 1.
+cat >parts.json <<'END'
+{"models": {"box": "cube.off"},
+ "materials": {"grey": {"reflectance": [0.5, 0.5, 0.5]}, "red": {"reflectance": [0.5, 0.1, 0.1]}},
+ "instances": [{"name": "one", "model": "box", "face_materials":
+                ["grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "red", "red"]},
+               {"name": "two", "model": "box", "material": "grey", "translate": [2, 0, 0], "scale": 0.5},
+               {"name": "three", "model": "box", "material": "grey", "translate": [1.25, 0, 0], "scale": 0.3}]}
+END
+expect 0 collide parts.json --json
+check "parts of one object do not count" test "$(grep -E 'name_[ab]' out | tr -d ' \n')" = '"name_a":"one","name_b":"three","name_a":"two","name_b":"three",'
 expect 0 make cornell -o cornell --triangles 200 --quiet
 expect 0 collide cornell/scene.json
 cut -d ' ' -f 1,2 out >expected
