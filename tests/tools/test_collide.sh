@@ -236,6 +236,14 @@ cat >parts.json <<'END'
 END
 expect 0 collide parts.json --json
 check "parts of one object do not count" test "$(grep -E 'name_[ab]' out | tr -d ' \n')" = '"name_a":"one","name_b":"three","name_a":"two","name_b":"three",'
+# 40 cubes that all touch: 780 pairs, in order.
+awk 'BEGIN { print "{\"models\": {\"box\": \"cube.off\"}, \"materials\": {\"grey\": {\"reflectance\": [0.5, 0.5, 0.5]}}, \"instances\": ["
+    for (i = 0; i < 40; ++i)
+        printf "{\"name\": \"%d\", \"model\": \"box\", \"material\": \"grey\", \"translate\": [%g, 0, 0]}%s\n", i, i / 20, i < 39 ? "," : "]}" }' >many.json
+expect 0 collide many.json
+cut -d ' ' -f 1,2 out >found
+awk 'BEGIN { for (i = 0; i < 40; ++i) for (j = i + 1; j < 40; ++j) print i, j }' >expected
+check "all pairs of 40 cubes" cmp -s found expected
 expect 0 make cornell -o cornell --triangles 200 --quiet
 expect 0 collide cornell/scene.json
 cut -d ' ' -f 1,2 out >expected
