@@ -2,9 +2,9 @@
 //
 // usage: bench_queries_pairs MESH [POSES]
 //
-// Half of the poses touch and half are apart, each 1 % of the diagonal from first contact, with random rotations and
-// directions. Prints one line per query: our time and FCL's (median of runs in turns, processor time of this thread),
-// their ratio, and our visits. Fails if the answers differ.
+// Half of the poses touch and half are apart, each 1 % of the diagonal from first contact, with random
+// rotations and directions. Prints one line per query: our time and FCL's (median of runs in turns, processor
+// time of this thread), their ratio, and our visits. Fails if the answers differ.
 #include <fcl/fcl.h>
 
 #include <algorithm>
@@ -47,13 +47,15 @@ bool load_model(const char *path, our_model &m) {
     fct_bvh_def def = fct_bvh_def_default();
     double start = cpu_seconds();
     if (fct_bvh_build(&m.env, m.tree, &def, &m.bvh) != FCT_OK) return false;
-    double rays = cpu_seconds() - start, faces = double(m.mesh.face_count), plain = double(fct_bvh_bytes(m.bvh));
+    double rays = cpu_seconds() - start, faces = double(m.mesh.face_count),
+           plain = double(fct_bvh_bytes(m.bvh));
     fct_bvh_destroy(m.bvh);
     def.parts = FCT_BVH_PAIRS;
     start = cpu_seconds();
     if (fct_bvh_build(&m.env, m.tree, &def, &m.bvh) != FCT_OK) return false;
     std::printf("faces %u: %.1f bytes per triangle, %.1f without pairs; build %.3f s, %.3f s without pairs\n",
-                m.mesh.face_count, double(fct_bvh_bytes(m.bvh)) / faces, plain / faces, cpu_seconds() - start, rays);
+                m.mesh.face_count, double(fct_bvh_bytes(m.bvh)) / faces, plain / faces, cpu_seconds() - start,
+                rays);
     fct_bounds b = fct_bvh_bounds(m.bvh);
     double sum = 0;
     for (int k = 0; k < 3; ++k) sum += std::pow(double(b.upper[k]) - double(b.lower[k]), 2);
@@ -68,9 +70,11 @@ std::shared_ptr<peer_model> build_peer(const our_model &m) {
     std::vector<fcl::Vector3d> vertices;
     std::vector<fcl::Triangle> triangles;
     for (uint32_t v = 0; v < m.mesh.vertex_count; ++v)
-        vertices.emplace_back(m.mesh.positions[3 * v], m.mesh.positions[3 * v + 1], m.mesh.positions[3 * v + 2]);
+        vertices.emplace_back(m.mesh.positions[3 * v], m.mesh.positions[3 * v + 1],
+                              m.mesh.positions[3 * v + 2]);
     for (uint32_t f = 0; f < m.mesh.face_count; ++f)
-        triangles.emplace_back(m.mesh.triangles[3 * f], m.mesh.triangles[3 * f + 1], m.mesh.triangles[3 * f + 2]);
+        triangles.emplace_back(m.mesh.triangles[3 * f], m.mesh.triangles[3 * f + 1],
+                               m.mesh.triangles[3 * f + 2]);
     double start = cpu_seconds();
     peer->beginModel();
     peer->addSubModel(vertices, triangles);
@@ -146,8 +150,8 @@ void report(const char *name, size_t count, const fct_visits &visits, Ours ours,
         theirs.push_back(cpu_seconds() - start);
     }
     double n = double(count), a = median(mine) / n * 1e6, b = median(theirs) / n * 1e6;
-    std::printf("%-18s ours %9.2f us  FCL %9.2f us  ratio %6.2f  boxes %8.1f triangles %7.2f\n", name, a, b, b / a,
-                double(visits.boxes) / n, double(visits.triangles) / n);
+    std::printf("%-18s ours %9.2f us  FCL %9.2f us  ratio %6.2f  boxes %8.1f triangles %7.2f\n", name, a, b,
+                b / a, double(visits.boxes) / n, double(visits.triangles) / n);
 }
 
 } // namespace
@@ -171,20 +175,21 @@ int main(int count, char **arguments) {
         std::vector<char> mine(half), theirs(half);
         fct_visits visits{};
         for (const fct_pose &p : *poses) fct_bvh_overlap(m.bvh, m.bvh, &p, nullptr, &visits);
-        report(poses == &touching ? "overlap, touching" : "overlap, apart", half, visits,
-               [&] {
-                   for (size_t i = 0; i < half; ++i)
-                       mine[i] = fct_bvh_overlap(m.bvh, m.bvh, &(*poses)[i], nullptr, nullptr);
-               },
-               [&] {
-                   for (size_t i = 0; i < half; ++i) {
-                       fcl::CollisionRequestd request;
-                       fcl::CollisionResultd result;
-                       fcl::collide(peer.get(), fcl::Transform3d::Identity(), peer.get(), peer_pose((*poses)[i]), request,
-                                    result);
-                       theirs[i] = result.isCollision();
-                   }
-               });
+        report(
+            poses == &touching ? "overlap, touching" : "overlap, apart", half, visits,
+            [&] {
+                for (size_t i = 0; i < half; ++i)
+                    mine[i] = fct_bvh_overlap(m.bvh, m.bvh, &(*poses)[i], nullptr, nullptr);
+            },
+            [&] {
+                for (size_t i = 0; i < half; ++i) {
+                    fcl::CollisionRequestd request;
+                    fcl::CollisionResultd result;
+                    fcl::collide(peer.get(), fcl::Transform3d::Identity(), peer.get(), peer_pose((*poses)[i]),
+                                 request, result);
+                    theirs[i] = result.isCollision();
+                }
+            });
         for (size_t i = 0; i < half; ++i) bad += mine[i] != theirs[i];
     }
     std::vector<double> mine(half), theirs(half);
@@ -193,25 +198,27 @@ int main(int count, char **arguments) {
         fct_distance d;
         fct_bvh_distance(m.bvh, m.bvh, &p, nullptr, nullptr, &d, &visits);
     }
-    report("distance, apart", half, visits,
-           [&] {
-               for (size_t i = 0; i < half; ++i) {
-                   fct_distance d;
-                   fct_bvh_distance(m.bvh, m.bvh, &apart[i], nullptr, nullptr, &d, nullptr);
-                   mine[i] = d.distance;
-               }
-           },
-           [&] {
-               for (size_t i = 0; i < half; ++i) {
-                   fcl::DistanceRequestd request;
-                   fcl::DistanceResultd result;
-                   fcl::distance(peer.get(), fcl::Transform3d::Identity(), peer.get(), peer_pose(apart[i]), request,
-                                 result);
-                   theirs[i] = result.min_distance;
-               }
-           });
+    report(
+        "distance, apart", half, visits,
+        [&] {
+            for (size_t i = 0; i < half; ++i) {
+                fct_distance d;
+                fct_bvh_distance(m.bvh, m.bvh, &apart[i], nullptr, nullptr, &d, nullptr);
+                mine[i] = d.distance;
+            }
+        },
+        [&] {
+            for (size_t i = 0; i < half; ++i) {
+                fcl::DistanceRequestd request;
+                fcl::DistanceResultd result;
+                fcl::distance(peer.get(), fcl::Transform3d::Identity(), peer.get(), peer_pose(apart[i]),
+                              request, result);
+                theirs[i] = result.min_distance;
+            }
+        });
     double worst = 0;
     for (size_t i = 0; i < half; ++i) worst = std::max(worst, std::fabs(mine[i] - theirs[i]) / m.diagonal);
-    std::printf("answers that differ: %d of %zu; distances differ by at most %.1e diagonals\n", bad, 2 * half, worst);
+    std::printf("answers that differ: %d of %zu; distances differ by at most %.1e diagonals\n", bad, 2 * half,
+                worst);
     return bad > 0 || worst > 1e-6;
 }

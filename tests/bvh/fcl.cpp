@@ -1,5 +1,5 @@
-// Two models against FCL: the pairs of faces that meet, and the distance. FCL computes in double without exact decisions,
-// so a pair may differ if the two faces touch within 1e-9 of the size.
+// Two models against FCL: the pairs of faces that meet, and the distance. FCL computes in double without
+// exact decisions, so a pair may differ if the two faces touch within 1e-9 of the size.
 #include <fcl/fcl.h>
 
 #include <algorithm>
@@ -53,9 +53,11 @@ bool load_model(const fct_env &env, const char *name, double scale, model &m) {
     std::vector<fcl::Vector3d> vertices;
     std::vector<fcl::Triangle> triangles;
     for (uint32_t v = 0; v < m.mesh.vertex_count; ++v)
-        vertices.emplace_back(m.mesh.positions[3 * v], m.mesh.positions[3 * v + 1], m.mesh.positions[3 * v + 2]);
+        vertices.emplace_back(m.mesh.positions[3 * v], m.mesh.positions[3 * v + 1],
+                              m.mesh.positions[3 * v + 2]);
     for (uint32_t f = 0; f < m.mesh.face_count; ++f)
-        triangles.emplace_back(m.mesh.triangles[3 * f], m.mesh.triangles[3 * f + 1], m.mesh.triangles[3 * f + 2]);
+        triangles.emplace_back(m.mesh.triangles[3 * f], m.mesh.triangles[3 * f + 1],
+                               m.mesh.triangles[3 * f + 2]);
     m.peer.beginModel();
     m.peer.addSubModel(vertices, triangles);
     m.peer.endModel();
@@ -76,12 +78,14 @@ double random_unit(uint64_t &state) {
 /* The centre of b lies `away` from that of a in a random direction. */
 fct_pose random_pose(const model &a, const model &b, double away, uint64_t &seed) {
     fcl::Vector3d direction(random_unit(seed) - .5, random_unit(seed) - .5, random_unit(seed) - .5);
-    fcl::Quaterniond q(random_unit(seed) - .5, random_unit(seed) - .5, random_unit(seed) - .5, random_unit(seed) - .5);
+    fcl::Quaterniond q(random_unit(seed) - .5, random_unit(seed) - .5, random_unit(seed) - .5,
+                       random_unit(seed) - .5);
     fcl::Matrix3d r = q.normalized().toRotationMatrix();
     fct_bounds x = fct_bvh_bounds(a.bvh), y = fct_bvh_bounds(b.bvh);
     fct_pose pose;
     for (int i = 0; i < 3; ++i) {
-        pose.translation[i] = (double(x.lower[i]) + double(x.upper[i])) / 2 + away * direction.normalized()[i];
+        pose.translation[i] =
+            (double(x.lower[i]) + double(x.upper[i])) / 2 + away * direction.normalized()[i];
         for (int j = 0; j < 3; ++j) {
             pose.rotation[i][j] = r(i, j);
             pose.translation[i] -= r(i, j) * (double(y.lower[j]) + double(y.upper[j])) / 2;
@@ -163,8 +167,8 @@ void compare_models(const char *name_a, const char *name_b, double scale, int co
         fcl::distance(&a.peer, fcl::Transform3d::Identity(), &b.peer, peer_pose(pose), request, result);
         assert_true(std::fabs(result.min_distance - d.distance) <= 1e-9 * (a.size + b.size));
     }
-    print_message("%s and %s: %zu of %d touch, %zu pairs, %zu decided by rounding\n", name_a, name_b, touching, count,
-                  pairs, doubtful);
+    print_message("%s and %s: %zu of %d touch, %zu pairs, %zu decided by rounding\n", name_a, name_b,
+                  touching, count, pairs, doubtful);
     assert_in_range(touching, 1, size_t(count) - 1);
     release_model(env, a);
     release_model(env, b);

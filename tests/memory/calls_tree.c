@@ -124,7 +124,8 @@ static fct_result build_bvh(const fct_env *env) {
 static fct_result find_touching(const fct_env *env) {
     fct_bvh_def def = fct_bvh_def_default();
     def.parts = FCT_BVH_PAIRS;
-    fct_body bodies[3] = {{NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}};
+    fct_body bodies[3] = {
+        {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}};
     fct_bvh *bvh;
     assert_int_equal(fct_bvh_build(&inputs.env, inputs.tree, &def, &bvh), FCT_OK);
     for (int i = 0; i < 3; ++i) bodies[i].bvh = bvh;

@@ -12,7 +12,8 @@ check "a cube touches itself" grep -qE '^1 [0-9]+ [0-9]+$' out
 expect 1 collide cube.off cube.off --pose "$(moved 5 0 0)"
 check "two cubes apart" test "$(cat out)" = 0
 # Faces are closed, and the decision is exact: 2^-40 more than 2 is apart.
-{ moved 2 .5 .25; moved 2.0000000000009095 .5 .25; moved 1.9999999999990905 .5 .25; moved 0 0 -2; moved 2 2 2; moved 2 2 2.0000000000009095
+{ moved 2 .5 .25; moved 2.0000000000009095 .5 .25; moved 1.9999999999990905 .5 .25; moved 0 0 -2
+    moved 2 2 2; moved 2 2 2.0000000000009095
     moved -2 -2 2; } >poses.txt
 expect 0 collide cube.off cube.off --poses poses.txt
 check "exact contacts of cubes" test "$(column 1)" = "1 0 1 1 1 0 1 "
@@ -44,11 +45,16 @@ cube 1 >small.off
 expect 0 collide cube.off small.off --pose "$(moved 1.4 .1 .2)" --contacts
 holds "$(wc -l <out) >= 8 && $(awk 'NF != 13' out | wc -l) == 0"
 # Every segment lies on x = 1 and on the surface of B.
-awk 'function off(y, z) { y -= .1; z -= .2; y = y < 0 ? -y : y; z = z < 0 ? -z : z; y = y > z ? y : z; return y - .5 > 1e-9 || .5 - y > 1e-9 }
+awk 'function size(x) { return x < 0 ? -x : x }
+    function off(y, z) { y = size(y - .1); z = size(z - .2); return size((y > z ? y : z) - .5) > 1e-9 }
     $4 != 1 || $7 != 1 || off($5, $6) || off($8, $9) { print }' out >bad
 check "segments of contact" test ! -s bad
-check "the shortest ways out have unit directions" test -z "$(awk '{ n = $10 * $10 + $11 * $11 + $12 * $12 } n < .99999999 || n > 1.00000001' out)"
-check "sides of B that cross the plane leave it by .1 along x" test -n "$(awk '$10 > .999999 && $13 > .0999999 && $13 < .1000001' out)"
+awk '{ sum += sqrt(($4 - $7) ^ 2 + ($5 - $8) ^ 2 + ($6 - $9) ^ 2) } END { print sum }' out >length
+check "the segments make up the outline of B's side" test "$(cat length)" = 4
+awk '{ n = $10 * $10 + $11 * $11 + $12 * $12 } n < .99999999 || n > 1.00000001' out >bad
+check "the shortest ways out have unit directions" test ! -s bad
+awk '$10 > .999999 && $13 > .0999999 && $13 < .1000001' out >found
+check "sides of B that cross the plane leave it by .1 along x" test -s found
 check "no way is longer" test -z "$(awk '$13 > .1000001 || $13 < 0' out)"
 expect 0 collide cube.off small.off --pose "$(moved 1.4 .1 .2)" --pairs
 holds "$(wc -l <out) >= 8 && $(awk 'NF != 3 || $1 != 0' out | wc -l) == 0"
@@ -67,8 +73,9 @@ holds "$(value poses) == 3 && $(value found) == 30 && $(grep -c face_a out) == 3
 
 # --- Spheres of radius 1, with faces up to .0096 inside ---
 awk 'BEGIN { for (i = 0; i < 400; ++i) {
-    a = 7 * i; c = cos(a); s = sin(a); r = i % 5 ? .05 * (i % 80) : 0
-    printf "%.9f %.9f 0 %.9f %.9f %.9f 0 %.9f 0 0 1 %.9f\n", c, -s, r * cos(3 * i), s, c, r * sin(3 * i) * cos(i), r * sin(3 * i) * sin(i) } }' >poses.txt
+    a = 7 * i; c = cos(a); s = sin(a); r = i == 0 || i == 10 ? 0 : .05 * (1 + i % 79)
+    x = r * cos(3 * i); y = r * sin(3 * i) * cos(i); z = r * sin(3 * i) * sin(i)
+    printf "%.9f %.9f 0 %.9f %.9f %.9f 0 %.9f 0 0 1 %.9f\n", c, -s, x, s, c, y, z } }' >poses.txt
 expect 0 collide sphere.off sphere.off --poses poses.txt
 cp out touching
 awk 'NR == FNR { r[FNR] = sqrt($4 * $4 + $8 * $8 + $12 * $12); next }
@@ -77,11 +84,13 @@ check "spheres touch up to the sum of their radii" test ! -s bad
 expect 0 collide sphere.off sphere.off --poses poses.txt --distance
 cp out apart
 awk 'NR == FNR { r[FNR] = sqrt($4 * $4 + $8 * $8 + $12 * $12) - 2; next }
-    { low = r[FNR] > 0 ? r[FNR] : 0; high = r[FNR] + .02 > 0 ? r[FNR] + .02 : 0 } $1 < low - 1e-8 || (r[FNR] > -1.9 && $1 > high)' poses.txt apart >bad
+    { low = r[FNR] > 0 ? r[FNR] : 0; high = r[FNR] + .02 > 0 ? r[FNR] + .02 : 0 }
+    $1 < low - 1e-8 || (r[FNR] > -1.9 && $1 > high)' poses.txt apart >bad
 check "distances of spheres" test ! -s bad
 awk '{ d = ($4 - $7) ^ 2 + ($5 - $8) ^ 2 + ($6 - $9) ^ 2 - $1 ^ 2 } d > 1e-6 || d < -1e-6' apart >bad
 check "the points are that far apart" test ! -s bad
-check "distance 0 where faces meet" test "$(paste -d ' ' touching apart | awk '$1 == 1 { x = $4 } $1 == 0 { x = $2 } ($1 == 1) != (x == 0)' | wc -l)" = 0
+paste -d ' ' touching apart | awk '{ x = $1 == 1 ? $4 : $2 } ($1 == 1) != (x == 0)' >bad
+check "distance 0 where faces meet, and only there" test ! -s bad
 expect 0 collide sphere.off sphere.off --poses poses.txt --distance --tolerance .05
 paste -d ' ' out apart | awk '$1 < $10 - 1e-8 || $1 > $10 + .05 + 1e-8' >bad
 check "the tolerance bounds the distance" test ! -s bad
@@ -90,13 +99,23 @@ holds "$(paste -d ' ' out apart | awk '$1 > $10 + 1e-4' | wc -l) > 3"
 expect 1 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0'
 expect 0 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0' --distance
 holds "$(column 1) > .39 && $(column 1) < .41"
+for pose in '.5 0 0 .1 0 .5 0 0 0 0 .5 0 b-inside' '2 0 0 .1 0 2 0 0 0 0 2 0 a-inside' \
+    '.5 0 0 1 0 .5 0 0 0 0 .5 0 touching' \
+    '.5 0 0 1.6 0 .5 0 0 0 0 .5 0 apart' '-.5 0 0 .1 0 .5 0 0 0 0 .5 0 b-inside' '-2 0 0 .1 0 2 0 0 0 0 2 0 a-inside'; do
+    expect 0 collide sphere.off sphere.off --pose "${pose% *}" --relation
+    check "the relation of spheres: $pose" test "$(cat out)" = "${pose##* }"
+done
+expect 0 collide sphere.off sphere.off --pose '.5 0 0 .1 0 .5 0 0 0 0 .5 0' --relation --json
+keys results relation found
+holds "$(value found) == 1"
+check "the relation in JSON" test "$(value relation)" = b-inside
 # One pose at a time, and on other threads.
 for i in 7 111 399; do
     expect 0 collide sphere.off sphere.off --pose "$(sed -n ${i}p poses.txt)" --distance
     check "pose $i alone" test "$(cut -d ' ' -f 1 out)" = "$(sed -n ${i}p apart | cut -d ' ' -f 1)"
 done
-for threads in 1 2 5; do
-    for how in '' --distance '--distance --tolerance 1%' --pairs --contacts; do
+for threads in 1 5; do
+    for how in '' --relation --distance '--distance --tolerance 1%' --pairs --contacts; do
         expect 0 collide sphere.off sphere.off --poses poses.txt $how --threads $threads -o "$threads$how.txt"
         check "$threads threads, $how" cmp -s "1$how.txt" "$threads$how.txt"
     done
@@ -106,12 +125,21 @@ for threads in 1 2 5; do
 done
 # A pose with more pairs than its part of the memory of a block, as the first pose of its block and in the middle.
 holds "$(grep -c '^0 ' 1--pairs.txt) > 4096 && $(grep -c '^10 ' 1--pairs.txt) > 4096"
-for i in 0 10 11 300; do
+for i in 0 10 11 330; do
     expect 0 collide sphere.off sphere.off --pose "$(sed -n $((i + 1))p poses.txt)" --pairs
     grep "^$i " 1--pairs.txt | cut -d ' ' -f 2,3 >expected
     cut -d ' ' -f 2,3 out >found
     check "the pairs of pose $i alone" cmp -s found expected
 done
+# Tests of several poses add up.
+boxes=0 triangles=0
+sed -n '1p;12p;331p' poses.txt >three.txt
+while read -r pose; do
+    expect 0 collide sphere.off sphere.off --pose "$pose" --pairs --json
+    boxes=$((boxes + $(value box_tests))) triangles=$((triangles + $(value triangle_tests)))
+done <three.txt
+expect 0 collide sphere.off sphere.off --poses three.txt --pairs --json
+holds "$(value box_tests) == $boxes && $(value triangle_tests) == $triangles"
 check "one pair of many" test "$(cut -d ' ' -f 1 1--pairs.txt | uniq | wc -l)" = "$(grep -c ^1 touching)"
 paste -d ' ' <(cut -d ' ' -f 1-3 1--contacts.txt) 1--pairs.txt | awk '$1 != $4 || $2 != $5 || $3 != $6' >bad
 check "contacts of the same pairs" test ! -s bad
@@ -140,7 +168,9 @@ join() { # A B: both meshes in one, B moved by .9 .3 .2
     awk 'FNR == 1 { ++file; next } FNR == 2 { n[file] = $1; f += $2; next }
         NF == 3 { vertex[++v] = file == 1 ? $0 : ($1 + .9) " " ($2 + .3) " " ($3 + .2) }
         NF == 4 { o = file == 2 ? n[1] : 0; face[++faces] = "3 " $2 + o " " $3 + o " " $4 + o }
-        END { print "OFF"; print v, f, 0; for (i = 1; i <= v; ++i) print vertex[i]; for (i = 1; i <= faces; ++i) print face[i] }' "$1" "$2"
+        END { print "OFF"; print v, f, 0
+            for (i = 1; i <= v; ++i) print vertex[i]
+            for (i = 1; i <= faces; ++i) print face[i] }' "$1" "$2"
 }
 join cube.off small.off >both.off
 expect 0 collide cube.off small.off --pose "$(moved .9 .3 .2)" --pairs
@@ -170,7 +200,8 @@ check "a far and a near model" near expected
 expect 0 collide far.off far-small.off --pose '0 1 0 -3999998.1 -1 0 0 -10000000.3 0 0 1 4' --distance
 check "a far model that is turned" near expected
 expect 0 collide far.off far-small.off --pose "$(moved 12000001.8 -12000001 .2)" --contacts
-check "contacts of far models" test "$(awk '$4 < 5000001.299 || $4 > 5000001.301 || $7 < 5000001.299 || $7 > 5000001.301' out | wc -l)" = 0
+awk '$4 < 5000001.299 || $4 > 5000001.301 || $7 < 5000001.299 || $7 > 5000001.301' out >bad
+check "contacts of far models" test ! -s bad
 holds "$(wc -l <out) >= 8"
 
 # --- Scenes ---
@@ -194,6 +225,25 @@ check "names of instances" test "$(value name_a),$(value name_b)" = "box,big bal
 sed -e 's/"translate": \[2.9/"translate": [3.1/' -e 's/2.2, 0/6, 0/' scene.json >apart.json
 expect 1 collide apart.json
 check "no pair" test ! -s out
+# A cube of two materials has two parts, which adjoin; cube three touches the part with the side x = 1.
+cat >parts.json <<'END'
+{"models": {"box": "cube.off"},
+ "materials": {"grey": {"reflectance": [0.5, 0.5, 0.5]}, "red": {"reflectance": [0.5, 0.1, 0.1]}},
+ "instances": [{"name": "one", "model": "box", "face_materials":
+                ["grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "grey", "red", "red"]},
+               {"name": "two", "model": "box", "material": "grey", "translate": [2, 0, 0], "scale": 0.5},
+               {"name": "three", "model": "box", "material": "grey", "translate": [1.25, 0, 0], "scale": 0.3}]}
+END
+expect 0 collide parts.json --json
+check "parts of one object do not count" test "$(grep -E 'name_[ab]' out | tr -d ' \n')" = '"name_a":"one","name_b":"three","name_a":"two","name_b":"three",'
+# 40 cubes that all touch: 780 pairs, in order.
+awk 'BEGIN { print "{\"models\": {\"box\": \"cube.off\"}, \"materials\": {\"grey\": {\"reflectance\": [0.5, 0.5, 0.5]}}, \"instances\": ["
+    for (i = 0; i < 40; ++i)
+        printf "{\"name\": \"%d\", \"model\": \"box\", \"material\": \"grey\", \"translate\": [%g, 0, 0]}%s\n", i, i / 20, i < 39 ? "," : "]}" }' >many.json
+expect 0 collide many.json
+cut -d ' ' -f 1,2 out >found
+awk 'BEGIN { for (i = 0; i < 40; ++i) for (j = i + 1; j < 40; ++j) print i, j }' >expected
+check "all pairs of 40 cubes" cmp -s found expected
 expect 0 make cornell -o cornell --triangles 200 --quiet
 expect 0 collide cornell/scene.json
 cut -d ' ' -f 1,2 out >expected
@@ -204,7 +254,8 @@ cut -d ' ' -f 1,2 out >found
 check "a glTF file has the same instances" cmp -s found expected
 
 # --- Wrong input ---
-for bad in '1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 5' '1 0 0 0 0 1 0 x 0 0 1 0' '1 0 0 0 0 1 0 nan 0 0 1 0' 'inf 0 0 0 0 1 0 0 0 0 1 0'; do
+for bad in '1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 5' '1 0 0 0 0 1 0 x 0 0 1 0' '1 0 0 0 0 1 0 nan 0 0 1 0' \
+    'inf 0 0 0 0 1 0 0 0 0 1 0'; do
     { moved 0 0 0; echo "$bad"; } >bad.txt
     expect 65 collide cube.off cube.off --poses bad.txt
     says "bad.txt:2: expected"
@@ -235,6 +286,9 @@ expect 64 collide cube.off cube.off --limit 3
 expect 64 collide cube.off cube.off --pairs --limit 0
 expect 64 collide cube.off cube.off --pairs --distance
 expect 64 collide cube.off cube.off --contacts --within 1
+expect 64 collide cube.off cube.off --relation --distance
+expect 64 collide cube.off cube.off --relation --pairs
+expect 64 collide cube.off --self --relation
 expect 64 collide cube.off cube.off --tolerance 1
 expect 64 collide cube.off cube.off --distance --tolerance -1
 expect 64 collide cube.off cube.off --within inch

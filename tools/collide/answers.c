@@ -34,6 +34,10 @@ static void answer_pose(const collide_answers *a, size_t i, fct_face_pair *hint,
     case COLLIDE_DISTANCE:
         out->found = fct_bvh_distance(model_a, model_b, &pose, &q->distance, hint, &out->nearest, visits);
         break;
+    case COLLIDE_RELATION:
+        out->relation = fct_bvh_relation(model_a, model_b, &pose, hint, visits);
+        out->found = out->relation != FCT_APART;
+        break;
     case COLLIDE_PAIRS:
         out->pairs = a->slots + i * a->slot;
         out->pair_count = model_b

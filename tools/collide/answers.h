@@ -9,6 +9,7 @@ typedef enum collide_kind {
     COLLIDE_TOUCH,    /* whether faces meet, and a pair that does */
     COLLIDE_WITHIN,   /* whether the surfaces are within a distance */
     COLLIDE_DISTANCE, /* how far they are apart */
+    COLLIDE_RELATION, /* whether they touch, or one holds the other */
     COLLIDE_PAIRS     /* all pairs of faces that meet, of two models or of one */
 } collide_kind;
 
@@ -22,8 +23,9 @@ typedef struct collide_question {
 
 /* The answer to one pose. */
 typedef struct collide_answer {
-    bool found;           /* faces meet, or are near enough */
+    bool found;           /* faces meet, or are near enough; RELATION: not apart */
     fct_distance nearest; /* TOUCH: only its pair; DISTANCE: all */
+    fct_relation relation;
     size_t pair_count;    /* PAIRS */
     fct_face_pair *pairs; /* pair_count; valid until the next answer is taken */
 } collide_answer;

@@ -11,7 +11,7 @@
 
 typedef struct collide_options {
     const char *pose, *poses;
-    bool pairs, contacts, distance, self;
+    bool pairs, contacts, distance, relation, self;
     uint64_t limit;                /* 0: not given */
     tool_length tolerance, within; /* negative: not given */
 } collide_options;
@@ -25,6 +25,7 @@ enum {
     KEY_DISTANCE,
     KEY_TOLERANCE,
     KEY_WITHIN,
+    KEY_RELATION,
     KEY_SELF
 };
 
@@ -45,6 +46,10 @@ static const struct argp_option collide_options_table[] = {
      "Print whether the surfaces are within D of each other, in the mesh's unit or in % of A's diagonal; "
      "with "
      "--distance: print -1 if they are not",
+     0},
+    {"relation", KEY_RELATION, NULL, 0,
+     "Print apart, touching, a-inside or b-inside: whether they touch, or a part of one lies inside the "
+     "other",
      0},
     {"self", KEY_SELF, NULL, 0, "Print the pairs of faces of A that meet and share no corner", 0},
     {0}};
@@ -73,6 +78,9 @@ static error_t parse_collide(int key, char *text, struct argp_state *state) {
         return tool_parse_length(state, "--tolerance", text, &o->tolerance);
     case KEY_WITHIN:
         return tool_parse_length(state, "--within", text, &o->within);
+    case KEY_RELATION:
+        o->relation = true;
+        return 0;
     case KEY_SELF:
         o->self = true;
         return 0;
@@ -87,9 +95,10 @@ static bool holds_instances(const tool *t, const char *path) {
 
 /* One input: a scene, or a mesh with --self. */
 static int check_one_input(tool *t, const collide_options *o) {
-    if (o->pose || o->poses || o->distance || o->within.value >= 0)
+    if (o->pose || o->poses || o->distance || o->relation || o->within.value >= 0)
         return tool_fail(t, TOOL_USAGE,
-                         "--pose, --poses, --distance and --within: expected two meshes, found one input");
+                         "--pose, --poses, --distance, --relation and --within: expected two meshes, found "
+                         "one input");
     if (!o->self && !holds_instances(t, t->inputs[0]))
         return tool_fail(t, TOOL_USAGE, "expected A B, a scene or --self; found only '%s'", t->inputs[0]);
     if (!o->self && o->pairs)
@@ -112,8 +121,10 @@ static int check_two_inputs(tool *t, const collide_options *o) {
         return tool_fail(t, TOOL_USAGE, "only one of A, B and the poses can come from standard input");
     if (o->self) return tool_fail(t, TOOL_USAGE, "--self: expected one mesh, found two");
     if (o->pose && o->poses) return tool_fail(t, TOOL_USAGE, "--pose and --poses exclude each other");
-    if (o->pairs && (o->distance || o->within.value >= 0))
-        return tool_fail(t, TOOL_USAGE, "--pairs and --contacts: expected no --distance and no --within");
+    bool near = o->distance || o->within.value >= 0;
+    if (o->pairs + near + o->relation > 1)
+        return tool_fail(t, TOOL_USAGE,
+                         "expected one of --pairs or --contacts, --distance or --within, and --relation");
     if (o->limit && !o->pairs)
         return tool_fail(t, TOOL_USAGE, "--limit: expected --pairs, --contacts, --self or a scene");
     return TOOL_DONE;
@@ -138,6 +149,7 @@ static void set_question(const collide_options *o, const collide_models *models,
                             .distance = fct_distance_def_default(),
                             .limit = get_limit(o),
                             .kind = o->pairs || o->self    ? COLLIDE_PAIRS
+                                    : o->relation          ? COLLIDE_RELATION
                                     : o->distance          ? COLLIDE_DISTANCE
                                     : o->within.value >= 0 ? COLLIDE_WITHIN
                                                            : COLLIDE_TOUCH};
@@ -163,7 +175,7 @@ static int answer_all(tool *t, const collide_options *o, const collide_question 
         code = collide_answers_take(t, &answers, &answer);
         if (code == TOOL_DONE) collide_report_answer(&report, q, pose, answer);
     }
-    bool asked = q->kind != COLLIDE_DISTANCE || o->within.value >= 0;
+    bool asked = (q->kind != COLLIDE_DISTANCE && q->kind != COLLIDE_RELATION) || o->within.value >= 0;
     code = collide_report_close(&report, code, summarize(&report, &answers), asked);
     collide_answers_close(t, &answers);
     return code;
@@ -174,7 +186,7 @@ static int collide_models_of(tool *t, const collide_options *o) {
     collide_poses poses;
     collide_question question;
     int code = collide_poses_read(t, o->pose, o->poses, &poses);
-    if (code == TOOL_DONE) code = collide_models_open(t, &models);
+    if (code == TOOL_DONE) code = collide_models_open(t, o->relation ? FCT_BVH_SIGN : 0, &models);
     if (code == TOOL_DONE) {
         fct_tree *tree_b = models.tree_b ? models.tree_b : models.tree_a;
         memcpy(poses.origin_a, fct_tree_get(models.tree_a).origin, sizeof poses.origin_a);
@@ -224,6 +236,8 @@ int tool_collide(int argc, char **argv) {
             "For each pose the output has one line:\n"
             "'1 face_a face_b' with a pair of faces that meets, or '0';\n"
             "with --within: '1' or '0';\n"
+            "with --relation: 'touching', 'a-inside' (nothing touches, and a connected part of A lies inside "
+            "B), 'b-inside' or 'apart'; inside is where the winding number is over 1/2;\n"
             "with --distance: 'distance face_a face_b ax ay az bx by bz' with the two nearest points in A's "
             "coordinates.\n"
             "With --pairs, each pair has a line 'pose face_a face_b', where poses count from 0. With "
@@ -233,15 +247,19 @@ int tool_collide(int argc, char **argv) {
             "With --self, each pair has a line 'face_a face_b', with the contact as above.\n\n"
             "SCENE is a scene.json or a glTF file. Each pair of instances that touches has a line "
             "'instance_a instance_b face_a face_b'. Parts of one object do not count.\n\n"
-            "The exit code is 1 if nothing touches, or nothing is within D.\n\n"
+            "The exit code is 1 if nothing touches, or nothing is within D. It is 0 with --relation, and "
+            "with "
+            "--distance alone.\n\n"
             "JSON keys: results[], found, poses, seconds (of the queries), box_tests, triangle_tests, "
             "peak_bytes. found counts poses, or pairs if those are asked for. With -o, the lines go to the "
-            "file, and there are no results[]. Keys of results: touching, face_a, face_b; within; distance, "
+            "file, and there are no results[]. Keys of results: touching, face_a, face_b; within; relation; "
+            "distance, "
             "face_a, face_b, point_a, point_b; pairs[face_a, face_b, from, to, normal, depth]; instance_a, "
             "instance_b, name_a, name_b, face_a, face_b. For a scene, box_tests and triangle_tests are null.",
         .examples = "  facetree collide bunny.fct cow.fct --pose '1 0 0 .1  0 1 0 0  0 0 1 0'\n"
                     "  facetree collide robot.fct room.fct --poses path.txt --within 0.05 -o near.txt\n"
                     "  facetree collide bunny.fct cow.fct --distance --tolerance 0.1%\n"
+                    "  facetree collide bunny.fct cow.fct --poses path.txt --relation\n"
                     "  facetree collide bunny.obj --self --json\n"
                     "  facetree collide scene.json",
         .options = collide_options_table,

@@ -3,17 +3,18 @@
 
 #include "tools/kit/model.h"
 
-static int open_model(tool *t, const char *path, fct_tree **tree, fct_bvh **bvh) {
+static int open_model(tool *t, const char *path, uint32_t parts, fct_tree **tree, fct_bvh **bvh) {
     fct_bvh_def def = fct_bvh_def_default();
-    def.parts = FCT_BVH_PAIRS;
+    def.parts = FCT_BVH_PAIRS | parts;
     int code = tool_open_tree(t, path, NULL, tree);
     return code == TOOL_DONE ? tool_result(t, fct_bvh_build(&t->env, *tree, &def, bvh)) : code;
 }
 
-int collide_models_open(tool *t, collide_models *out) {
+int collide_models_open(tool *t, uint32_t parts, collide_models *out) {
     *out = (collide_models){0};
-    int code = open_model(t, t->inputs[0], &out->tree_a, &out->a);
-    if (code == TOOL_DONE && t->input_count == 2) code = open_model(t, t->inputs[1], &out->tree_b, &out->b);
+    int code = open_model(t, t->inputs[0], parts, &out->tree_a, &out->a);
+    if (code == TOOL_DONE && t->input_count == 2)
+        code = open_model(t, t->inputs[1], parts, &out->tree_b, &out->b);
     return code;
 }
 

@@ -9,8 +9,8 @@ typedef struct collide_models {
     fct_bvh *a, *b;
 } collide_models;
 
-/* Opens the inputs of the command. Returns an exit code. */
-int collide_models_open(tool *t, collide_models *out);
+/* Opens the inputs of the command. parts: FCT_BVH_SIGN or 0, beside FCT_BVH_PAIRS. Returns an exit code. */
+int collide_models_open(tool *t, uint32_t parts, collide_models *out);
 void collide_models_close(collide_models *models);
 
 #endif

@@ -45,6 +45,16 @@ static void report_within(collide_report *r, const collide_answer *answer) {
     if (r->results) collide_report_add(r, json_pack("{s:b}", "within", answer->found));
 }
 
+static void report_relation(collide_report *r, const collide_answer *answer) {
+    static const char *const names[] = {[FCT_APART] = "apart",
+                                        [FCT_TOUCHING] = "touching",
+                                        [FCT_A_INSIDE] = "a-inside",
+                                        [FCT_B_INSIDE] = "b-inside"};
+    const char *name = names[answer->relation];
+    if (r->writer.stream) fprintf(r->writer.stream, "%s\n", name);
+    if (r->results) collide_report_add(r, json_pack("{s:s}", "relation", name));
+}
+
 static void report_distance(collide_report *r, const double origin[3], const collide_answer *answer) {
     const fct_distance *d = &answer->nearest;
     FILE *stream = r->writer.stream;
@@ -114,6 +124,9 @@ void collide_report_answer(collide_report *r, const collide_question *question, 
         break;
     case COLLIDE_WITHIN:
         report_within(r, answer);
+        break;
+    case COLLIDE_RELATION:
+        report_relation(r, answer);
         break;
     case COLLIDE_DISTANCE:
         report_distance(r, origin, answer);
