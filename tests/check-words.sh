@@ -16,7 +16,7 @@ forbid() {
 }
 everything=$(find base mesh dual cluster partition bvh scene radiosity simplify tools include tests bench examples docs cmake \
     CMakeLists.txt CMakePresets.json README.md CHANGELOG.md run test .ci -type f 2>/dev/null |
-    grep -vE '^tests/check-words\.sh$|^tests/fuzz/seeds/|\.(png|svg|glb|ply|fct)$' | sort)
+    grep -vE '^tests/check-words\.sh$|^tests/fuzz/(seeds|models)/|\.(png|svg|glb|ply|fct)$' | sort)
 library=$(sources)
 parallel='^base/parallel\.c$'
 forbid 'unfinished work' '\b(TODO|FIXME|XXX|HACK)\b' $everything
