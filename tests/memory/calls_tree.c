@@ -149,6 +149,23 @@ static fct_result compare_meshes(const fct_env *env) {
     return STARVE(fct_mesh_compare(env, inputs.bvh, inputs.other_bvh, 2, 1, &error));
 }
 
+static fct_result refit_bvh(const fct_env *env) {
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_SIGN | FCT_BVH_PAIRS;
+    fct_bvh *bvh, *moved;
+    assert_int_equal(fct_bvh_build(&inputs.env, inputs.tree, &def, &bvh), FCT_OK);
+    fct_result result = STARVE(fct_bvh_refit(env, bvh, inputs.sheet.positions, &moved, NULL));
+    assert_int_equal(moved != NULL, result == FCT_OK);
+    fct_bvh_destroy(moved);
+    fct_bvh_destroy(bvh);
+    return result;
+}
+
+static fct_result find_hausdorff(const fct_env *env) {
+    fct_hausdorff hausdorff;
+    return STARVE(fct_mesh_hausdorff(env, inputs.bvh, inputs.other_bvh, .1, 0, &hausdorff));
+}
+
 const memory_call tree_calls[] = {{"fct_tree_build", "rounds", build_rounds, false},
                                   {"fct_tree_build", "greedy", build_greedy, false},
                                   {"fct_tree_check", "", check_tree, false},
@@ -166,5 +183,7 @@ const memory_call tree_calls[] = {{"fct_tree_build", "rounds", build_rounds, fal
                                   {"fct_bvh_build", "all parts", build_bvh, false},
                                   {"fct_bodies_touching", "", find_touching, false},
                                   {"fct_bvh_check", "", check_bvh, false},
+                                  {"fct_bvh_refit", "", refit_bvh, false},
+                                  {"fct_mesh_hausdorff", "", find_hausdorff, false},
                                   {"fct_mesh_compare", "", compare_meshes, false},
                                   {NULL, NULL, NULL, false}};
