@@ -166,7 +166,7 @@ static void distance_searches_visit_few(void **state) {
         fct_bvh_distance(m.bvh, m.bvh, &pose, NULL, NULL, &d, &far);
     }
     /* Measured: 24125, 21801, 57689 nodes; 3267, 2374, 13716 triangles. */
-assert_in_range(visits.nodes, 18000, 25300);
+    assert_in_range(visits.nodes, 18000, 25300);
     assert_in_range(hinted.nodes, 15000, 22900);
     assert_in_range(far.nodes, 40000, 60600);
     assert_in_range(visits.triangles, 2000, 3430);

@@ -229,7 +229,7 @@ static void searches_visit_few(void **state) {
         }
     }
     /* Measured: 1402, 2449, 15329, 8544. */
-assert_in_range(touching.nodes, 1000, 1470);
+    assert_in_range(touching.nodes, 1000, 1470);
     assert_in_range(touching.triangles, 1000, 2570);
     assert_in_range(apart.nodes, 12000, 16100);
     assert_in_range(apart.triangles, 5000, 8900);
