@@ -61,13 +61,12 @@ static bool lies_on_segment(v3 p, v3 a, v3 b) {
     return lies_between(p.x, a.x, b.x) && lies_between(p.y, a.y, b.y) && lies_between(p.z, a.z, b.z);
 }
 
-/* For segments in one plane that is seen along `axis` with area. */
+/* Whether the segments a b and c d cross, or c or d lies on a b. They lie in one plane that is seen along
+ * `axis` with area. */
 static bool segments_cross(int axis, v3 a, v3 b, v3 c, v3 d) {
     int ac = fct_orient_plane(axis, a, b, c), ad = fct_orient_plane(axis, a, b, d);
-    int ca = fct_orient_plane(axis, c, d, a), cb = fct_orient_plane(axis, c, d, b);
-    if (ac * ad < 0 && ca * cb < 0) return true;
-    return (ac == 0 && lies_on_segment(c, a, b)) || (ad == 0 && lies_on_segment(d, a, b)) ||
-           (ca == 0 && lies_on_segment(a, c, d)) || (cb == 0 && lies_on_segment(b, c, d));
+    if ((ac == 0 && lies_on_segment(c, a, b)) || (ad == 0 && lies_on_segment(d, a, b))) return true;
+    return ac * ad < 0 && fct_orient_plane(axis, c, d, a) * fct_orient_plane(axis, c, d, b) < 0;
 }
 
 static bool segment_meets_triangle(int axis, v3 p, v3 q, const v3 t[3]) {

@@ -234,6 +234,11 @@ static void searches_visit_few(void **state) {
     assert_in_range(apart.nodes, 12000, 16100);
     assert_in_range(apart.triangles, 5000, 8900);
     assert_true(touching.boxes == 8 * touching.nodes);
+    /* A model with itself. Measured: 80727 boxes, 143755 triangles. */
+    fct_visits own = {0, 0, 0};
+    assert_int_equal(fct_bvh_self_pairs(m.bvh, SIZE_MAX, 0, NULL, &own), 0);
+    assert_in_range(own.boxes, 40000, 84800);
+    assert_in_range(own.triangles, 100000, 151000);
     model_release(&env, &m);
 }
 

@@ -66,6 +66,25 @@ static void planes_have_a_side(void **state) {
                      fct_orient_space(tiny, huge, y, z));
 }
 
+/* A point in steps of the last place around (.5, .5), against a line through (12, 12) and (24, 24): in
+ * doubles, more than a tenth of the signs are wrong. */
+static void lines_are_exact(void **state) {
+    (void)state;
+    v3 q = {12, 12, 0}, r = {24, 24, 0};
+    size_t wrong = 0;
+    for (int i = 0; i < 64; ++i)
+        for (int j = 0; j < 64; ++j) {
+            v3 p = {.5 + i * 0x1p-53, .5 + j * 0x1p-53, 0};
+            int expected = (p.y > p.x) - (p.y < p.x);
+            double plain = (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
+            wrong += (plain > 0) - (plain < 0) != expected;
+            assert_int_equal(fct_orient_plane(2, q, r, p), expected);
+            assert_int_equal(fct_orient_plane(2, p, q, r), expected);
+            assert_int_equal(fct_orient_plane(2, r, q, p), -expected);
+        }
+    assert_true(wrong > 400);
+}
+
 /* ---- Meeting, in integers ---- */
 
 typedef struct int3 {
@@ -269,14 +288,22 @@ static void distances_of_degenerate_triangles(void **state) {
     v3 through[3] = {{2, 0, -1}, {2, 0, 3}, {2, 0, 1}};
     assert_false(fct_triangles_meet(through, flat));
     assert_true(fct_triangles_distance(through, flat, &pa, &pb) < 1e-20);
+    assert_true(fct_triangles_distance(flat, through, &pa, &pb) < 1e-20);
+    v3 beside[3] = {{2, 5, -1}, {2, 5, 3}, {2, 5, 1}};
+    assert_true(fabs(fct_triangles_distance(flat, beside, &pa, &pb) - 4) < 1e-12);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_are_exact),    cmocka_unit_test(planes_have_a_side),
-        cmocka_unit_test(meeting_is_exact),    cmocka_unit_test(contacts_are_shared),
-        cmocka_unit_test(contact_of_a_cross),  cmocka_unit_test(contacts_in_a_plane),
-        cmocka_unit_test(distances_are_least), cmocka_unit_test(distances_of_degenerate_triangles),
+        cmocka_unit_test(planes_are_exact),
+        cmocka_unit_test(planes_have_a_side),
+        cmocka_unit_test(lines_are_exact),
+        cmocka_unit_test(meeting_is_exact),
+        cmocka_unit_test(contacts_are_shared),
+        cmocka_unit_test(contact_of_a_cross),
+        cmocka_unit_test(contacts_in_a_plane),
+        cmocka_unit_test(distances_are_least),
+        cmocka_unit_test(distances_of_degenerate_triangles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
