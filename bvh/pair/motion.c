@@ -111,14 +111,14 @@ bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion 
     for (;;) {
         fct_pose pose = pose_at(motion, &t, center, time);
         fct_distance nearest;
-        /* Faces that are farther apart than the rest of the way do not meet. */
+        /* Faces that are farther apart than the rest of the way do not meet. At the time 1, only contact is
+         * found. */
         def.max_distance = speed * (1 - time) + tolerance;
         if (!fct_bvh_distance(a, b, &pose, &def, &hint, &nearest, visits)) return false;
         if (nearest.distance <= tolerance) {
             *out = (fct_first_contact){.time = time, .pose = pose, .nearest = nearest};
             return true;
         }
-        if (time == 1) return false;
         double least = (nearest.distance - def.absolute) / (1 + def.relative);
         if (least < tolerance && def.relative > 0) {
             def.relative = 0; /* near contact: measure again */
