@@ -261,6 +261,27 @@ static void first_contacts_of_cubes(void **state) {
     model_release(&env, &cube);
 }
 
+/* A rod of length 20 turns by a quarter about its middle and hits a small cube half way. */
+static void a_rod_that_turns(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_cube(&env), small = make_cube(&env);
+    for (uint32_t v = 0; v < 8; ++v)
+        for (uint32_t k = 0; k < 3; ++k) {
+            mesh.positions[3 * v + k] = (mesh.positions[3 * v + k] - .5f) * (k == 0 ? 20 : .1f);
+            small.positions[3 * v + k] = (small.positions[3 * v + k] - .5f) * .2f + (k < 2 ? 6.9f : 0);
+        }
+    model rod = pair_model_make(&env, mesh), cube = pair_model_make(&env, small);
+    fct_motion motion = {fct_pose_identity(), {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}, {0, 0, 0}}};
+    fct_first_contact contact;
+    assert_true(fct_bvh_first_contact(cube.bvh, rod.bvh, &motion, .001, &contact, NULL));
+    /* The corner (7, 6.8) is below the diagonal; the rod is .05 thick on each side. */
+    double angle = atan2(6.8, 7) - asin(.05 / hypot(6.8, 7));
+    assert_true(fabs(contact.time * 1.5707963267948966 - angle) < .001);
+    model_release(&env, &rod);
+    model_release(&env, &cube);
+}
+
 /* At no sampled time before the first contact are the surfaces nearer than half of the tolerance. */
 static void first_contacts_are_first(void **state) {
     (void)state;
@@ -409,11 +430,11 @@ static void bodies_that_touch(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distances_of_pebbles),     cmocka_unit_test(distances_at_extremes),
-        cmocka_unit_test(distances_of_cubes),       cmocka_unit_test(distance_searches_visit_few),
-        cmocka_unit_test(motions_are_steady),       cmocka_unit_test(first_contacts_of_cubes),
-        cmocka_unit_test(first_contacts_are_first), cmocka_unit_test(bodies_in_bodies),
-        cmocka_unit_test(bodies_that_touch),
+        cmocka_unit_test(distances_of_pebbles), cmocka_unit_test(distances_at_extremes),
+        cmocka_unit_test(distances_of_cubes),   cmocka_unit_test(distance_searches_visit_few),
+        cmocka_unit_test(motions_are_steady),   cmocka_unit_test(first_contacts_of_cubes),
+        cmocka_unit_test(a_rod_that_turns),     cmocka_unit_test(first_contacts_are_first),
+        cmocka_unit_test(bodies_in_bodies),     cmocka_unit_test(bodies_that_touch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
