@@ -106,7 +106,10 @@ static int run_compare(tool *t, void *options) {
                                                  HAUSDORFF_ABSOLUTE * error.diameter, &hausdorff));
     if (code == TOOL_DONE) {
         json_t *report = report_error(&error, samples, tool_seconds() - start);
-        if (o->hausdorff && report) json_object_update_new(report, report_hausdorff(&hausdorff));
+        if (o->hausdorff && json_object_update_new(report, report_hausdorff(&hausdorff)) != 0) {
+            json_decref(report);
+            report = NULL;
+        }
         code = tool_print(t, report);
     }
     for (int i = 0; i < 2; ++i) {

@@ -8,8 +8,8 @@
  *   1. Two edges at an angle with the sine x: the nearest point of an edge e moves by up to 16 u L / x^2
  * along it, and not by more than |e|. So the distance grows by at most x min(|e|, 16 u L / x^2), which is
  * largest, below 2^-10 L, at x = 2^-10.
- *   2. A triangle with a sine under 2^-11 at its first corner does not count as a face: it has no point
- * farther from its edges than 2^-11 L. The normal of the others errs by 4 u / x < 2^-11.
+ *   2. A triangle with a sine under 2^-11 between its longest edges does not count as a face: no point of it
+ * is farther from its edges than 2^-11 L. The normal of the others errs by 4 u / x < 2^-11.
  */
 #ifndef FCT_BVH_APART_H
 #define FCT_BVH_APART_H
@@ -70,7 +70,9 @@ static inline f8 edge_distance2(const lane_triangles *a, int i, const lane_trian
 /* The smaller of `least` and the squared distances of the corners of `from` above the inside of `face`. */
 static inline f8 face_distance2(const lane_triangles *face, const lane_triangles *from, f8 least) {
     w3 n = w3_cross(face->edge[0], face->edge[1]);
-    f8 least_n2 = f8_mul(f8_mul(face->edge2[0], face->edge2[1]), f8_set(FACE_SINE2));
+    const f8 *e = face->edge2;
+    f8 edges = f8_max(f8_mul(e[0], e[1]), f8_max(f8_mul(e[1], e[2]), f8_mul(e[2], e[0])));
+    f8 least_n2 = f8_mul(edges, f8_set(FACE_SINE2));
     f8 n2 = w3_dot(n, n), good = f8_sub(n2, f8_max(least_n2, f8_set(LEAST_FACE)));
     w3 in[3];
     for (int i = 0; i < 3; ++i) in[i] = w3_cross(n, face->edge[i]);

@@ -33,7 +33,7 @@ static fct_result check_bodies(const fct_env *env, uint32_t count, const fct_bod
         if (!bodies[i].bvh->pairs) return fct_fail(env, FCT_ERROR_DATA, "body %u has no FCT_BVH_PAIRS", i);
         if (!(sum + size < INFINITY))
             return fct_fail(env, FCT_ERROR_DATA, "the pose of body %u is not finite", i);
-        if (!(fabs(fct_determinant(bodies[i].pose.rotation)) > 1e-12 * size * size * size))
+        if (!fct_has_inverse(bodies[i].pose.rotation))
             return fct_fail(env, FCT_ERROR_DATA, "the rotation of body %u has no inverse", i);
     }
     return FCT_OK;

@@ -19,12 +19,19 @@ static fct_face_pair make_pair(const fct_pair_map *map, uint32_t place_a, uint32
     return (fct_face_pair){map->a->view.face_ids[place_a], map->b->view.face_ids[place_b], place_a, place_b};
 }
 
-static bool hint_meets(const fct_pair_map *map, const fct_face_pair *hint) {
+/* Whether both faces exist and have area. Reads their corners. */
+static bool read_faces(const fct_pair_map *map, const fct_face_pair *pair, v3 p[3], v3 q[3]) {
+    if (!is_pair(map, pair)) return false;
+    if (fct_bvh_degenerate(map->a, pair->place_a) || fct_bvh_degenerate(map->b, pair->place_b)) return false;
+    read_pair(map, pair, p, q);
+    return true;
+}
+
+static bool hint_meets(const fct_pair_map *map, fct_face_pair *hint) {
     v3 p[3], q[3];
-    if (!is_pair(map, hint)) return false;
-    if (fct_bvh_degenerate(map->a, hint->place_a) || fct_bvh_degenerate(map->b, hint->place_b)) return false;
-    read_pair(map, hint, p, q);
-    return fct_triangles_meet(p, q);
+    if (!read_faces(map, hint, p, q) || !fct_triangles_meet(p, q)) return false;
+    *hint = make_pair(map, hint->place_a, hint->place_b);
+    return true;
 }
 
 static bool find_overlap(const fct_pair_map *map, fct_face_pair *hint, fct_visits *visits) {
@@ -59,9 +66,8 @@ bool fct_bvh_contact(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, c
                      fct_contact *out) {
     fct_pair_map map;
     v3 p[3], q[3];
-    if (!fct_pair_map_set(a, b, pose, &map) || !is_pair(&map, pair)) return false;
-    read_pair(&map, pair, p, q);
-    return fct_triangles_contact(p, q, out);
+    return fct_pair_map_set(a, b, pose, &map) && read_faces(&map, pair, p, q) &&
+           fct_triangles_contact(p, q, out);
 }
 
 fct_distance_def fct_distance_def_default(void) {

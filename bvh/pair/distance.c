@@ -34,7 +34,8 @@ typedef struct distance_search {
     const fct_pair_map *map;
     double relative, absolute, enough;
     fct_near_pair best;
-    double upper;      /* the least distance is not more, scaled */
+    double maximum;    /* farther pairs do not count, scaled */
+    double upper;      /* the least distance is not more, scaled; infinity until a pair is known */
     double reach;      /* a pair must have a lower bound of at most this, scaled */
     float limit2;      /* its square, rounded up */
     bool found;        /* best is new */
@@ -50,11 +51,11 @@ static bool is_enough(const distance_search *s) {
     return s->found && sqrt(s->best.distance2) <= s->enough;
 }
 
-/* The tolerances count from the first pair on. */
+/* The tolerances count once a pair is known that is near enough. */
 static void set_limit(distance_search *s) {
-    double scale = s->map->a->scale, reach = s->upper;
-    bool known = s->best.place_a != FCT_NONE || s->waiting > 0;
-    if (known) reach = fct_max((reach - s->absolute * scale) / (1 + s->relative), 0);
+    double scale = s->map->a->scale, reach = s->maximum;
+    bool known = s->upper <= s->maximum;
+    if (known) reach = fct_max((s->upper - s->absolute * scale) / (1 + s->relative), 0);
     s->done = is_enough(s) || (known && reach == 0);
     s->reach = reach * (1 + 0x1p-40) + 1e-18;
     double limit2 = s->reach * s->reach * (1 + 0x1p-20);
@@ -82,7 +83,7 @@ static void settle_candidates(distance_search *s) {
             if (s->candidates[j].distance < s->candidates[nearest].distance) nearest = j;
         candidate c = s->candidates[nearest];
         s->candidates[nearest] = s->candidates[i];
-        if ((double)c.distance > s->upper) break;
+        if ((double)c.distance > fct_min(s->upper, s->maximum)) break;
         measure_pair(s, c.place_a, c.place_b);
     }
     s->waiting = 0;
@@ -111,7 +112,7 @@ static void measure_octet(distance_search *s, const fct_leaf *a, const placed_le
     if (!open) return;
     eight_triangles eight = pick_triangles(a, placed_a, first / 8);
     float distance[8];
-    f8_store(distance, f8_sqrt(find_distances2(&eight, one)));
+    f8_store(distance, f8_sqrt(f8_max(find_distances2(&eight, one), bound)));
     /* Triangles that meet may be far apart along their edges, but their boxes meet too. */
     uint32_t touching = f8_le(bound, f8_set(0));
     for (; open && !s->done; open &= open - 1) {
@@ -258,7 +259,8 @@ bool fct_distance_search(const fct_pair_map *map, double relative, double absolu
     double shrink2 = 1 - map->to_a.skew;
     s.to_limit_b = shrink2 > 0 ? map->to_a.factor * map->to_a.factor * shrink2 * (1 - 0x1p-40) : 0;
     s.placed_a.box = s.placed_b.box = FCT_NONE;
-    s.upper = sqrt(best->distance2) * map->a->scale;
+    s.maximum = sqrt(best->distance2) * map->a->scale;
+    s.upper = best->place_a != FCT_NONE ? s.maximum : INFINITY;
     s.found = best->place_a != FCT_NONE;
     set_limit(&s);
     s.found = false;

@@ -104,6 +104,7 @@ bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion 
     double radius = v3_norm(v3_sub(v3_load(b->bounds.upper), center));
     v3 way = v3_sub(fct_pose_apply(&motion->to, center), fct_pose_apply(&motion->from, center));
     double speed = v3_norm(way) + t.angle * radius, time = 0;
+    if (!(speed < INFINITY)) return false;
     tolerance = fct_max(tolerance, LEAST_TOLERANCE * speed);
     fct_distance_def def = fct_distance_def_default();
     fct_face_pair hint = fct_face_pair_none();
@@ -116,6 +117,8 @@ bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion 
         def.max_distance = speed * (1 - time) + tolerance;
         if (!fct_bvh_distance(a, b, &pose, &def, &hint, &nearest, visits)) return false;
         if (nearest.distance <= tolerance) {
+            def.relative = def.absolute = 0;
+            fct_bvh_distance(a, b, &pose, &def, &hint, &nearest, visits);
             *out = (fct_first_contact){.time = time, .pose = pose, .nearest = nearest};
             return true;
         }

@@ -20,6 +20,12 @@ static inline v3 fct_matrix_column(const double m[3][3], int i) {
 static inline double fct_determinant(const double m[3][3]) {
     return v3_dot(fct_matrix_column(m, 0), v3_cross(fct_matrix_column(m, 1), fct_matrix_column(m, 2)));
 }
+/* Whether the columns are independent beyond rounding. */
+static inline bool fct_has_inverse(const double m[3][3]) {
+    double size = 1;
+    for (int i = 0; i < 3; ++i) size *= v3_norm(fct_matrix_column(m, i));
+    return fabs(fct_determinant(m)) > 1e-12 * size;
+}
 
 /* The pose of b in the coordinates of a, from those of both in the world. a's rotation has an inverse. */
 static inline fct_pose fct_pose_relate(const fct_pose *a, const fct_pose *b) {

@@ -194,12 +194,16 @@ static void try_axis(const v3 a[3], const v3 b[3], v3 axis, double least_length,
 static void find_way_out(const v3 a[3], const v3 b[3], fct_contact *out) {
     v3 ea[3], eb[3];
     for (int i = 0; i < 3; ++i) ea[i] = v3_sub(a[(i + 1) % 3], a[i]), eb[i] = v3_sub(b[(i + 1) % 3], b[i]);
-    out->depth = INFINITY;
+    *out = (fct_contact){.from = {out->from[0], out->from[1], out->from[2]},
+                         .to = {out->to[0], out->to[1], out->to[2]},
+                         .normal = {1, 0, 0},
+                         .depth = INFINITY};
     try_axis(a, b, v3_cross(ea[0], ea[1]), 0, out);
     try_axis(a, b, v3_cross(eb[0], eb[1]), 0, out);
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
             try_axis(a, b, v3_cross(ea[i], eb[j]), 1e-9 * v3_norm(ea[i]) * v3_norm(eb[j]), out);
+    if (!(out->depth < INFINITY)) out->depth = 0; /* needles without a normal */
 }
 
 bool fct_triangles_contact(const v3 a[3], const v3 b[3], fct_contact *out) {
@@ -210,6 +214,8 @@ bool fct_triangles_contact(const v3 a[3], const v3 b[3], fct_contact *out) {
     s.count = 0;
     add_edges(&s, b, side_b, a, axis_a);
     add_edges(&s, a, side_a, b, axis_b);
+    /* The points of two needles may be lost to rounding. */
+    if (s.count == 0) add_point(&s, a[0]);
     find_ends(&s, out);
     find_way_out(a, b, out);
     return true;
@@ -219,9 +225,11 @@ bool fct_triangles_contact(const v3 a[3], const v3 b[3], fct_contact *out) {
 static void approach_segments(v3 p, v3 u, v3 q, v3 v, double *s, double *t) {
     v3 r = v3_sub(p, q);
     double uu = v3_norm2(u), vv = v3_norm2(v), uv = v3_dot(u, v), ur = v3_dot(u, r), vr = v3_dot(v, r);
-    double det = uu * vv - uv * uv;
-    /* Of parallel segments, the first end counts; the clamps below find the nearest point of q's. */
-    *s = det > 1e-14 * uu * vv ? fct_min(fct_max((uv * vr - vv * ur) / det, 0), 1) : 0;
+    /* The difference of products of dots would cancel at small angles; the cross products do not. Of parallel
+     * segments, the first end counts; the clamps below find the nearest point of q's. */
+    v3 n = v3_cross(u, v);
+    double n2 = v3_norm2(n);
+    *s = n2 > 0 ? fct_min(fct_max(-v3_dot(v3_cross(r, v), n) / n2, 0), 1) : 0;
     *t = vv > 0 ? (uv * *s + vr) / vv : 0;
     if (*t < 0 || *t > 1 || vv == 0) {
         *t = fct_min(fct_max(*t, 0), 1);

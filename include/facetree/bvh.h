@@ -26,7 +26,7 @@ typedef enum fct_backend { FCT_BACKEND_OBB, FCT_BACKEND_EMBREE, FCT_BACKEND_MULT
 
 /* What an OBB structure holds beside rays and points. */
 enum {
-    FCT_BVH_PAIRS = 1, /* queries on two models (collide.h): about 10 bytes per triangle */
+    FCT_BVH_PAIRS = 1, /* queries on two models (collide.h): about 11 bytes per triangle */
     FCT_BVH_SIGN = 2   /* winding numbers and signed distances: about 24 bytes per triangle */
 };
 

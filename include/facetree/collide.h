@@ -10,9 +10,10 @@
  * faces meet is decided by exact arithmetic: also where they are coplanar, or share a vertex or an edge. A
  * face without area meets nothing; its distance counts. Distances are computed in double.
  *
- * Queries do not allocate and do not fail, and any number of threads may ask. If a model has no
- * FCT_BVH_PAIRS, or if the pose is not finite, nothing touches and no distance is found. visits may be NULL;
- * it counts pairs of boxes, and pairs of triangles.
+ * Queries do not allocate and do not fail, and any number of threads may ask. Nothing touches and no distance
+ * is found if a model has no FCT_BVH_PAIRS; if the pose is not finite, or its rotation is zero; or if a
+ * length of the pose beside a model, or the two models beside each other, have a ratio above 1e30. visits may
+ * be NULL; it counts pairs of boxes, and pairs of triangles.
  */
 #ifndef FACETREE_COLLIDE_H
 #define FACETREE_COLLIDE_H
@@ -31,7 +32,8 @@ typedef struct fct_pose {
 FCT_API fct_pose fct_pose_identity(void);
 
 /* A face of a and a face of b. As a hint, it is the answer to a similar question, such as that of the last
- * frame; it makes the query faster and does not change its answer. */
+ * frame: it makes the query faster. It does not change whether faces meet, nor the exact distance. It may
+ * change which pair answers, and a distance within the tolerance. */
 typedef struct fct_face_pair {
     uint32_t face_a, face_b;   /* input face ids; FCT_NONE if there is no pair */
     uint32_t place_a, place_b; /* their places in the trees' order */
@@ -104,11 +106,11 @@ typedef struct fct_motion {
 FCT_API fct_pose fct_motion_at(const fct_bvh *b, const fct_motion *motion, double time);
 
 typedef struct fct_first_contact {
-    double time;          /* the bodies come within `tolerance` at this time, and not earlier */
-    fct_pose pose;        /* of b at this time */
+    double time;   /* the surfaces are within `tolerance` at this time, and over tolerance / 2 apart before */
+    fct_pose pose; /* of b at this time */
     fct_distance nearest; /* at this time */
 } fct_first_contact;
-/* The first time in [0, 1] at which the surfaces are within `tolerance` (> 0) of each other, by conservative
+/* Finds when the surfaces come within `tolerance` (> 0) of each other, by conservative
  * advancement (Mirtich 1996). A tolerance below 1e-5 of the longest way of a point of b counts as that.
  * Returns false if they stay apart, or if the motion is not one of rotations. */
 FCT_API bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion *motion,

@@ -182,6 +182,58 @@ static void distance_searches_visit_few(void **state) {
     model_release(&env, &m);
 }
 
+/* A maximum and a tolerance together: within the maximum, a pair is always found. */
+static void maximum_and_tolerance(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    uint64_t seed = 60;
+    size_t found = 0, total = 0;
+    for (int i = 0; i < (SANITIZED ? 100 : 1000); ++i) {
+        model a = pair_model_make(&env, make_soup(&env, 12, seed + 1)),
+              b = pair_model_make(&env, make_soup(&env, 9, seed));
+        fct_pose pose = random_pose(&seed, 2);
+        double expected = brute_distance(&a.mesh, &b.mesh, &pose);
+        fct_distance_def def = fct_distance_def_default();
+        fct_distance d;
+        def.relative = .2, def.absolute = .01,
+        def.max_distance = expected * (1 + .03 * (random_unit(&seed) - .3));
+        bool near = expected <= def.max_distance;
+        assert_int_equal(fct_bvh_distance(a.bvh, b.bvh, &pose, &def, NULL, &d, NULL), near);
+        if (near) assert_true(d.distance <= def.max_distance && d.distance >= expected);
+        found += near, ++total;
+        model_release(&env, &a);
+        model_release(&env, &b);
+    }
+    assert_in_range(found, total / 2, total * 9 / 10);
+}
+
+/* A needle that is sharp at its first corner, and a corner of another face behind its tip. */
+static void distances_of_needles(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    uint64_t seed = 61;
+    for (int i = 0; i < 2000; ++i) {
+        fct_mesh needle, face;
+        assert_int_equal(fct_mesh_create(&env, 3, 1, 0, &needle), FCT_OK);
+        assert_int_equal(fct_mesh_create(&env, 3, 1, 0, &face), FCT_OK);
+        double thin = exp2(-20 - 6 * random_unit(&seed)), back = -.05 - .3 * random_unit(&seed);
+        float corners[9] = {0, 0, 0, 1, 0, 0, 1, (float)thin, 0};
+        memcpy(needle.positions, corners, sizeof corners);
+        v3_store(face.positions, v3_make(back, .3 * thin * random_unit(&seed), 0));
+        for (int c = 1; c < 3; ++c)
+            v3_store(face.positions + 3 * c,
+                     v3_add(v3_make(back - 1, 0, 0), v3_scale(random_direction(&seed), .7)));
+        for (uint32_t c = 0; c < 3; ++c) needle.triangles[c] = face.triangles[c] = c;
+        model a = pair_model_make(&env, needle), b = pair_model_make(&env, face);
+        fct_pose pose = fct_pose_identity();
+        fct_distance d;
+        assert_true(fct_bvh_distance(a.bvh, b.bvh, &pose, NULL, NULL, &d, NULL));
+        assert_true(d.distance == brute_distance(&a.mesh, &b.mesh, &pose));
+        model_release(&env, &a);
+        model_release(&env, &b);
+    }
+}
+
 /* ---- Motions ---- */
 
 static void motions_are_steady(void **state) {
@@ -431,7 +483,8 @@ static void bodies_that_touch(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(distances_of_pebbles), cmocka_unit_test(distances_at_extremes),
-        cmocka_unit_test(distances_of_cubes),   cmocka_unit_test(distance_searches_visit_few),
+        cmocka_unit_test(distances_of_cubes),   cmocka_unit_test(maximum_and_tolerance),
+        cmocka_unit_test(distances_of_needles), cmocka_unit_test(distance_searches_visit_few),
         cmocka_unit_test(motions_are_steady),   cmocka_unit_test(first_contacts_of_cubes),
         cmocka_unit_test(a_rod_that_turns),     cmocka_unit_test(first_contacts_are_first),
         cmocka_unit_test(bodies_in_bodies),     cmocka_unit_test(bodies_that_touch),

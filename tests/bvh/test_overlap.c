@@ -272,6 +272,34 @@ static void calls_without_answers(void **state) {
     model_release(&env, &plain);
 }
 
+/* A face without area has no contact, and a hint that meets gets its face ids. */
+static void contacts_of_flat_faces(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh flat;
+    assert_int_equal(fct_mesh_create(&env, 3, 1, 0, &flat), FCT_OK);
+    float corners[9] = {-.5f, .25f, .125f, .5f, .25f, .125f, 0, .25f, .125f};
+    memcpy(flat.positions, corners, sizeof corners);
+    for (uint32_t c = 0; c < 3; ++c) flat.triangles[c] = c;
+    model a = pair_model_make(&env, make_grid(&env, 1)), b = pair_model_make(&env, flat);
+    uint64_t seed = 70;
+    for (int i = 0; i < 200; ++i) {
+        fct_pose pose = random_pose(&seed, .2);
+        for (uint32_t place = 0; place < 2; ++place) {
+            fct_face_pair pair = {0, 0, place, 0};
+            fct_contact contact;
+            assert_false(fct_bvh_contact(a.bvh, b.bvh, &pose, &pair, &contact));
+            assert_false(fct_bvh_overlap(a.bvh, b.bvh, &pose, &pair, NULL));
+        }
+    }
+    fct_face_pair hint = {777, 888, 0, 0};
+    assert_true(fct_bvh_overlap(a.bvh, a.bvh, NULL, &hint, NULL));
+    assert_int_equal(hint.face_a, fct_tree_get(a.tree).face_ids[0]);
+    assert_int_equal(hint.face_b, fct_tree_get(a.tree).face_ids[0]);
+    model_release(&env, &a);
+    model_release(&env, &b);
+}
+
 /* Many poses at once: the same answers as one by one, for every number of threads. */
 static void batches(void **state) {
     (void)state;
@@ -316,6 +344,7 @@ int main(void) {
         cmocka_unit_test(sizes_and_places),
         cmocka_unit_test(self_pairs),
         cmocka_unit_test(searches_visit_few),
+        cmocka_unit_test(contacts_of_flat_faces),
         cmocka_unit_test(calls_without_answers),
         cmocka_unit_test(batches),
     };

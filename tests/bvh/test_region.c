@@ -2,6 +2,7 @@
 #include "packed.h"
 
 #include "base/math/round.h"
+#include "bvh/near/region/clip.h"
 #include "bvh/near/triangle.h"
 
 /* A constraint a u + b v + c >= 0 on the barycentrics of a triangle. */
@@ -228,8 +229,32 @@ static void bad_regions_hold_nothing(void **state) {
     model_release(&env, &m);
 }
 
+/* One plane again and again, with other lengths, and its neighbours in the last place. */
+static void repeated_planes(void **state) {
+    (void)state;
+    uint64_t seed = 80;
+    for (int i = 0; i < 20000; ++i) {
+        v3 p[3], n = random_direction(&seed);
+        double d = .3 * (random_unit(&seed) - .5);
+        fct_half_space h[FCT_BVH_PLANES];
+        for (int c = 0; c < 3; ++c) p[c] = random_direction(&seed);
+        for (int k = 0; k < FCT_BVH_PLANES; ++k) {
+            double factor = exp2(8 * random_unit(&seed) - 4);
+            h[k] = (fct_half_space){v3_scale(n, factor), d * factor};
+        }
+        bool touches = false;
+        double nearest = INFINITY;
+        for (int c = 0; c < 3; ++c) {
+            touches |= v3_dot(n, p[c]) + d >= 0;
+            nearest = fmin(nearest, fabs(v3_dot(n, p[c]) + d));
+        }
+        if (nearest > 1e-12) assert_int_equal(fct_clip_touches(p, h, UINT32_MAX), touches);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(repeated_planes),
         cmocka_unit_test(regions_agree_with_brute_force),
         cmocka_unit_test(balls_agree_with_brute_force),
         cmocka_unit_test(touching_counts),

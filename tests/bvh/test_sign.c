@@ -406,8 +406,36 @@ static void without_the_part_there_is_no_answer(void **state) {
     model_release(&env, &one);
 }
 
+/* Points above and below the insides of faces, nearer than a float resolves. */
+static void signs_close_to_faces(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_pebble(&env, 12, 90);
+    fct_tree *tree;
+    fct_bvh *bvh;
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_SIGN;
+    assert_int_equal(fct_tree_build(&env, &mesh, NULL, NULL, &tree), FCT_OK);
+    assert_int_equal(fct_bvh_build(&env, tree, &def, &bvh), FCT_OK);
+    uint64_t seed = 91;
+    for (uint32_t f = 0; f < mesh.face_count; ++f)
+        for (double height = 1e-5; height > 1e-12; height /= 2.7) {
+            v3 p[3];
+            face_corners(&mesh, f, p);
+            double u = .2 + .3 * random_unit(&seed), v = .2 + .3 * random_unit(&seed);
+            v3 n = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+            v3 q = v3_add(v3_scale(p[0], 1 - u - v), v3_add(v3_scale(p[1], u), v3_scale(p[2], v)));
+            assert_false(fct_winding_is_inside(bvh, v3_mad(q, height, n), NULL));
+            assert_true(fct_winding_is_inside(bvh, v3_mad(q, -height, n), NULL));
+        }
+    fct_bvh_destroy(bvh);
+    fct_tree_destroy(tree);
+    fct_mesh_release(&env, &mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(signs_close_to_faces),
         cmocka_unit_test(winding_numbers_agree_with_all_faces),
         cmocka_unit_test(moments_are_integrals_over_the_surface),
         cmocka_unit_test(moments_carry_the_far_field),

@@ -277,6 +277,17 @@ static void distances_are_least(void **state) {
     }
 }
 
+/* Edges that cross at a tiny angle, just above each other. */
+static void distances_of_nearly_parallel_edges(void **state) {
+    (void)state;
+    for (double angle = 1e-3; angle > 1e-12; angle /= 3) {
+        double height = angle * 1e-3;
+        v3 a[3] = {{-1, 0, 0}, {1, 0, 0}, {0, 0, -5}}, pa, pb;
+        v3 b[3] = {{-1, -angle, height}, {1, angle, height}, {0, 0, 5}};
+        assert_true(fabs(sqrt(fct_triangles_distance(a, b, &pa, &pb)) - height) <= 1e-15);
+    }
+}
+
 static void distances_of_degenerate_triangles(void **state) {
     (void)state;
     v3 needle[3] = {{0, 0, 2}, {4, 0, 2}, {2, 0, 2}}, flat[3] = {{1, -1, 0}, {3, -1, 0}, {2, 3, 0}}, pa, pb;
@@ -303,6 +314,7 @@ int main(void) {
         cmocka_unit_test(contact_of_a_cross),
         cmocka_unit_test(contacts_in_a_plane),
         cmocka_unit_test(distances_are_least),
+        cmocka_unit_test(distances_of_nearly_parallel_edges),
         cmocka_unit_test(distances_of_degenerate_triangles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,7 +7,7 @@
 
 enum { COLUMNS = 12 };
 
-/* |det R| over the cube of the sum of all |r|. A smaller share is rounding. */
+/* |det R| over the product of the lengths of the columns. A smaller share is rounding. */
 #define SINGULAR_RATIO 1e-12
 /* Differences of R^T R from a multiple of the identity, relative to it. The least of six decimals that people
  * write is below this. */
@@ -31,9 +31,12 @@ static double find_determinant(const double *row) {
 }
 
 static bool has_inverse(const double *row, double determinant) {
-    double size = 0;
-    for (int i = 0; i < 9; ++i) size += fabs(get_entry(row, i / 3, i % 3));
-    return fabs(determinant) > SINGULAR_RATIO * size * size * size;
+    double size = 1;
+    for (int c = 0; c < 3; ++c)
+        size *=
+            sqrt(get_entry(row, 0, c) * get_entry(row, 0, c) + get_entry(row, 1, c) * get_entry(row, 1, c) +
+                 get_entry(row, 2, c) * get_entry(row, 2, c));
+    return fabs(determinant) > SINGULAR_RATIO * size;
 }
 
 /* Whether R is a factor times a rotation or reflection. */

@@ -40,7 +40,7 @@ static int parse_row(const reader *r, const char *text, double *row, int *found)
         bool must_be_finite = *found < r->least || isnan(value);
         bool written_infinite = strncasecmp(text + strspn(text, "+-"), "inf", 3) == 0;
         if (!isfinite((float)value) && (must_be_finite || !written_infinite))
-            return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a finite number, found '%s'", r->path,
+            return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number below 3.4e38, found '%s'", r->path,
                              r->line, copy_word(text, word));
         if (*found == r->columns)
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers at most, found more: '%s'",

@@ -7,8 +7,9 @@
  *     tan(angle / 2) = a.(b x c) / (|a| |b| |c| + (a.b) |c| + (b.c) |a| + (c.a) |b|)
  *
  * for corners a, b, c relative to the point. Where both terms of the fraction are small against |a| |b| |c|,
- * the point lies close to a side of the face. Such a face is measured again in double. So a half angle errs
- * by at most 3e-5, on nearly all faces by less than 1e-6.
+ * the point lies close to a side of the face; where the first is below its rounding and the second negative,
+ * close to the inside. Such a face is measured again in double. So a half angle errs by at most 3e-5, on
+ * nearly all faces by less than 1e-6.
  */
 #include "bvh/near/sign/winding.h"
 
@@ -20,6 +21,8 @@
 #define HALF_PI 1.57079632679489662
 /* A fraction whose terms are smaller than this, over |a| |b| |c|, is computed in double. */
 #define SMALL_TERMS 0x1p-5f
+/* Rounding of the first term in float, over the product of its three lengths. */
+#define TERM_ROUNDING 0x1p-19f
 
 typedef struct winding {
     const fct_bvh *bvh;
@@ -77,13 +80,16 @@ static void add_leaf(winding *w, const fct_leaf *leaf) {
              c = f8x3_lookup(&vertices, octets, i8_load_bytes(corners + 16));
         f8 la = f8_sqrt(f8x3_dot(a, a)), lb = f8_sqrt(f8x3_dot(b, b)), lc = f8_sqrt(f8x3_dot(c, c));
         f8 all = f8_mul(f8_mul(la, lb), lc);
-        f8 y = f8x3_dot(a, f8x3_cross(f8x3_sub(b, a), f8x3_sub(c, a)));
+        f8x3 ab = f8x3_sub(b, a), ac = f8x3_sub(c, a);
+        f8 y = f8x3_dot(a, f8x3_cross(ab, ac));
         f8 x = f8_add(f8_add(all, f8_mul(f8x3_dot(a, b), lc)),
                       f8_add(f8_mul(f8x3_dot(b, c), la), f8_mul(f8x3_dot(c, a), lb)));
         float half[8];
         f8_store(half, atan2_of(y, x));
         uint32_t count = leaf->count - first < 8 ? leaf->count - first : 8;
         uint32_t small = f8_le(f8_max(f8_abs(x), f8_abs(y)), f8_mul(f8_set(SMALL_TERMS), all));
+        f8 lengths = f8_mul(la, f8_sqrt(f8_mul(f8x3_dot(ab, ab), f8x3_dot(ac, ac))));
+        small |= f8_lt(x, f8_set(0)) & f8_le(f8_abs(y), f8_mul(f8_set(TERM_ROUNDING), f8_max(all, lengths)));
         for (uint32_t i = 0; i < count; ++i)
             w->near += small >> i & 1 ? measure_half_angle(w->point, leaf, first + i) : (double)half[i];
     }
