@@ -21,12 +21,6 @@ extern "C" {
 #include "facetree/facetree.h"
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define SANITIZED 1
-#else
-#define SANITIZED 0
-#endif
-
 namespace {
 
 using peer_model = fcl::BVHModel<fcl::OBBRSSd>;
@@ -175,15 +169,15 @@ void compare_models(const char *name_a, const char *name_b, double scale, int co
 }
 
 void bunny_and_bunny(void **) {
-    compare_models("stanford-bunny.obj", "stanford-bunny.obj", 1, SANITIZED ? 4 : 100);
+    compare_models("stanford-bunny.obj", "stanford-bunny.obj", 1, 100);
 }
 
 void cow_and_suzanne(void **) {
-    compare_models("cow.obj", "suzanne.obj", 2, SANITIZED ? 20 : 400);
+    compare_models("cow.obj", "suzanne.obj", 2, 400);
 }
 
 void fandisk_and_arm(void **) {
-    compare_models("fandisk.obj", "rocker-arm.obj", 1, SANITIZED ? 10 : 100);
+    compare_models("fandisk.obj", "rocker-arm.obj", 1, 100);
 }
 
 } // namespace

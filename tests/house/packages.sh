@@ -1,7 +1,7 @@
 # The Debian 12 packages that ./run and ./test need, and a function that installs them. Source this file.
 packages_build="gcc g++ cmake ninja-build pkg-config libembree-dev libopenmesh-dev libjansson-dev
     libpng-dev libjpeg-dev libxxhash-dev libcmocka-dev libmeshoptimizer-dev"
-packages_test="clang procps python3 clang-format-14 libclang-rt-14-dev qemu-user"
+packages_test="clang procps python3 clang-format-14 libclang-rt-14-dev qemu-user libfcl-dev"
 
 # install_packages LOG PACKAGE...: installs the packages that are missing.
 install_packages() {
