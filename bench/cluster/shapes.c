@@ -1,9 +1,13 @@
 /* bench/cluster/shapes.c: makes subdivided, shuffled and adversarial meshes, which `facetree make` does not
  * make.
  *
- * usage: shapes NAME COUNT OUT            strip, fan, loose, books, cubes, blocks, beams, needles, gear: of
- * about COUNT triangles shapes subdivide LEVELS IN OUT   splits each triangle into four, LEVELS times, with
- * noise shapes shuffle-faces SEED IN OUT, shapes shuffle SEED IN OUT (vertices, too), shapes copy 0 IN OUT
+ * usage:
+ * - shapes NAME COUNT OUT: strip, fan, loose, books, cubes, blocks, beams, needles or gear, of COUNT triangles
+ * - shapes subdivide LEVELS IN OUT: splits each triangle into four, LEVELS times, with noise
+ * - shapes shuffle-faces SEED IN OUT
+ * - shapes shuffle SEED IN OUT: vertices, too
+ * - shapes copy 0 IN OUT
+ *
  * The output depends on the arguments only.
  */
 #include <math.h>
