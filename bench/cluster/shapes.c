@@ -2,7 +2,8 @@
  * make.
  *
  * usage:
- * - shapes NAME COUNT OUT: strip, fan, loose, books, cubes, blocks, beams, needles or gear, of COUNT triangles
+ * - shapes NAME COUNT OUT: strip, fan, loose, books, cubes, blocks, beams, needles or gear, of COUNT
+ * triangles
  * - shapes subdivide LEVELS IN OUT: splits each triangle into four, LEVELS times, with noise
  * - shapes shuffle-faces SEED IN OUT
  * - shapes shuffle SEED IN OUT: vertices, too
