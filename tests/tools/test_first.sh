@@ -144,7 +144,7 @@ for command in bake cluster simplify; do
 done
 expect 0 help --zsh
 check "zsh completion names the command" test "$(head -n 1 out)" = '#compdef facetree'
-check "zsh completion has a branch per command" test "$(grep -c '_arguments' out)" = 13
+check "zsh completion has a branch per command" test "$(grep -c '_arguments' out)" = 14
 if command -v zsh >/dev/null; then
     cp out _facetree
     check "zsh reads the completion" zsh -n _facetree
