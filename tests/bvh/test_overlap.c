@@ -219,7 +219,9 @@ static void searches_visit_few(void **state) {
     size_t met = 0, missed = 0;
     while (met < 60 || missed < 60) {
         fct_pose pose = random_pose(&seed, 0);
-        v3 away = v3_scale(random_direction(&seed), 1.55 + .35 * random_unit(&seed));
+        double far =
+            1.55 + .35 * random_unit(&seed); /* a statement each: compilers order arguments as they like */
+        v3 away = v3_scale(random_direction(&seed), far);
         pose.translation[0] = away.x, pose.translation[1] = away.y, pose.translation[2] = away.z;
         fct_visits visits = {0, 0, 0};
         if (fct_bvh_overlap(m.bvh, m.bvh, &pose, NULL, &visits)) {
