@@ -162,9 +162,12 @@ static inline void fct_visits_add(fct_visits *visits, const fct_visits *more) {
     visits->triangles += more->triangles;
 }
 
-/* A point in scaled space. */
+/* A point in scaled space, and back. */
 static inline v3 fct_bvh_to_scaled(const fct_bvh *bvh, v3 point) {
     return v3_sub(v3_scale(point, bvh->scale), v3_load(bvh->offset));
+}
+static inline v3 fct_bvh_from_scaled(const fct_bvh *bvh, v3 point) {
+    return v3_scale(v3_add(point, v3_load(bvh->offset)), 1 / bvh->scale);
 }
 /* The vertex's position, scaled: exact unless the result is a denormal float. */
 static inline void fct_bvh_position(const fct_bvh *bvh, uint32_t vertex, float out[3]) {

@@ -2,6 +2,7 @@
  * faces. */
 #include "base/parallel.h"
 #include "bvh/near/nearest.h"
+#include "bvh/near/points.h"
 #include "bvh/near/several.h"
 
 bool fct_bvh_closest_point(const fct_bvh *bvh, const float point[3], float max_distance, fct_closest *out,
@@ -24,22 +25,28 @@ enum { CHUNK = 256 }; /* points per task */
 
 typedef struct point_batch {
     const fct_bvh *bvh;
+    fct_point_query *query;
     const float *points;
     float max_distance;
     fct_closest *out;
 } point_batch;
 
-static void find_closest_points(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+static void ask_points(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const point_batch *b = user;
     for (size_t i = begin; i < end; ++i)
-        fct_bvh_closest_point(b->bvh, b->points + 3 * i, b->max_distance, &b->out[i], NULL);
+        b->query(b->bvh, b->points + 3 * i, b->max_distance, &b->out[i], NULL);
+}
+
+void fct_ask_points(const fct_bvh *bvh, fct_point_query *query, size_t count, const float *points,
+                    float max_distance, fct_closest *out) {
+    point_batch batch = {bvh, query, points, max_distance, out};
+    fct_parallel_for(bvh->env, count, CHUNK, ask_points, &batch);
 }
 
 void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                             fct_closest *out) {
-    point_batch batch = {.bvh = bvh, .points = points, .max_distance = max_distance, .out = out};
-    fct_parallel_for(bvh->env, count, CHUNK, find_closest_points, &batch);
+    fct_ask_points(bvh, fct_bvh_closest_point, count, points, max_distance, out);
 }
 
 uint32_t fct_bvh_nearest(const fct_bvh *bvh, const float point[3], uint32_t k, float max_distance,

@@ -1,23 +1,9 @@
-/* bvh/near/descend.h: the stack of a search that opens the nearest box first. For kernel files. */
+/* bvh/near/descend.h: the search for near faces: opens the nearest box first. For kernel files. */
 #ifndef FCT_BVH_DESCEND_H
 #define FCT_BVH_DESCEND_H
 
-#include "base/key.h"
+#include "bvh/entry.h"
 #include "bvh/near/measure.h"
-
-/* A pending child: the bits of its squared distance above its reference. */
-static inline float fct_entry_distance2(uint64_t entry) {
-    return fct_float_of_bits((uint32_t)(entry >> 32));
-}
-
-/* Prefetches 256 bytes: an axis node, or the largest leaf. */
-static inline void fct_prefetch_child(const fct_bvh *bvh, uint32_t ref) {
-    const char *at = ref & FCT_REF_LEAF ? (const char *)fct_bvh_leaf(bvh, ref) : fct_bvh_node(bvh, ref);
-    __builtin_prefetch(at);
-    __builtin_prefetch(at + 64);
-    __builtin_prefetch(at + 128);
-    __builtin_prefetch(at + 192);
-}
 
 /* Pushes the children whose bit is set, the nearest on top, and returns the new height.
  *
@@ -36,10 +22,34 @@ static inline uint32_t fct_push_children(const fct_bvh *bvh, uint64_t *stack, ui
     i8_store(below, farther); /* minus the count */
     for (; met; met &= met - 1, ++count) {
         uint32_t i = (uint32_t)__builtin_ctz(met);
-        stack[height - below[i]] = (uint64_t)fct_float_bits(distance2[i]) << 32 | child[i];
+        stack[height - below[i]] = fct_entry_make(distance2[i], child[i]);
         fct_prefetch_child(bvh, child[i]);
     }
     return height + count;
+}
+
+/* Calls visit(user, ref) for the leaves whose boxes are within the limit, near ones first. The visitor may
+ * lower *limit2, a squared distance. */
+static inline void fct_descend(const fct_bvh *bvh, const fct_at *at, const float *limit2,
+                               void (*visit)(void *user, uint32_t ref), void *user, fct_visits *visits) {
+    uint64_t stack[FCT_STACK_SIZE];
+    uint32_t height = 1;
+    stack[0] = bvh->root;
+    while (height) {
+        uint64_t entry = stack[--height];
+        if (fct_entry_distance(entry) > *limit2) continue;
+        uint32_t ref = (uint32_t)entry;
+        if (ref & FCT_REF_LEAF) {
+            visit(user, ref);
+            continue;
+        }
+        float distance2[8];
+        const uint32_t *child;
+        uint32_t met = fct_measure_children(bvh, ref, at, *limit2, distance2, &child);
+        ++visits->nodes;
+        visits->boxes += 8;
+        height = fct_push_children(bvh, stack, height, met, distance2, child);
+    }
 }
 
 #endif

@@ -115,7 +115,9 @@ static void shrink_bound(search *s, f8 upper2, uint32_t lanes) {
 }
 
 /* Bounds the distances of the triangles of a leaf; those within reach join the waiting list. */
-static void search_leaf(search *s, const fct_leaf *leaf) {
+static void search_leaf(void *user, uint32_t ref) {
+    search *s = user;
+    const fct_leaf *leaf = fct_bvh_leaf(s->bvh, ref);
     fct_near_vertices vertices;
     fct_near_vertices_load(leaf, &s->at, &vertices);
     const uint8_t *corners = fct_leaf_corners(leaf);
@@ -136,29 +138,6 @@ static void search_leaf(search *s, const fct_leaf *leaf) {
     }
 }
 
-static void search_nodes(search *s) {
-    const fct_bvh *bvh = s->bvh;
-    uint64_t stack[FCT_STACK_SIZE];
-    uint32_t height = 1;
-    stack[0] = bvh->root;
-    while (height) {
-        uint64_t entry = stack[--height];
-        if (fct_entry_distance2(entry) > s->limit2) continue;
-        uint32_t ref = (uint32_t)entry;
-        if (ref & FCT_REF_LEAF) {
-            search_leaf(s, fct_bvh_leaf(bvh, ref));
-            continue;
-        }
-        float distance2[8];
-        const uint32_t *child;
-        uint32_t met = fct_measure_children(bvh, ref, &s->at, s->limit2, distance2, &child);
-        ++s->visits.nodes;
-        s->visits.boxes += 8;
-        height = fct_push_children(bvh, stack, height, met, distance2, child);
-    }
-    measure_waiting(s);
-}
-
 /* The corners come from the leaf, which is in the cache: unscaling them is exact. */
 static void report_face(const search *s, double distance2, fct_near *out) {
     v3 p[3];
@@ -166,7 +145,7 @@ static void report_face(const search *s, double distance2, fct_near *out) {
     fct_leaf_triangle(s->leaf, s->place - s->leaf->first, p);
     *out = (fct_near){.distance2 = distance2 / scale / scale, .u = s->u, .v = s->v, .place = s->place};
     v3 scaled = v3_add(v3_scale(p[0], 1 - s->u - s->v), v3_add(v3_scale(p[1], s->u), v3_scale(p[2], s->v)));
-    out->point = v3_scale(v3_add(scaled, v3_load(s->bvh->offset)), 1 / scale);
+    out->point = fct_bvh_from_scaled(s->bvh, scaled);
 }
 
 bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
@@ -181,7 +160,8 @@ bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double m
     double reach = max_distance * bvh->scale;
     s.best2 = reach * reach;
     set_bound(&s, sqrt(s.best2));
-    search_nodes(&s);
+    fct_descend(bvh, &s.at, &s.limit2, search_leaf, &s, &s.visits);
+    measure_waiting(&s);
     fct_visits_add(visits, &s.visits);
     if (s.place == FCT_NONE) return false;
     report_face(&s, normal ? s.facing2 : s.best2, out);

@@ -82,7 +82,8 @@ static void offer_face(several *s, const fct_leaf *leaf, uint32_t leaf_ref, uint
     if (s->count == s->k) set_reach(s, load_distance2(&s->heap[0]));
 }
 
-static void search_leaf(several *s, uint32_t ref) {
+static void search_leaf(void *user, uint32_t ref) {
+    several *s = user;
     const fct_leaf *leaf = fct_bvh_leaf(s->bvh, ref);
     fct_near_vertices vertices;
     fct_near_vertices_load(leaf, &s->at, &vertices);
@@ -95,28 +96,6 @@ static void search_leaf(several *s, uint32_t ref) {
     }
 }
 
-static void search_nodes(several *s) {
-    const fct_bvh *bvh = s->bvh;
-    uint64_t stack[FCT_STACK_SIZE];
-    uint32_t height = 1;
-    stack[0] = bvh->root;
-    while (height) {
-        uint64_t entry = stack[--height];
-        if (fct_entry_distance2(entry) > s->limit2) continue;
-        uint32_t ref = (uint32_t)entry;
-        if (ref & FCT_REF_LEAF) {
-            search_leaf(s, ref);
-            continue;
-        }
-        float distance2[8];
-        const uint32_t *child;
-        uint32_t met = fct_measure_children(bvh, ref, &s->at, s->limit2, distance2, &child);
-        ++s->visits.nodes;
-        s->visits.boxes += 8;
-        height = fct_push_children(bvh, stack, height, met, distance2, child);
-    }
-}
-
 /* Turns an item of the heap into an answer, as fct_bvh_closest_point gives it. */
 static void fill_item(const several *s, fct_closest *item) {
     const fct_leaf *leaf = fct_bvh_leaf(s->bvh, item->place);
@@ -125,7 +104,7 @@ static void fill_item(const several *s, fct_closest *item) {
     double u, v, scale = s->bvh->scale, d2 = measure_face(s, leaf, number, &nearest, &u, &v);
     fct_leaf_triangle(leaf, number, p);
     v3 scaled = v3_add(v3_scale(p[0], 1 - u - v), v3_add(v3_scale(p[1], u), v3_scale(p[2], v)));
-    v3_store(item->point, v3_scale(v3_add(scaled, v3_load(s->bvh->offset)), 1 / scale));
+    v3_store(item->point, fct_bvh_from_scaled(s->bvh, scaled));
     item->distance = (float)sqrt(d2 / scale / scale);
     item->u = (float)u, item->v = (float)v;
     item->place = leaf->first + number;
@@ -137,7 +116,7 @@ uint32_t fct_several_search(const fct_bvh *bvh, v3 point, uint32_t k, double max
     s.at = fct_at_make(bvh, s.point);
     double reach = max_distance * bvh->scale;
     set_reach(&s, reach * reach);
-    search_nodes(&s);
+    fct_descend(bvh, &s.at, &s.limit2, search_leaf, &s, &s.visits);
     fct_sift_sort(out, s.count, is_nearer, swap_items);
     for (uint32_t i = 0; i < s.count; ++i) fill_item(&s, &out[i]);
     fct_visits_add(visits, &s.visits);

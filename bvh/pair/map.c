@@ -17,7 +17,7 @@ fct_pose fct_pose_identity(void) {
 
 /* The centre of a model, unscaled. */
 static v3 find_center(const fct_bvh *bvh) {
-    return v3_scale(v3_add(v3_load(bvh->offset), v3_load(bvh->center)), 1 / bvh->scale);
+    return fct_bvh_from_scaled(bvh, v3_load(bvh->center));
 }
 
 static double sum_sizes(v3 a) {

@@ -10,8 +10,8 @@
  */
 #include "bvh/ray/traverse.h"
 
-#include "base/key.h"
 #include "base/math/simd.h"
+#include "bvh/entry.h"
 
 /* The nearest hits so far, sorted. */
 typedef struct hit_list {
@@ -278,37 +278,18 @@ static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
     return leaf->vertex_octets == 2 ? test_triangles(t, leaf, 2, any) : test_triangles(t, leaf, 1, any);
 }
 
-/* A pending child: the bits of the entry distance, then the reference. The distance is not negative, so the
- * entries sort by distance. */
-static inline uint64_t make_entry(float enter, uint32_t ref) {
-    return (uint64_t)fct_float_bits(enter) << 32 | ref;
-}
-
-static inline float entry_distance(uint64_t entry) {
-    return fct_float_of_bits((uint32_t)(entry >> 32));
-}
-
-/* Prefetches 256 bytes: an axis node, or the largest leaf. */
-static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
-    const char *at = ref & FCT_REF_LEAF ? (const char *)fct_bvh_leaf(bvh, ref) : fct_bvh_node(bvh, ref);
-    __builtin_prefetch(at);
-    __builtin_prefetch(at + 64);
-    __builtin_prefetch(at + 128);
-    __builtin_prefetch(at + 192);
-}
-
 /* Pushes all children in the mask but the nearest, sorted, and returns the nearest. The mask is not empty.
  * Most nodes have one or two such children. */
 static inline uint64_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t *height, uint32_t met,
                                      const float enter[8], const uint32_t child[8]) {
     uint32_t i = (uint32_t)__builtin_ctz(met);
-    uint64_t nearest = make_entry(enter[i], child[i]);
-    prefetch_child(bvh, child[i]);
+    uint64_t nearest = fct_entry_make(enter[i], child[i]);
+    fct_prefetch_child(bvh, child[i]);
     uint32_t base = *height;
     for (met &= met - 1; met; met &= met - 1) {
         i = (uint32_t)__builtin_ctz(met);
-        uint64_t entry = make_entry(enter[i], child[i]);
-        prefetch_child(bvh, child[i]);
+        uint64_t entry = fct_entry_make(enter[i], child[i]);
+        fct_prefetch_child(bvh, child[i]);
         uint64_t waiting = entry < nearest ? nearest : entry;
         nearest = entry < nearest ? entry : nearest;
         uint32_t at = (*height)++;
@@ -323,7 +304,7 @@ static inline bool traverse_nodes(traversal *t, bool any) {
     const fct_bvh *bvh = t->bvh;
     wide_ray wide = widen_ray(bvh, r);
     float t_min = r->t_min;
-    uint64_t stack[FCT_STACK_SIZE], entry = make_entry(t_min, bvh->root);
+    uint64_t stack[FCT_STACK_SIZE], entry = fct_entry_make(t_min, bvh->root);
     uint32_t height = 0;
     bool found = false;
     for (;;) {
@@ -355,7 +336,7 @@ static inline bool traverse_nodes(traversal *t, bool any) {
         do {
             if (height == 0) return found;
             entry = stack[--height];
-        } while (entry_distance(entry) > t->hit.t);
+        } while (fct_entry_distance(entry) > t->hit.t);
     }
 }
 

@@ -143,9 +143,9 @@ FCT_API void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const floa
 /* The generalised winding number of the surface about a point (Jacobson, Kavan, Sorkine-Hornung 2013): the
  * sum of the signed solid angles of the faces over 4 pi. About a closed surface whose faces wind outwards it
  * is 1 inside and 0 outside; inwards, -1 inside. Holes and overlaps change it smoothly. Far clusters count by
- * their moments up to the third (Barill et al. 2018): the result errs by less than .001 on scans. NaN for a
- * bvh that was built without FCT_BVH_SIGN, for the Embree backend, and if the point is not finite. visits may
- * be NULL. */
+ * their moments up to the third (Barill et al. 2018): the result errs by less than .001 on scans. The result
+ * is NaN if the bvh was built without FCT_BVH_SIGN or with the Embree backend, or if the point is not finite.
+ * visits may be NULL. */
 FCT_API double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visits *visits);
 /* fct_bvh_closest_point, with a negative distance where the winding number is above .5 or below -.5: inside
  * of a closed surface, however its faces wind, also where parts overlap or small holes are open. The sum of

@@ -302,7 +302,7 @@ static void contacts_of_flat_faces(void **state) {
     model_release(&env, &b);
 }
 
-/* Many poses at once: the same answers as one by one, for every number of threads. */
+/* A batch of poses gives the answers of single calls, with any number of threads. */
 static void batches(void **state) {
     (void)state;
     fct_env env = fct_env_default();

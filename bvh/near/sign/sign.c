@@ -3,11 +3,8 @@
  * The sign only needs to know whether |w| is above .5. So the first sum uses moments of clusters that are
  * close to the point. If its result is not clear, a more precise sum follows, and then that of all faces.
  */
-#include "base/parallel.h"
-#include "bvh/near/nearest.h"
+#include "bvh/near/points.h"
 #include "bvh/near/sign/winding.h"
-
-enum { CHUNK = 256 }; /* points per task */
 
 /* The reach of fct_bvh_winding_number. The greatest errors measured are 2e-4 on scans, and 5e-4 on a sphere
  * whose vertices are moved by up to .4 of its radius; with 2.5 they are 7e-4 and 1.6e-3. */
@@ -41,22 +38,7 @@ bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max
     return true;
 }
 
-typedef struct point_batch {
-    const fct_bvh *bvh;
-    const float *points;
-    float max_distance;
-    fct_closest *out;
-} point_batch;
-
-static void find_signed_distances(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
-    (void)chunk, (void)thread;
-    const point_batch *b = user;
-    for (size_t i = begin; i < end; ++i)
-        fct_bvh_signed_distance(b->bvh, b->points + 3 * i, b->max_distance, &b->out[i], NULL);
-}
-
 void fct_bvh_signed_distances(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                               fct_closest *out) {
-    point_batch batch = {.bvh = bvh, .points = points, .max_distance = max_distance, .out = out};
-    fct_parallel_for(bvh->env, count, CHUNK, find_signed_distances, &batch);
+    fct_ask_points(bvh, fct_bvh_signed_distance, count, points, max_distance, out);
 }
