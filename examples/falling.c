@@ -5,7 +5,7 @@
  * depend on single faces. Friction is a spring between the bodies, which slides at the Coulomb limit. Each
  * run gives the same frames, for any number of threads.
  *
- * Writes falling-0.ply to falling-3.ply. usage: falling
+ * Writes falling-0.ply to falling-3.ply, with y up, while z is up here. usage: falling
  */
 #include <math.h>
 #include <stdio.h>
@@ -311,7 +311,7 @@ static fct_result save_world(const world *w, int number) {
         for (uint32_t v = 0; v < mesh->vertex_count; ++v, ++vertex) {
             vec p = place_vertex(w, i, v);
             float *to = all.positions + 3 * (size_t)vertex;
-            to[0] = (float)p.x, to[1] = (float)p.y, to[2] = (float)p.z;
+            to[0] = (float)p.x, to[1] = (float)p.z, to[2] = (float)-p.y;
         }
     }
     char name[32];
