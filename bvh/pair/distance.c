@@ -38,7 +38,6 @@ typedef struct distance_search {
     double upper;      /* the least distance is not more, scaled; infinity until a pair is known */
     double reach;      /* a pair must have a lower bound of at most this, scaled */
     float limit2;      /* its square, rounded up */
-    bool found;        /* best is new */
     bool done;         /* the rest cannot matter */
     double to_limit_b; /* squared distances in b's unit, times this, are lower bounds in a's unit */
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
@@ -48,7 +47,7 @@ typedef struct distance_search {
 } distance_search;
 
 static bool is_enough(const distance_search *s) {
-    return s->found && sqrt(s->best.distance2) <= s->enough;
+    return s->best.place_a != FCT_NONE && sqrt(s->best.distance2) <= s->enough;
 }
 
 /* The tolerances count once a pair is known that is near enough. */
@@ -70,7 +69,6 @@ static void measure_pair(distance_search *s, uint32_t place_a, uint32_t place_b)
     double d2 = fct_triangles_distance(p, q, &at_a, &at_b);
     if (!(d2 < s->best.distance2 || (d2 == s->best.distance2 && s->best.place_a == FCT_NONE))) return;
     s->best = (fct_near_pair){d2, at_a, at_b, place_a, place_b};
-    s->found = true;
     s->upper = fct_min(s->upper, sqrt(d2) * s->map->a->scale);
     set_limit(s);
 }
@@ -101,26 +99,38 @@ static void add_candidate(distance_search *s, float distance, float error, uint3
         settle_candidates(s);
 }
 
-/* The pairs of a triangle of b and triangles [first, first + 8) of a that may be near enough. */
-static void measure_octet(distance_search *s, const fct_leaf *a, const placed_leaf *placed_a,
-                          const triangle_boxes *boxes_a, uint32_t first, const lane_triangles *one,
-                          const float low[3], const float high[3], const fct_leaf_maps *maps,
-                          uint32_t place_b) {
-    uint32_t left = a->count - first, used = left < 8 ? (1u << left) - 1 : 0xffu;
-    f8 bound = bound_triangles(boxes_a, first, low, high, maps->slack);
+/* A leaf of a in the coordinates of its box. */
+typedef struct measured_leaf {
+    const fct_leaf *leaf;
+    placed_leaf placed;
+    triangle_boxes boxes;
+} measured_leaf;
+
+/* A face of b there. */
+typedef struct measured_face {
+    lane_triangles lanes;
+    float low[3], high[3]; /* its box */
+    uint32_t place;
+} measured_face;
+
+/* The pairs of a face of b and triangles [first, first + 8) of a that may be near enough. */
+static void measure_octet(distance_search *s, const measured_leaf *a, uint32_t first, const measured_face *b,
+                          const fct_leaf_maps *maps) {
+    uint32_t left = a->leaf->count - first, used = left < 8 ? (1u << left) - 1 : 0xffu;
+    f8 bound = bound_triangles(&a->boxes, first, b->low, b->high, maps->slack);
     uint32_t open = f8_le(bound, f8_set(s->limit2)) & used;
     if (!open) return;
-    eight_triangles eight = pick_triangles(a, placed_a, first / 8);
+    eight_triangles eight = pick_triangles(a->leaf, &a->placed, first / 8);
     float distance[8];
-    f8_store(distance, f8_sqrt(f8_max(find_distances2(&eight, one), bound)));
+    f8_store(distance, f8_sqrt(f8_max(find_distances2(&eight, &b->lanes), bound)));
     /* Triangles that meet may be far apart along their edges, but their boxes meet too. */
     uint32_t touching = f8_le(bound, f8_set(0));
     for (; open && !s->done; open &= open - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(open), place_a = a->first + first + i;
+        uint32_t i = (uint32_t)__builtin_ctz(open), place_a = a->leaf->first + first + i;
         if (touching >> i & 1)
-            measure_pair(s, place_a, place_b);
+            measure_pair(s, place_a, b->place);
         else
-            add_candidate(s, distance[i], DISTANCE_ERROR * maps->size + maps->slack, place_a, place_b);
+            add_candidate(s, distance[i], DISTANCE_ERROR * maps->size + maps->slack, place_a, b->place);
     }
 }
 
@@ -142,43 +152,54 @@ static void search_far_leaves(distance_search *s, const fct_leaf *a, const fct_l
                 measure_pair(s, a->first + i, b->first + j);
 }
 
+/* Faces of leaf b whose boxes are near enough to the box of leaf a. */
+static uint32_t find_near_faces(const distance_search *s, const fct_leaf *b, const triangle_boxes *boxes,
+                                const fct_leaf_maps *maps) {
+    uint32_t open = 0;
+    float low[3];
+    for (int k = 0; k < 3; ++k) low[k] = -maps->half_a[k];
+    for (uint32_t first = 0; first < b->count; first += 8)
+        open |= f8_le(bound_triangles(boxes, first, low, maps->half_a, maps->slack), f8_set(s->limit2))
+                << first;
+    return open & ((1u << b->count) - 1);
+}
+
 static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     const fct_pair_map *map = s->map;
-    const fct_leaf *a = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a)),
-                   *b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
+    const fct_leaf *b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
+    measured_leaf a;
     fct_leaf_maps maps;
-    triangle_boxes boxes_a, boxes_b;
-    float low[3], high[3], corners[3][3][16];
+    triangle_boxes boxes_b;
+    float corners[3][3][16];
+    a.leaf = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a));
     fct_leaf_maps_set(map, box_a, box_b, &maps);
     if ((double)maps.size > FAR_CENTER) {
-        search_far_leaves(s, a, b);
+        search_far_leaves(s, a.leaf, b);
         return;
     }
     placed_leaf placed_b = place_leaf(b, &maps.of_b);
     find_triangle_boxes(b, &placed_b, &boxes_b);
-    for (int k = 0; k < 3; ++k) low[k] = -maps.half_a[k], high[k] = maps.half_a[k];
-    uint32_t open_b = 0;
-    for (uint32_t first = 0; first < b->count; first += 8)
-        open_b |= f8_le(bound_triangles(&boxes_b, first, low, high, maps.slack), f8_set(s->limit2)) << first;
-    open_b &= (1u << b->count) - 1;
-    if (!open_b) return;
+    uint32_t open = find_near_faces(s, b, &boxes_b, &maps);
+    if (!open) return;
     for (uint32_t octet = 0; octet < fct_leaf_octets(b); ++octet) {
         eight_triangles t = pick_triangles(b, &placed_b, octet);
         for (int c = 0; c < 3; ++c)
             for (int k = 0; k < 3; ++k) f8_store(corners[c][k] + 8 * octet, t.p[c][k]);
     }
-    placed_leaf placed_a = place_leaf(a, &maps.of_a);
-    find_triangle_boxes(a, &placed_a, &boxes_a);
-    for (; open_b && !s->done; open_b &= open_b - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(open_b);
+    a.placed = place_leaf(a.leaf, &maps.of_a);
+    find_triangle_boxes(a.leaf, &a.placed, &a.boxes);
+    for (; open && !s->done; open &= open - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(open);
+        measured_face face;
         float p[3][3];
+        face.place = b->first + i;
         for (int k = 0; k < 3; ++k) {
-            low[k] = boxes_b.low[k][i], high[k] = boxes_b.high[k][i];
+            face.low[k] = boxes_b.low[k][i], face.high[k] = boxes_b.high[k][i];
             for (int c = 0; c < 3; ++c) p[c][k] = corners[c][k][i];
         }
-        lane_triangles one = spread_triangle(p);
-        for (uint32_t first = 0; first < a->count && !s->done; first += 8)
-            measure_octet(s, a, &placed_a, &boxes_a, first, &one, low, high, &maps, b->first + i);
+        face.lanes = spread_triangle((const float(*)[3])p);
+        for (uint32_t first = 0; first < a.leaf->count && !s->done; first += 8)
+            measure_octet(s, &a, first, &face, &maps);
     }
 }
 
@@ -252,7 +273,7 @@ static void search_nodes(distance_search *s) {
     }
 }
 
-bool fct_distance_search(const fct_pair_map *map, double relative, double absolute, double enough,
+void fct_distance_search(const fct_pair_map *map, double relative, double absolute, double enough,
                          fct_near_pair *best, fct_visits *visits) {
     distance_search s = {
         .map = map, .relative = relative, .absolute = absolute, .enough = enough, .best = *best};
@@ -261,12 +282,9 @@ bool fct_distance_search(const fct_pair_map *map, double relative, double absolu
     s.placed_a.box = s.placed_b.box = FCT_NONE;
     s.maximum = sqrt(best->distance2) * map->a->scale;
     s.upper = best->place_a != FCT_NONE ? s.maximum : INFINITY;
-    s.found = best->place_a != FCT_NONE;
     set_limit(&s);
-    s.found = false;
     search_nodes(&s);
     settle_candidates(&s);
     fct_visits_add(visits, &s.visits);
-    if (s.found) *best = s.best;
-    return s.found;
+    *best = s.best;
 }

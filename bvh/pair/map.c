@@ -3,10 +3,10 @@
 
 #include "bvh/pair/pose.h"
 
-/* Errors of float arithmetic on a placed box, in units of u = 2^-24 of the lengths that meet: its centre, its
- * half extents and the other model's extent. The separation along an edge direction has the longest chain: a
- * dot product (4 u), twice a product with a rotation that errs by 4 u, and the sum of four radii (6 u each).
- * 64 u covers it. */
+/* What float arithmetic on a placed box errs by, as a share of the lengths that meet: its centre, its half
+ * extents and the other model's extent. With u = 2^-24, an axis errs by 4 u, a product of two axes by 8 u,
+ * and the vector between the centres along an axis by 8 u. Along a product of two axes, this vector then errs
+ * by 36 u and the radii by 20 u. */
 #define FLOAT_ERROR 0x1p-18
 /* No vertex of a model is farther from its centre. */
 #define MODEL_RADIUS 1.75

@@ -29,10 +29,10 @@ typedef struct fct_near_pair {
 } fct_near_pair;
 
 /* The nearest faces. *best is a pair already known, or has places FCT_NONE and the square of the largest
- * distance that counts; returns whether it is replaced. The result may exceed the least distance d by
- * relative d + absolute. Stops at once at a pair within `enough`. */
+ * distance that counts; a nearer pair replaces it. The result may exceed the least distance d by relative d +
+ * absolute. Stops at once at a pair within `enough`. */
 #define fct_distance_search FCT_KERNEL(fct_distance_search)
-FCT_DECLARE_KERNEL(bool, fct_distance_search,
+FCT_DECLARE_KERNEL(void, fct_distance_search,
                    (const fct_pair_map *map, double relative, double absolute, double enough,
                     fct_near_pair *best, fct_visits *visits));
 
