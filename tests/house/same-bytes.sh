@@ -11,15 +11,15 @@ trap 'rm -rf "$here"' EXIT
 cd "$here" || exit 2
 bad=0 runs=0
 
-# make_inputs FOLDER TRIANGLES: a mesh with and without colours, rays, points, poses and a scene.
+# make_inputs FOLDER TRIANGLES: a mesh, a scene, and rays, points and poses on all sides of the mesh (.6 x .95 x .4, on y = 0).
 make_inputs() {
     mkdir -p "$1" && cd "$1" || exit 2
     "$program" make bust -o mesh.ply --triangles "$2" --quiet || exit 2
     "$program" make cornell -o cornell --triangles 100 --quiet || exit 2
-    awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f 3 %.6f %.6f -1\n", sin(i), cos(3 * i), sin(7 * i) / 3, cos(5 * i) / 3 }' >rays.txt
-    awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f %.6f\n", 2 * sin(i), cos(3 * i), 2 * sin(7 * i) }' >points.txt
+    awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f 3 %.6f %.6f -1\n", sin(i) / 3, .5 + cos(3 * i) / 2, sin(7 * i) / 20, cos(5 * i) / 20 }' >rays.txt
+    awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f %.6f\n", sin(i) / 3, .5 + cos(3 * i), sin(7 * i) / 3 }' >points.txt
     awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.9f %.9f 0 %.6f %.9f %.9f 0 %.6f 0 0 1 %.6f\n",
-        cos(i), -sin(i), 3 * sin(i), sin(i), cos(i), 2 * cos(3 * i), sin(7 * i) }' >poses.txt
+        cos(i), -sin(i), sin(i) / 2, sin(i), cos(i), cos(3 * i), sin(7 * i) / 3 }' >poses.txt
     cd "$here" || exit 2
 }
 
