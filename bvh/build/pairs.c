@@ -73,7 +73,7 @@ fct_result fct_pairs_build(fct_bvh *bvh, const fct_leaf_list *leaves, const fct_
     bvh->pair_count = wide->count + 1;
     bvh->pairs = fct_allocate(bvh->env, bvh->pair_count, sizeof *bvh->pairs);
     if (!bvh->pairs) return fct_fail_memory(bvh->env, "the nodes of a pair structure");
-    fct_slabs root = fct_slabs_fit(bvh, leaves, top, &top->nodes[0]);
+    fct_slabs root = fct_slabs_fit(bvh, leaves, top, &top->nodes[0], &wide->spans[0]);
     clear_node(&bvh->pairs[0]);
     fct_pack_pair_box(&root, 0, &bvh->pairs[0]);
     bvh->pairs[0].child[0] = wide->count ? 1 : FCT_REF_LEAF | leaves->offsets[0];

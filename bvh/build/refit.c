@@ -103,8 +103,9 @@ static bool fit_below(const refit_job *job, bool pairs, uint32_t ref, fct_slabs 
             height += list_children(job->bvh, pairs, ref, stack + height);
             continue;
         }
-        moved |= job->moved[ref & ~FCT_REF_LEAF];
-        for (int i = 0; i < 2; ++i) fct_slabs_hold(job->bvh, fct_bvh_leaf(job->bvh, ref), &slabs[i]);
+        const uint32_t offset = ref & ~FCT_REF_LEAF, only = 0;
+        moved |= job->moved[offset];
+        for (int i = 0; i < 2; ++i) fct_slabs_hold(job->bvh, &offset, &only, 1, &slabs[i]);
     }
     return moved;
 }

@@ -12,56 +12,53 @@ double fct_slabs_area(const fct_slabs *s) {
                          s->upper[2] - s->lower[2] + pad);
 }
 
-static bool holds_places(const fct_tree *tree, uint32_t node, uint32_t first, uint32_t last) {
-    uint32_t begin = fct_node_first(tree, node);
-    return begin <= first && last <= begin + fct_node_faces(tree, node);
+static bool holds_places(const fct_tree *tree, uint32_t node, const fct_span *span) {
+    const uint32_t begin = fct_node_first(tree, node);
+    return begin <= span->first && span->last <= begin + fct_node_faces(tree, node);
 }
 
-/* The smallest cluster whose places include [first, last). FCT_NONE if no cluster does, or if the tree has
- * more than MOST_ROOTS roots. */
-static uint32_t find_enclosing_cluster(const fct_tree *tree, uint32_t first, uint32_t last) {
+/* The root whose places include those of the span. FCT_NONE if none does, or if there are more than
+ * MOST_ROOTS.
+ */
+static uint32_t find_enclosing_root(const fct_tree *tree, const fct_span *span) {
     const fct_tree_view *view = &tree->view;
-    uint32_t node = FCT_NONE;
-    for (uint32_t r = 0; r < view->root_count && view->root_count <= MOST_ROOTS && node == FCT_NONE; ++r) {
-        uint32_t root = view->roots[r];
-        if (root >= view->node_count) continue;
-        if (holds_places(tree, root, first, last)) node = root;
-    }
-    for (uint32_t next = node; next != FCT_NONE;) {
-        node = next, next = FCT_NONE;
-        for (int i = 0; i < 2; ++i) {
-            uint32_t child = fct_node_child(tree, node, i);
-            if (child >= view->node_count) continue;
-            if (holds_places(tree, child, first, last)) next = child;
-        }
+    for (uint32_t r = 0; r < view->root_count && view->root_count <= MOST_ROOTS; ++r)
+        if (holds_places(tree, view->roots[r], span)) return view->roots[r];
+    return FCT_NONE;
+}
+
+/* The smallest cluster below `node` whose places include those of the span, as those of the node do. */
+static uint32_t find_smallest(const fct_tree *tree, uint32_t node, const fct_span *span) {
+    while (node < tree->view.node_count) {
+        const uint32_t left = fct_node_child(tree, node, 0), right = fct_node_child(tree, node, 1);
+        if (holds_places(tree, left, span))
+            node = left;
+        else if (holds_places(tree, right, span))
+            node = right;
+        else
+            break;
     }
     return node;
 }
 
-void fct_slabs_clear(fct_slabs *s) {
-    for (int k = 0; k < 3; ++k) s->lower[k] = INFINITY, s->upper[k] = -INFINITY;
-}
-
-void fct_slabs_hold(const fct_bvh *bvh, const fct_leaf *leaf, fct_slabs *s) {
-    v3 center = v3_load(bvh->center);
-    const float *rows = fct_leaf_vertices(leaf);
-    uint32_t stride = 8u * leaf->vertex_octets;
-    for (uint32_t j = 0; j < stride; ++j) {
-        v3 p = v3_make((double)rows[j] - center.x, (double)rows[stride + j] - center.y,
-                       (double)rows[2 * stride + j] - center.z);
-        for (int k = 0; k < 3; ++k) {
-            double at = v3_dot(p, s->axes[k]);
-            if (at < s->lower[k]) s->lower[k] = at;
-            if (at > s->upper[k]) s->upper[k] = at;
+/* Sets the enclosing clusters, from the root down: that of a node lies below that of its parent. */
+static void find_enclosing(const fct_tree *tree, const fct_top *top, fct_span *spans) {
+    spans[0].enclosing = FCT_NONE;
+    for (uint32_t n = 0; n < top->node_count; ++n) {
+        const fct_top_node *node = &top->nodes[n];
+        fct_span *s = &spans[n];
+        if (node->left == FCT_NONE) {
+            s->enclosing = s->largest;
+            continue;
         }
+        if (s->enclosing == FCT_NONE) s->enclosing = find_enclosing_root(tree, s);
+        if (s->enclosing != FCT_NONE) s->enclosing = find_smallest(tree, s->enclosing, s);
+        spans[node->left].enclosing = spans[node->right].enclosing = s->enclosing;
     }
 }
 
-/* Fits the slabs to the vertices of `count` leaves. */
-static void fit_slabs(const fct_bvh *bvh, const fct_leaf_list *leaves, const uint32_t *order, uint32_t count,
-                      fct_slabs *s) {
-    fct_slabs_clear(s);
-    for (uint32_t i = 0; i < count; ++i) fct_slabs_hold(bvh, fct_bvh_leaf(bvh, leaves->offsets[order[i]]), s);
+void fct_slabs_clear(fct_slabs *s) {
+    for (int k = 0; k < 3; ++k) s->lower[k] = INFINITY, s->upper[k] = -INFINITY;
 }
 
 static void use_cluster_axes(const fct_bvh *bvh, uint32_t node, fct_slabs *s) {
@@ -80,29 +77,42 @@ static fct_slabs make_axis_slabs(const fct_bvh *bvh, const fct_top_node *node) {
     return s;
 }
 
-fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
-                        const fct_top_node *node) {
-    uint32_t first = FCT_NONE, last = 0, largest = 0;
-    double largest_area = -1;
-    for (uint32_t i = node->begin; i < node->end; ++i) {
-        uint32_t number = top->order[i];
-        const fct_leaf *leaf = fct_bvh_leaf(bvh, leaves->offsets[number]);
-        if (leaf->first < first) first = leaf->first;
-        if (leaf->first + leaf->count > last) last = leaf->first + leaf->count;
-        fct_cluster room;
-        uint32_t id = leaves->nodes[number];
-        double area = (double)fct_node_cluster(bvh->tree, id, &room)->area;
-        if (area > largest_area) largest_area = area, largest = id;
+fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
+                           fct_span **out) {
+    fct_span *spans = *out = fct_allocate(bvh->env, top->node_count, sizeof *spans);
+    if (!spans) return fct_fail_memory(bvh->env, "the nodes of a ray structure");
+    for (uint32_t n = top->node_count; n-- > 0;) {
+        const fct_top_node *node = &top->nodes[n];
+        if (node->left == FCT_NONE) {
+            const uint32_t number = top->order[node->begin], cluster = leaves->nodes[number];
+            const fct_leaf *leaf = fct_bvh_leaf(bvh, leaves->offsets[number]);
+            fct_cluster room;
+            spans[n] = (fct_span){.first = leaf->first,
+                                  .last = leaf->first + leaf->count,
+                                  .largest = cluster,
+                                  .area = fct_node_cluster(bvh->tree, cluster, &room)->area};
+        } else {
+            const fct_span *l = &spans[node->left], *r = &spans[node->right];
+            spans[n] = r->area > l->area ? *r : *l;
+            spans[n].first = l->first < r->first ? l->first : r->first;
+            spans[n].last = l->last > r->last ? l->last : r->last;
+        }
     }
-    fct_slabs best = make_axis_slabs(bvh, node);
+    find_enclosing(bvh->tree, top, spans);
+    return FCT_OK;
+}
+
+fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
+                        const fct_top_node *node, const fct_span *span) {
+    fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
-    uint32_t candidates[2] = {largest, find_enclosing_cluster(bvh->tree, first, last)};
+    const uint32_t candidates[2] = {span->largest, span->enclosing};
     for (int i = 0; i < 2; ++i) {
         if (candidates[i] == FCT_NONE || (i == 1 && candidates[1] == candidates[0])) continue;
-        fct_slabs s;
         use_cluster_axes(bvh, candidates[i], &s);
-        fit_slabs(bvh, leaves, top->order + node->begin, node->end - node->begin, &s);
-        double area = fct_slabs_area(&s);
+        fct_slabs_clear(&s);
+        fct_slabs_hold(bvh, leaves->offsets, top->order + node->begin, node->end - node->begin, &s);
+        const double area = fct_slabs_area(&s);
         if (area < best_area) best = s, best_area = area;
     }
     return best;

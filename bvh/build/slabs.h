@@ -2,6 +2,7 @@
 #ifndef FCT_BVH_SLABS_H
 #define FCT_BVH_SLABS_H
 
+#include "base/variant.h"
 #include "bvh/build/top.h"
 
 /* Three slabs that hold every vertex x: lower[i] <= axes[i] . (x - center) <= upper[i]. The axes are
@@ -18,13 +19,30 @@ static inline double fct_half_area(double x, double y, double z) {
 /* Half of the surface of the box, padded. */
 double fct_slabs_area(const fct_slabs *s);
 
-/* Empties the slabs of these axes, and widens them to hold the vertices of a leaf. */
+/* Empties the slabs of these axes. */
 void fct_slabs_clear(fct_slabs *s);
-void fct_slabs_hold(const fct_bvh *bvh, const fct_leaf *leaf, fct_slabs *s);
+/* Widens them to hold the vertices of leaves: of those at offsets[order[i]], i < count. */
+#define fct_slabs_hold FCT_KERNEL(fct_slabs_hold)
+FCT_DECLARE_KERNEL(void, fct_slabs_hold,
+                   (const fct_bvh *bvh, const uint32_t *offsets, const uint32_t *order, uint32_t count,
+                    fct_slabs *s));
+
+/* Of the leaves of a node of the top. */
+typedef struct fct_span {
+    uint32_t first, last; /* places [first, last) around all faces */
+    uint32_t largest;     /* the leaf's cluster of largest area */
+    uint32_t
+        enclosing; /* the smallest cluster with all faces; FCT_NONE if none, or if the tree has many roots */
+    float area;    /* of `largest` */
+} fct_span;
+
+/* One per node of the top. The caller releases *out. Errors: MEMORY. */
+fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
+                           fct_span **out);
 
 /* The slabs of least area of the leaves of a node of the top. Of three sets of axes: those of the smallest
  * face cluster that holds all its faces, those of its leaf of largest area, and the coordinate axes. */
 fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
-                        const fct_top_node *node);
+                        const fct_top_node *node, const fct_span *span);
 
 #endif

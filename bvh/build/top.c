@@ -4,11 +4,13 @@
  * of a tree that is split top-down. So this file splits the set of leaves, with 16 bins per axis (Wald 2007).
  * A set whose centres coincide, or that is SPLIT_DEPTH levels deep, is halved by count. This bounds the depth
  * of any input by FCT_TOP_DEPTH: 48 levels of splits and 32 of halving. Each leaf counts 1, whatever it
- * holds. O(n log n) on one thread, about 1 % of the time of clustering.
+ * holds. O(n log n), in parallel below nodes of PART_LEAVES leaves.
  */
 #include "bvh/build/top.h"
 
-enum { BIN_COUNT = 16, SPLIT_DEPTH = 48 };
+#include "base/parallel.h"
+
+enum { BIN_COUNT = 16, SPLIT_DEPTH = 48, PART_LEAVES = 2048 };
 
 typedef struct bin {
     float bounds[6];
@@ -21,8 +23,8 @@ static void clear_bounds(float b[6]) {
 
 static void join_bounds(float b[6], const float o[6]) {
     for (int k = 0; k < 3; ++k) {
-        if (o[k] < b[k]) b[k] = o[k];
-        if (o[3 + k] > b[3 + k]) b[3 + k] = o[3 + k];
+        b[k] = o[k] < b[k] ? o[k] : b[k];
+        b[3 + k] = o[3 + k] > b[3 + k] ? o[3 + k] : b[3 + k];
     }
 }
 
@@ -70,43 +72,56 @@ static void find_best_plane(const bin bins[BIN_COUNT], int axis, split *best) {
     }
 }
 
-/* Reorders [begin, end) of `order` into two parts, neither empty, and returns where the second part begins.
- */
-static uint32_t split_leaves(const float *bounds, uint32_t *order, uint32_t begin, uint32_t end,
-                             uint32_t depth) {
-    uint32_t middle = begin + (end - begin) / 2;
-    if (end - begin == 2 || depth >= SPLIT_DEPTH) return middle;
+/* The bins of an axis: of twice the centres, from `lower` on. An axis on which all centres coincide has the
+ * factor 0 and no bins. */
+typedef struct binning {
     float lower[3], factor[3];
-    for (int k = 0; k < 3; ++k) {
-        float low = INFINITY, high = -INFINITY;
-        for (uint32_t i = begin; i < end; ++i) {
-            float c = double_center(bounds + 6 * (size_t)order[i], k);
-            if (c < low) low = c;
-            if (c > high) high = c;
+    bin bins[3][BIN_COUNT];
+} binning;
+
+static void fill_bins(const float *bounds, const uint32_t *order, uint32_t count, binning *b) {
+    float high[3];
+    for (int k = 0; k < 3; ++k) b->lower[k] = INFINITY, high[k] = -INFINITY;
+    for (uint32_t i = 0; i < count; ++i) {
+        const float *box = bounds + 6 * (size_t)order[i];
+        for (int k = 0; k < 3; ++k) {
+            float c = double_center(box, k);
+            b->lower[k] = c < b->lower[k] ? c : b->lower[k];
+            high[k] = c > high[k] ? c : high[k];
         }
-        lower[k] = low;
-        /* The factor is a little smaller, so that the highest centre stays in the last bin. */
-        factor[k] = high > low ? (float)BIN_COUNT * (1 - 0x1p-20f) / (high - low) : 0;
-        if (!(factor[k] < INFINITY)) factor[k] = 0;
     }
-    split best = {.axis = -1, .cost = INFINITY};
     for (int k = 0; k < 3; ++k) {
-        if (factor[k] == 0) continue;
-        bin bins[BIN_COUNT];
-        for (int i = 0; i < BIN_COUNT; ++i) clear_bounds(bins[i].bounds), bins[i].count = 0;
-        for (uint32_t i = begin; i < end; ++i) {
-            const float *b = bounds + 6 * (size_t)order[i];
-            bin *into = &bins[find_bin(double_center(b, k), lower[k], factor[k])];
-            join_bounds(into->bounds, b);
+        /* The factor is a little smaller, so that the highest centre stays in the last bin. */
+        float width = high[k] - b->lower[k];
+        b->factor[k] = width > 0 ? (float)BIN_COUNT * (1 - 0x1p-20f) / width : 0;
+        if (!(b->factor[k] < INFINITY)) b->factor[k] = 0;
+        for (int i = 0; i < BIN_COUNT; ++i) clear_bounds(b->bins[k][i].bounds), b->bins[k][i].count = 0;
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        const float *box = bounds + 6 * (size_t)order[i];
+        for (int k = 0; k < 3; ++k) {
+            if (b->factor[k] == 0) continue;
+            bin *into = &b->bins[k][find_bin(double_center(box, k), b->lower[k], b->factor[k])];
+            join_bounds(into->bounds, box);
             ++into->count;
         }
-        find_best_plane(bins, k, &best);
     }
+}
+
+/* Reorders the leaves of a node into two parts, neither empty, and returns where the second part begins. */
+static uint32_t split_leaves(const float *bounds, uint32_t *order, const fct_top_node *node, uint32_t depth) {
+    uint32_t middle = node->begin + (node->end - node->begin) / 2;
+    if (node->end - node->begin == 2 || depth >= SPLIT_DEPTH) return middle;
+    binning b;
+    fill_bins(bounds, order + node->begin, node->end - node->begin, &b);
+    split best = {.axis = -1, .cost = INFINITY};
+    for (int k = 0; k < 3; ++k)
+        if (b.factor[k] != 0) find_best_plane(b.bins[k], k, &best);
     if (best.axis < 0) return middle;
-    uint32_t left = begin, right = end;
+    uint32_t left = node->begin, right = node->end;
     while (left < right) {
-        const float *b = bounds + 6 * (size_t)order[left];
-        if (find_bin(double_center(b, best.axis), lower[best.axis], factor[best.axis]) <= best.last) {
+        float c = double_center(bounds + 6 * (size_t)order[left], best.axis);
+        if (find_bin(c, b.lower[best.axis], b.factor[best.axis]) <= best.last) {
             ++left;
         } else {
             uint32_t moved = order[--right];
@@ -114,47 +129,110 @@ static uint32_t split_leaves(const float *bounds, uint32_t *order, uint32_t begi
             order[left] = moved;
         }
     }
-    return left > begin && left < end ? left : middle;
+    return left > node->begin && left < node->end ? left : middle;
 }
 
-/* Splits nodes until each holds one leaf. `stack` holds pairs of a node and its depth. */
-static void split_nodes(const float *bounds, fct_top *top, uint32_t *stack) {
-    uint32_t height = 0;
-    stack[height++] = 0, stack[height++] = 0;
+/* A node that is still to be split. */
+typedef struct pending {
+    uint32_t node, depth;
+} pending;
+
+/* Sets the bounds of a node. Gives it two children, `next` and next + 1, unless it holds one leaf: returns
+ * whether it did. */
+static bool split_node(const float *bounds, fct_top *top, pending at, uint32_t next) {
+    fct_top_node *node = &top->nodes[at.node];
+    clear_bounds(node->bounds);
+    for (uint32_t i = node->begin; i < node->end; ++i)
+        join_bounds(node->bounds, bounds + 6 * (size_t)top->order[i]);
+    if (node->end - node->begin == 1) return false;
+    uint32_t middle = split_leaves(bounds, top->order, node, at.depth);
+    node->left = next, node->right = next + 1;
+    fct_top_node child = {.left = FCT_NONE, .right = FCT_NONE, .begin = node->begin, .end = middle};
+    top->nodes[node->left] = child;
+    child.begin = middle, child.end = node->end;
+    top->nodes[node->right] = child;
+    return true;
+}
+
+/* Splits the nodes of more than PART_LEAVES leaves, and lists the others below them. Returns the number of
+ * the latter. */
+static uint32_t split_upper(const float *bounds, fct_top *top, pending *parts) {
+    pending stack[FCT_TOP_DEPTH + 2];
+    uint32_t height = 1, count = 0;
+    stack[0] = (pending){0, 0};
     while (height) {
-        uint32_t depth = stack[--height], number = stack[--height];
-        fct_top_node *node = &top->nodes[number];
-        clear_bounds(node->bounds);
-        for (uint32_t i = node->begin; i < node->end; ++i)
-            join_bounds(node->bounds, bounds + 6 * (size_t)top->order[i]);
-        if (node->end - node->begin == 1) continue;
-        uint32_t middle = split_leaves(bounds, top->order, node->begin, node->end, depth);
-        node->left = top->node_count++;
-        node->right = top->node_count++;
-        fct_top_node child = {.left = FCT_NONE, .right = FCT_NONE, .begin = node->begin, .end = middle};
-        top->nodes[node->left] = child;
-        child.begin = middle, child.end = node->end;
-        top->nodes[node->right] = child;
-        stack[height++] = node->right, stack[height++] = depth + 1;
-        stack[height++] = node->left, stack[height++] = depth + 1;
+        pending at = stack[--height];
+        if (top->nodes[at.node].end - top->nodes[at.node].begin <= PART_LEAVES) {
+            parts[count++] = at;
+            continue;
+        }
+        split_node(bounds, top, at, top->node_count);
+        stack[height++] = (pending){top->node_count + 1, at.depth + 1};
+        stack[height++] = (pending){top->node_count, at.depth + 1};
+        top->node_count += 2;
     }
+    return count;
+}
+
+typedef struct part_job {
+    const float *bounds;
+    fct_top *top;
+    const pending *parts;
+    const uint32_t *first; /* per part: the number of its first new node */
+} part_job;
+
+static void split_parts(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const part_job *job = user;
+    for (size_t i = begin; i < end; ++i) {
+        pending stack[FCT_TOP_DEPTH + 2];
+        uint32_t height = 1, next = job->first[i];
+        stack[0] = job->parts[i];
+        while (height) {
+            pending at = stack[--height];
+            if (!split_node(job->bounds, job->top, at, next)) continue;
+            stack[height++] = (pending){next + 1, at.depth + 1};
+            stack[height++] = (pending){next, at.depth + 1};
+            next += 2;
+        }
+    }
+}
+
+/* Splits nodes until each holds one leaf. A part of n leaves takes 2n - 2 new nodes, so the numbers of all
+ * nodes are known before the parts are split. */
+static fct_result split_all(const fct_env *env, const float *bounds, fct_top *top, uint32_t leaves) {
+    pending *parts;
+    uint32_t *first;
+    const fct_array scratch[] = {FCT_ARRAY(parts, leaves), FCT_ARRAY(first, leaves)};
+    fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "the top of a ray structure");
+    if (result != FCT_OK) return result;
+    const uint32_t count = split_upper(bounds, top, parts);
+    for (uint32_t i = 0; i < count; ++i) {
+        const fct_top_node *node = &top->nodes[parts[i].node];
+        first[i] = top->node_count;
+        top->node_count += 2 * (node->end - node->begin) - 2;
+    }
+    part_job job = {bounds, top, parts, first};
+    fct_parallel_for(env, count, 1, split_parts, &job);
+    fct_release_all(env, scratch, FCT_LENGTH(scratch));
+    return FCT_OK;
 }
 
 fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_top *out) {
     *out = (fct_top){0};
     fct_top top = {.node_count = 1};
-    top.nodes = fct_allocate(env, 2 * (size_t)leaves->count, sizeof *top.nodes);
-    top.order = fct_allocate(env, leaves->count, sizeof *top.order);
-    if (!top.nodes || !top.order) {
-        fct_top_release(env, &top);
-        return fct_fail_memory(env, "the top of a ray structure");
-    }
+    const fct_array arrays[] = {FCT_ARRAY(top.nodes, 2 * (size_t)leaves->count),
+                                FCT_ARRAY(top.order, leaves->count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the top of a ray structure");
+    if (result != FCT_OK) return result;
     for (uint32_t i = 0; i < leaves->count; ++i) top.order[i] = i;
     top.nodes[0] = (fct_top_node){.left = FCT_NONE, .right = FCT_NONE, .begin = 0, .end = leaves->count};
-    uint32_t stack[2 * (FCT_TOP_DEPTH + 2)];
-    split_nodes(leaves->bounds, &top, stack);
-    *out = top;
-    return FCT_OK;
+    result = split_all(env, leaves->bounds, &top, leaves->count);
+    if (result != FCT_OK)
+        fct_top_release(env, &top);
+    else
+        *out = top;
+    return result;
 }
 
 void fct_top_release(const fct_env *env, fct_top *top) {

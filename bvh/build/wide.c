@@ -21,7 +21,8 @@ static void fit_boxes(void *user, size_t begin, size_t end, size_t chunk, uint32
         const fct_wide_node *wide = &job->list->nodes[i];
         for (uint32_t k = 0; k < wide->count; ++k)
             job->list->boxes[8 * i + k] =
-                fct_slabs_fit(job->bvh, job->leaves, job->top, &job->top->nodes[wide->top[k]]);
+                fct_slabs_fit(job->bvh, job->leaves, job->top, &job->top->nodes[wide->top[k]],
+                              &job->list->spans[wide->top[k]]);
     }
 }
 
@@ -29,19 +30,20 @@ fct_result fct_wide_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const
                           fct_wide_list *out) {
     const fct_env *env = bvh->env;
     *out = (fct_wide_list){0};
-    if (leaves->count == 1) return FCT_OK;
-    fct_wide_list list = {.nodes = fct_allocate(env, leaves->count, sizeof *list.nodes)};
-    if (list.nodes) {
-        fct_result result = fct_collapse(env, top, list.nodes, &list.count);
-        if (result != FCT_OK) {
-            fct_wide_release(env, &list);
-            return result;
-        }
-        list.boxes = fct_allocate(env, list.count, 8 * sizeof *list.boxes);
+    fct_wide_list list = {0};
+    fct_result result = fct_spans_build(bvh, leaves, top, &list.spans);
+    if (result == FCT_OK && leaves->count > 1) {
+        list.nodes = fct_allocate(env, leaves->count, sizeof *list.nodes);
+        result = list.nodes ? fct_collapse(env, top, list.nodes, &list.count)
+                            : fct_fail_memory(env, "the nodes of a ray structure");
     }
-    if (!list.boxes) {
+    if (result == FCT_OK && list.count > 0) {
+        list.boxes = fct_allocate(env, list.count, 8 * sizeof *list.boxes);
+        if (!list.boxes) result = fct_fail_memory(env, "the nodes of a ray structure");
+    }
+    if (result != FCT_OK) {
         fct_wide_release(env, &list);
-        return fct_fail_memory(env, "the nodes of a ray structure");
+        return result;
     }
     box_job job = {.bvh = bvh, .leaves = leaves, .top = top, .list = &list};
     fct_parallel_for(env, list.count, NODE_CHUNK, fit_boxes, &job);
@@ -52,5 +54,6 @@ fct_result fct_wide_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const
 void fct_wide_release(const fct_env *env, fct_wide_list *list) {
     fct_release(env, list->nodes);
     fct_release(env, list->boxes);
+    fct_release(env, list->spans);
     *list = (fct_wide_list){0};
 }

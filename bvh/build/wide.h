@@ -9,6 +9,7 @@ typedef struct fct_wide_list {
     uint32_t count;       /* 0 if the model is one leaf */
     fct_wide_node *nodes; /* node 0 is the root; a node comes before its children */
     fct_slabs *boxes;     /* count x 8: the boxes of the children */
+    fct_span *spans;      /* per node of the top */
 } fct_wide_list;
 
 /* Collapses the binary top, and fits a box to each child. fct_wide_release frees *out. Errors: MEMORY. */

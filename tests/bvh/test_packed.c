@@ -2,6 +2,7 @@
 #include "packed.h"
 
 #include "bvh/build/collapse.h"
+#include "bvh/build/slabs.h"
 
 /* The documented padding of axis and oriented boxes: 64 and 256 times u = 2^-24. */
 #define U ldexp(1, -24)
@@ -256,7 +257,7 @@ static double best_binned_cost(const float *bounds, const uint32_t *order, uint3
 static void splits_of_the_top_have_the_least_binned_cost(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    enum { COUNT = 500 };
+    enum { COUNT = 5000 }; /* several parts */
     float bounds[6 * COUNT];
     uint64_t seed = 12;
     for (uint32_t i = 0; i < COUNT; ++i)
@@ -286,6 +287,71 @@ static void splits_of_the_top_have_the_least_binned_cost(void **state) {
         assert_true(cost <= best_binned_cost(bounds, top.order, node->begin, node->end) * (1 + 1e-5));
     }
     fct_top_release(&env, &top);
+}
+
+/* Boxes that share a plane, each a sixteenth as thick as the one before: a split takes one away. Then the
+ * same along another axis, where a split takes two. Sets at level 48 are halved. */
+static void nested_leaves_do_not_make_a_deep_top(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    enum { HALF = 36, COUNT = 2 * HALF };
+    float bounds[6 * COUNT] = {0};
+    for (int i = 0; i < COUNT; ++i) {
+        float *b = bounds + 6 * i;
+        b[1] = i < HALF ? -1 : 0;
+        b[3] = ldexpf(1, -4 * (i < HALF ? i : HALF));
+        b[4] = i < HALF ? 1 : ldexpf(1, -4 * (i - HALF));
+        b[5] = 1;
+    }
+    fct_leaf_list leaves = {.count = COUNT, .bounds = bounds};
+    fct_top top;
+    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    uint32_t depth[2 * COUNT] = {0}, deepest = 0;
+    for (uint32_t n = 0; n < top.node_count; ++n) {
+        if (depth[n] > deepest) deepest = depth[n];
+        if (top.nodes[n].left != FCT_NONE)
+            depth[top.nodes[n].left] = depth[top.nodes[n].right] = depth[n] + 1;
+    }
+    assert_in_range(deepest, 49, 53);
+    fct_top_release(&env, &top);
+}
+
+/* What lies below each node of the top, by trying every leaf and every cluster. */
+static void spans_name_the_clusters_around_their_leaves(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    model m = model_make(&env, make_pebble(&env, 24, 4), FCT_BACKEND_OBB);
+    const fct_tree_view *view = &m.bvh->view;
+    fct_leaf_list leaves;
+    fct_top top;
+    fct_span *spans;
+    char *packed = m.bvh->leaves;
+    assert_int_equal(fct_leaves_build(m.bvh, &leaves), FCT_OK);
+    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    assert_int_equal(fct_spans_build(m.bvh, &leaves, &top, &spans), FCT_OK);
+    for (uint32_t n = 0; n < top.node_count; ++n) {
+        uint32_t first = UINT32_MAX, last = 0, fewest = UINT32_MAX;
+        float area = 0;
+        for (uint32_t i = top.nodes[n].begin; i < top.nodes[n].end; ++i) {
+            fct_cluster c = cluster_of(m.bvh, leaves.nodes[top.order[i]]);
+            if (c.first < first) first = c.first;
+            if (c.first + c.count > last) last = c.first + c.count;
+            if (c.area > area) area = c.area;
+        }
+        for (uint32_t k = 0; k < view->node_count; ++k) {
+            fct_cluster c = cluster_of(m.bvh, k);
+            if (c.first <= first && c.first + c.count >= last && c.count < fewest) fewest = c.count;
+        }
+        assert_int_equal(spans[n].first, first);
+        assert_int_equal(spans[n].last, last);
+        assert_true(spans[n].area == area && cluster_of(m.bvh, spans[n].largest).area == area);
+        assert_int_equal(cluster_of(m.bvh, spans[n].enclosing).count, fewest);
+    }
+    fct_release(&env, spans);
+    fct_top_release(&env, &top);
+    fct_leaf_list_release(&env, &leaves);
+    fct_release(&env, packed);
+    model_release(&env, &m);
 }
 
 /* ---- The collapse to nodes of eight children ---- */
@@ -356,6 +422,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(boxes_hold_their_vertices_with_the_documented_padding),
         cmocka_unit_test(splits_of_the_top_have_the_least_binned_cost),
+        cmocka_unit_test(nested_leaves_do_not_make_a_deep_top),
+        cmocka_unit_test(spans_name_the_clusters_around_their_leaves),
         cmocka_unit_test(the_collapse_has_the_least_cost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
