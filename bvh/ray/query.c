@@ -1,10 +1,14 @@
 /* bvh/ray/query.c: the public ray queries, single and in batches, over either backend. */
+#include <string.h>
+
 #include "base/parallel.h"
 #include "bvh/ray/embree.h"
 #include "bvh/ray/traverse.h"
 
 /* Items per task of a batch: both are 1,024 rays. */
 enum { CLOSEST_CHUNK = 1024, WORD_CHUNK = 1024 / 64 };
+enum { TURNS_BYTES = 4 << 20 };
+enum { GROUP = 128 }; /* rays that are traversed together; of any hits, whole words */
 
 /* The scaled normal in the model's unit. If a float would overflow or vanish, the result is another positive
  * multiple of it. */
@@ -90,11 +94,47 @@ typedef struct ray_batch {
     uint64_t *occluded;
 } ray_batch;
 
+/* Rays that are prepared and then traversed together. */
+typedef struct ray_group {
+    uint32_t count, number[GROUP]; /* of each ray, from the first of the group */
+    fct_prepared_ray rays[GROUP];
+    fct_raw_hit hits[GROUP];
+} ray_group;
+
+/* Whether rays in turns gain: below this size the caches hold the model, and a ray hardly waits. */
+static bool takes_turns(const fct_bvh *bvh) {
+    return !bvh->embree && bvh->node_bytes + bvh->leaf_bytes > TURNS_BYTES;
+}
+
+/* Leaves out the rays that cannot hit. */
+static void traverse_group(const fct_bvh *bvh, const fct_ray *rays, size_t count, bool any, ray_group *g) {
+    g->count = 0;
+    for (uint32_t i = 0; i < count; ++i)
+        if (fct_ray_prepare(bvh, &rays[i], &g->rays[g->count])) g->number[g->count++] = i;
+    fct_traverse_many(bvh, g->count, g->rays, any, g->hits);
+}
+
 static void find_closest_hits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const ray_batch *batch = user;
-    for (size_t i = begin; i < end; ++i)
-        fct_bvh_closest_hit(batch->bvh, &batch->rays[i], &batch->hits[i], NULL);
+    const fct_bvh *bvh = batch->bvh;
+    ray_group g;
+    for (size_t first = begin; first < end; first += GROUP) {
+        const size_t count = end - first < GROUP ? end - first : GROUP;
+        const fct_ray *rays = batch->rays + first;
+        fct_hit *hits = batch->hits + first;
+        if (!takes_turns(bvh)) {
+            for (size_t i = 0; i < count; ++i) fct_bvh_closest_hit(bvh, &rays[i], &hits[i], NULL);
+            continue;
+        }
+        for (size_t i = 0; i < count; ++i) report_miss(&hits[i]);
+        traverse_group(bvh, rays, count, false, &g);
+        for (uint32_t i = 0; i < g.count; ++i) {
+            const uint32_t n = g.number[i];
+            if (g.hits[i].place != FCT_NONE)
+                report_hit(bvh, &rays[n], &g.hits[i], fct_ray_unscale_t(&g.rays[i], g.hits[i].t), &hits[n]);
+        }
+    }
 }
 
 void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, fct_hit *hits) {
@@ -106,11 +146,22 @@ void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays,
 static void find_any_hits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const ray_batch *batch = user;
-    for (size_t word = begin; word < end; ++word) {
-        uint64_t bits = 0;
-        for (size_t i = 64 * word; i < batch->count && i < 64 * word + 64; ++i)
-            bits |= (uint64_t)fct_bvh_any_hit(batch->bvh, &batch->rays[i], NULL) << (i % 64);
-        batch->occluded[word] = bits;
+    const fct_bvh *bvh = batch->bvh;
+    ray_group g;
+    for (size_t first = 64 * begin; first < 64 * end && first < batch->count; first += GROUP) {
+        const size_t left = (64 * end < batch->count ? 64 * end : batch->count) - first,
+                     count = left < GROUP ? left : GROUP;
+        const fct_ray *rays = batch->rays + first;
+        uint64_t *words = batch->occluded + first / 64;
+        memset(words, 0, (count + 63) / 64 * sizeof *words);
+        if (!takes_turns(bvh)) {
+            for (size_t i = 0; i < count; ++i)
+                words[i / 64] |= (uint64_t)fct_bvh_any_hit(bvh, &rays[i], NULL) << (i % 64);
+            continue;
+        }
+        traverse_group(bvh, rays, count, true, &g);
+        for (uint32_t i = 0; i < g.count; ++i)
+            words[g.number[i] / 64] |= (uint64_t)(g.hits[i].place != FCT_NONE) << (g.number[i] % 64);
     }
 }
 

@@ -13,6 +13,9 @@
 #include "base/math/simd.h"
 #include "bvh/entry.h"
 
+/* Rays of a batch that go on in turns. While one waits for memory, the others compute. */
+enum { LANES = 8 };
+
 /* The nearest hits so far, sorted. */
 typedef struct hit_list {
     const fct_ray *ray; /* the caller's */
@@ -299,50 +302,60 @@ static inline uint64_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32
     return nearest;
 }
 
-static inline bool traverse_nodes(traversal *t, bool any) {
-    const fct_prepared_ray *r = t->ray;
+/* Where a traversal stands: at an entry, with others waiting. */
+typedef struct position {
+    uint64_t entry;
+    uint32_t height;
+    uint64_t stack[FCT_STACK_SIZE];
+} position;
+
+static inline void enter_root(const traversal *t, position *at) {
+    at->entry = fct_entry_make(t->ray->t_min, t->bvh->root), at->height = 0;
+}
+
+/* Visits the node or leaf of the current entry, and goes on to the next. Returns false at the end. */
+static inline bool visit_next(traversal *t, const wide_ray *wide, position *at, bool any) {
     const fct_bvh *bvh = t->bvh;
-    wide_ray wide = widen_ray(bvh, r);
-    float t_min = r->t_min;
-    uint64_t stack[FCT_STACK_SIZE], entry = fct_entry_make(t_min, bvh->root);
-    uint32_t height = 0;
-    bool found = false;
-    for (;;) {
-        uint32_t ref = (uint32_t)entry;
-        if (ref & FCT_REF_LEAF) {
-            if (test_leaf(t, fct_bvh_leaf(bvh, ref), any)) {
-                found = true;
-                if (any) return true;
-            }
+    const uint32_t ref = (uint32_t)at->entry;
+    if (ref & FCT_REF_LEAF) {
+        if (test_leaf(t, fct_bvh_leaf(bvh, ref), any) && any) return false;
+    } else {
+        float enter[8];
+        const uint32_t *child;
+        uint32_t met;
+        ++t->visits.nodes;
+        if (ref & FCT_REF_ORIENTED) {
+            const fct_oriented_node *node = fct_bvh_node(bvh, ref);
+            met = meet_oriented_boxes(node, wide, t->ray->t_min, t->hit.t, enter);
+            child = node->child;
         } else {
-            float enter[8];
-            const uint32_t *child;
-            uint32_t met;
-            ++t->visits.nodes;
-            if (ref & FCT_REF_ORIENTED) {
-                const fct_oriented_node *node = fct_bvh_node(bvh, ref);
-                met = meet_oriented_boxes(node, &wide, t_min, t->hit.t, enter);
-                child = node->child;
-            } else {
-                const fct_axis_node *node = fct_bvh_node(bvh, ref);
-                met = meet_axis_boxes(node, &wide, t_min, t->hit.t, enter);
-                child = node->child;
-            }
-            if (met) {
-                entry = push_children(bvh, stack, &height, met, enter, child);
-                continue;
-            }
+            const fct_axis_node *node = fct_bvh_node(bvh, ref);
+            met = meet_axis_boxes(node, wide, t->ray->t_min, t->hit.t, enter);
+            child = node->child;
         }
-        do {
-            if (height == 0) return found;
-            entry = stack[--height];
-        } while (fct_entry_distance(entry) > t->hit.t);
+        if (met) {
+            at->entry = push_children(bvh, at->stack, &at->height, met, enter, child);
+            return true;
+        }
     }
+    do {
+        if (at->height == 0) return false;
+        at->entry = at->stack[--at->height];
+    } while (fct_entry_distance(at->entry) > t->hit.t);
+    return true;
 }
 
 static traversal begin_traversal(const fct_bvh *bvh, const fct_prepared_ray *ray) {
     return (traversal){
         .bvh = bvh, .ray = ray, .hit = {.t = ray->t_max, .place = FCT_NONE}, .visits = {0, 0, 0}};
+}
+
+static inline void traverse_nodes(traversal *t, bool any) {
+    const wide_ray wide = widen_ray(t->bvh, t->ray);
+    position at;
+    enter_root(t, &at);
+    while (visit_next(t, &wide, &at, any)) {
+    }
 }
 
 static v3 cross_sides(const traversal *t) {
@@ -351,26 +364,76 @@ static v3 cross_sides(const traversal *t) {
     return v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
 }
 
+/* The hit of a traversal that has ended. */
+static fct_raw_hit describe_hit(const traversal *t) {
+    fct_raw_hit hit = t->hit;
+    if (hit.place == FCT_NONE) return hit;
+    hit.u = (float)(t->weight[0] / t->weight[2]), hit.v = (float)(t->weight[1] / t->weight[2]);
+    hit.normal = cross_sides(t);
+    return hit;
+}
+
+static void add_visits(traversal *t, fct_visits *visits) {
+    t->visits.boxes = 8 * t->visits.nodes;
+    fct_visits_add(visits, &t->visits);
+}
+
 bool fct_traverse_closest(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_raw_hit *hit,
                           fct_visits *visits) {
     traversal t = begin_traversal(bvh, ray);
-    bool found = traverse_nodes(&t, false);
-    if (found) {
-        t.hit.u = (float)(t.weight[0] / t.weight[2]), t.hit.v = (float)(t.weight[1] / t.weight[2]);
-        t.hit.normal = cross_sides(&t);
-    }
-    *hit = t.hit;
-    t.visits.boxes = 8 * t.visits.nodes;
-    fct_visits_add(visits, &t.visits);
-    return found;
+    traverse_nodes(&t, false);
+    *hit = describe_hit(&t);
+    add_visits(&t, visits);
+    return hit->place != FCT_NONE;
 }
 
 bool fct_traverse_any(const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits) {
     traversal t = begin_traversal(bvh, ray);
-    bool found = traverse_nodes(&t, true);
-    t.visits.boxes = 8 * t.visits.nodes;
-    fct_visits_add(visits, &t.visits);
-    return found;
+    traverse_nodes(&t, true);
+    add_visits(&t, visits);
+    return t.hit.place != FCT_NONE;
+}
+
+/* A ray on its way. */
+typedef struct lane {
+    traversal t;
+    wide_ray wide;
+    position at;
+} lane;
+
+static inline void start_lane(lane *l, const fct_bvh *bvh, const fct_prepared_ray *ray) {
+    l->t = begin_traversal(bvh, ray);
+    l->wide = widen_ray(bvh, ray);
+    enter_root(&l->t, &l->at);
+}
+
+static inline void traverse_many(const fct_bvh *bvh, size_t count, const fct_prepared_ray *rays,
+                                 fct_raw_hit *hits, bool any) {
+    lane lanes[LANES], *running[LANES];
+    size_t next = 0, active = 0;
+    for (; active < LANES && next < count; ++active) {
+        running[active] = &lanes[active];
+        start_lane(running[active], bvh, &rays[next++]);
+    }
+    while (active) {
+        for (size_t i = 0; i < active; ++i) {
+            lane *l = running[i];
+            if (visit_next(&l->t, &l->wide, &l->at, any)) continue;
+            hits[l->t.ray - rays] = any ? l->t.hit : describe_hit(&l->t);
+            if (next < count)
+                start_lane(l, bvh, &rays[next++]);
+            else
+                running[i] = running[--active];
+        }
+    }
+}
+
+void fct_traverse_many(const fct_bvh *bvh, size_t count, const fct_prepared_ray *rays, bool any,
+                       fct_raw_hit *hits) {
+    if (any)
+        traverse_many(bvh, count, rays, hits, true);
+    else
+        traverse_many(bvh, count, rays, hits, false);
 }
 
 size_t fct_traverse_all(const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray,
@@ -379,7 +442,6 @@ size_t fct_traverse_all(const fct_bvh *bvh, const fct_ray *caller, const fct_pre
     traversal t = begin_traversal(bvh, ray);
     t.all = &all;
     traverse_nodes(&t, false);
-    t.visits.boxes = 8 * t.visits.nodes;
-    fct_visits_add(visits, &t.visits);
+    add_visits(&t, visits);
     return all.found;
 }

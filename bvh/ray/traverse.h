@@ -12,6 +12,12 @@ FCT_DECLARE_KERNEL(bool, fct_traverse_closest,
 #define fct_traverse_any FCT_KERNEL(fct_traverse_any)
 FCT_DECLARE_KERNEL(bool, fct_traverse_any,
                    (const fct_bvh *bvh, const fct_prepared_ray *ray, fct_visits *visits));
+/* Several rays, in turns: the closest hit of each, or, with `any`, one whose place alone counts. The place of
+ * a miss is FCT_NONE. */
+#define fct_traverse_many FCT_KERNEL(fct_traverse_many)
+FCT_DECLARE_KERNEL(void, fct_traverse_many,
+                   (const fct_bvh *bvh, size_t count, const fct_prepared_ray *rays, bool any,
+                    fct_raw_hit *hits));
 /* The nearest hits in order of (t, face), `capacity` of them at most; t is the caller's. Returns how many
  * there are in all. hits[i].normal is not set. */
 #define fct_traverse_all FCT_KERNEL(fct_traverse_all)
