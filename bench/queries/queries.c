@@ -297,10 +297,20 @@ static void measure_builds(const subject *s, uint32_t threads) {
     putchar('\n');
 }
 
+static double count_ray_bytes(const subject *s) {
+    fct_env env = bench_env(2);
+    fct_bvh *bvh;
+    bench_check(fct_bvh_create(&env, s->tree, FCT_BACKEND_OBB, &bvh), "a structure for rays");
+    double bytes = (double)fct_bvh_bytes(bvh);
+    fct_bvh_destroy(bvh);
+    return bytes;
+}
+
 /* Builds the structures that answer, and prints their sizes. */
 static void build_models(subject *s) {
-    double faces = s->mesh.face_count, own = 0;
-    printf("  %-14s   ", "bytes/triangle");
+    double faces = s->mesh.face_count, own = 0, rays = count_ray_bytes(s);
+    printf("  %-14s    rays alone %.1f  ", "bytes/triangle", rays / faces);
+    write_row(s, "bytes of rays", 1, "facetree", "per triangle", rays / faces, 1, "0,,,");
     for (size_t i = 0; i < bench_side_count; ++i) {
         const bench_side *side = bench_sides[i];
         if (s->mesh.face_count > side->most_triangles) continue;
