@@ -1,5 +1,5 @@
 // bench/queries/bullet.cpp: rays through Bullet's tree of quantised boxes over a mesh. Bullet asks for the
-// nearest hit of a segment; its triangle test widens each triangle by about a hundredth of its size.
+// nearest hit of a segment; its triangle test has a tolerance at the edges.
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>

@@ -154,8 +154,8 @@ def print_goals(rows):
         found = [r["value"] for r in pick(rows, row, "facetree")]
         if found:
             print_goal(what, "", goal, statistics.median(found), False)
-    print("PQP*: PQP is not in Debian. Its time is that of FCL in this run times .42 (touching), .45 (apart) or .81 (distance); these"
-          "\nfactors were measured once, on the bunny near contact.")
+    print("PQP*: not measured. FCL's time in this run times .42 (touching), .45 (apart) or .81 (distance), from an earlier study"
+          "\nof the bunny.")
 
 
 def main():
