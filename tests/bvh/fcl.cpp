@@ -1,6 +1,6 @@
 // Two models against FCL: the pairs of faces that meet, and the distance. FCL computes in double without
 // exact decisions, so a pair may differ if the two faces touch within 1e-9 of the size.
-#include <fcl/fcl.h>
+#include "tests/bvh/fcl.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,14 +23,13 @@ extern "C" {
 
 namespace {
 
-using peer_model = fcl::BVHModel<fcl::OBBRSSd>;
 using face_pair = std::pair<uint32_t, uint32_t>;
 
 struct model {
     fct_mesh mesh{};
     fct_tree *tree = nullptr;
     fct_bvh *bvh = nullptr;
-    peer_model peer;
+    fcl_model peer;
     double size = 0;
 };
 
@@ -44,17 +43,7 @@ bool load_model(const fct_env &env, const char *name, double scale, model &m) {
     assert_int_equal(fct_bvh_build(&env, m.tree, &def, &m.bvh), FCT_OK);
     b = fct_bvh_bounds(m.bvh);
     for (int k = 0; k < 3; ++k) m.size = std::max(m.size, double(b.upper[k]) - double(b.lower[k]));
-    std::vector<fcl::Vector3d> vertices;
-    std::vector<fcl::Triangle> triangles;
-    for (uint32_t v = 0; v < m.mesh.vertex_count; ++v)
-        vertices.emplace_back(m.mesh.positions[3 * v], m.mesh.positions[3 * v + 1],
-                              m.mesh.positions[3 * v + 2]);
-    for (uint32_t f = 0; f < m.mesh.face_count; ++f)
-        triangles.emplace_back(m.mesh.triangles[3 * f], m.mesh.triangles[3 * f + 1],
-                               m.mesh.triangles[3 * f + 2]);
-    m.peer.beginModel();
-    m.peer.addSubModel(vertices, triangles);
-    m.peer.endModel();
+    build_fcl_model(m.mesh, m.peer);
     return true;
 }
 
@@ -88,15 +77,6 @@ fct_pose random_pose(const model &a, const model &b, double away, uint64_t &seed
     return pose;
 }
 
-fcl::Transform3d peer_pose(const fct_pose &pose) {
-    fcl::Transform3d t = fcl::Transform3d::Identity();
-    for (int i = 0; i < 3; ++i) {
-        t.translation()[i] = pose.translation[i];
-        for (int j = 0; j < 3; ++j) t.linear()(i, j) = pose.rotation[i][j];
-    }
-    return t;
-}
-
 std::set<face_pair> our_pairs(const model &a, const model &b, const fct_pose &pose) {
     size_t count = fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, 0, nullptr, nullptr);
     std::vector<fct_face_pair> pairs(count);
@@ -110,7 +90,7 @@ std::set<face_pair> our_pairs(const model &a, const model &b, const fct_pose &po
 std::set<face_pair> peer_pairs(const model &a, const model &b, const fct_pose &pose) {
     fcl::CollisionRequestd request(1 << 24, false);
     fcl::CollisionResultd result;
-    fcl::collide(&a.peer, fcl::Transform3d::Identity(), &b.peer, peer_pose(pose), request, result);
+    fcl::collide(&a.peer, fcl::Transform3d::Identity(), &b.peer, make_fcl_pose(pose), request, result);
     std::set<face_pair> out;
     for (size_t i = 0; i < result.numContacts(); ++i)
         out.insert({uint32_t(result.getContact(i).b1), uint32_t(result.getContact(i).b2)});
@@ -158,7 +138,7 @@ void compare_models(const char *name_a, const char *name_b, double scale, int co
         if (!ours.empty()) continue;
         fcl::DistanceRequestd request;
         fcl::DistanceResultd result;
-        fcl::distance(&a.peer, fcl::Transform3d::Identity(), &b.peer, peer_pose(pose), request, result);
+        fcl::distance(&a.peer, fcl::Transform3d::Identity(), &b.peer, make_fcl_pose(pose), request, result);
         assert_true(std::fabs(result.min_distance - d.distance) <= 1e-9 * (a.size + b.size));
     }
     print_message("%s and %s: %zu of %d touch, %zu pairs, %zu decided by rounding\n", name_a, name_b,

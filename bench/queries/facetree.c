@@ -1,0 +1,224 @@
+/* bench/queries/facetree.c: our answers, one query at a time and in batches, and the list of all sides. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "bench/cluster/bench.h"
+#include "bench/queries/sides.h"
+
+typedef struct model {
+    fct_env env;
+    fct_bvh *bvh;
+} model;
+
+static void *build_parts(const fct_tree *tree, uint32_t threads, uint32_t parts) {
+    model *m = bench_allocate(1, sizeof *m);
+    m->env = bench_env(threads);
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = parts;
+    bench_check(fct_bvh_build(&m->env, tree, &def, &m->bvh), "our structure");
+    return m;
+}
+
+static void *build_model(const fct_mesh *mesh, const fct_tree *tree, uint32_t threads) {
+    (void)mesh;
+    return build_parts(tree, threads, FCT_BVH_PAIRS);
+}
+
+static void *build_batch_model(const fct_mesh *mesh, const fct_tree *tree, uint32_t threads) {
+    (void)mesh;
+    return build_parts(tree, threads, FCT_BVH_PAIRS | FCT_BVH_SIGN);
+}
+
+static void destroy_model(void *model_) {
+    model *m = model_;
+    fct_bvh_destroy(m->bvh);
+    free(m);
+}
+
+static size_t count_bytes(const void *m) {
+    return fct_bvh_bytes(((const model *)m)->bvh);
+}
+
+/* --- One query at a time --- */
+
+static void ask_closest_hit(const fct_bvh *bvh, size_t count, const fct_ray *rays, double *t, fct_visits *v) {
+    fct_hit hit;
+    for (size_t i = 0; i < count; ++i)
+        t[i] = fct_bvh_closest_hit(bvh, rays + i, &hit, v) ? (double)hit.t : INFINITY;
+}
+
+static void ask_any_hit(const fct_bvh *bvh, size_t count, const fct_ray *rays, double *hit, fct_visits *v) {
+    for (size_t i = 0; i < count; ++i) hit[i] = fct_bvh_any_hit(bvh, rays + i, v);
+}
+
+static void ask_closest_point(const fct_bvh *bvh, size_t count, const float *points, double *distances,
+                              fct_visits *v) {
+    fct_closest closest;
+    for (size_t i = 0; i < count; ++i) {
+        fct_bvh_closest_point(bvh, points + 3 * i, INFINITY, &closest, v);
+        distances[i] = (double)closest.distance;
+    }
+}
+
+static void ask_overlap(const fct_bvh *bvh, size_t count, const fct_pose *poses, double *touching,
+                        fct_visits *v) {
+    for (size_t i = 0; i < count; ++i) touching[i] = fct_bvh_overlap(bvh, bvh, poses + i, NULL, v);
+}
+
+static void ask_distance(const fct_bvh *bvh, size_t count, const fct_pose *poses, double *distances,
+                         fct_visits *v) {
+    fct_distance distance;
+    for (size_t i = 0; i < count; ++i) {
+        fct_bvh_distance(bvh, bvh, poses + i, NULL, NULL, &distance, v);
+        distances[i] = distance.distance;
+    }
+}
+
+static void find_closest_hits(void *m, size_t count, const void *rays, double *t) {
+    ask_closest_hit(((model *)m)->bvh, count, rays, t, NULL);
+}
+
+static void find_any_hits(void *m, size_t count, const void *rays, double *hit) {
+    ask_any_hit(((model *)m)->bvh, count, rays, hit, NULL);
+}
+
+static void find_closest_points(void *m, size_t count, const void *points, double *distances) {
+    ask_closest_point(((model *)m)->bvh, count, points, distances, NULL);
+}
+
+static void find_overlaps(void *m, size_t count, const void *poses, double *touching) {
+    ask_overlap(((model *)m)->bvh, count, poses, touching, NULL);
+}
+
+static void find_distances(void *m, size_t count, const void *poses, double *distances) {
+    ask_distance(((model *)m)->bvh, count, poses, distances, NULL);
+}
+
+const fct_bvh *bench_own_bvh(const void *m) {
+    return ((const model *)m)->bvh;
+}
+
+void bench_count_visits(const void *m, bench_question question, size_t count, const void *queries,
+                        fct_visits *visits) {
+    const fct_bvh *bvh = bench_own_bvh(m);
+    double *answers = bench_allocate(count, sizeof *answers);
+    switch (question) {
+    case BENCH_CLOSEST_HIT:
+        ask_closest_hit(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_ANY_HIT:
+        ask_any_hit(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_CLOSEST_POINT:
+        ask_closest_point(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_OVERLAP:
+        ask_overlap(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_DISTANCE:
+        ask_distance(bvh, count, queries, answers, visits);
+        break;
+    default: /* signed distances have no visits of their own here */
+        break;
+    }
+    free(answers);
+}
+
+/* --- Batches --- */
+
+static void batch_closest_hits(void *m, size_t count, const void *rays, double *t) {
+    fct_hit *hits = bench_allocate(count, sizeof *hits);
+    fct_bvh_closest_hits(((model *)m)->bvh, count, rays, hits);
+    for (size_t i = 0; i < count; ++i) t[i] = hits[i].face == FCT_NONE ? INFINITY : (double)hits[i].t;
+    free(hits);
+}
+
+static void batch_any_hits(void *m, size_t count, const void *rays, double *hit) {
+    uint64_t *bits = bench_allocate((count + 63) / 64, sizeof *bits);
+    fct_bvh_any_hits(((model *)m)->bvh, count, rays, bits);
+    for (size_t i = 0; i < count; ++i) hit[i] = (double)(bits[i / 64] >> (i % 64) & 1);
+    free(bits);
+}
+
+static void batch_points(void *m, size_t count, const void *points, double *distances) {
+    fct_closest *closest = bench_allocate(count, sizeof *closest);
+    fct_bvh_closest_points(((model *)m)->bvh, count, points, INFINITY, closest);
+    for (size_t i = 0; i < count; ++i) distances[i] = (double)closest[i].distance;
+    free(closest);
+}
+
+static void batch_signed_distances(void *m, size_t count, const void *points, double *distances) {
+    fct_closest *closest = bench_allocate(count, sizeof *closest);
+    fct_bvh_signed_distances(((model *)m)->bvh, count, points, INFINITY, closest);
+    for (size_t i = 0; i < count; ++i) distances[i] = (double)closest[i].distance;
+    free(closest);
+}
+
+static void batch_overlaps(void *m, size_t count, const void *poses, double *touching) {
+    uint64_t *bits = bench_allocate((count + 63) / 64, sizeof *bits);
+    fct_bvh_overlaps(((model *)m)->bvh, ((model *)m)->bvh, count, poses, bits);
+    for (size_t i = 0; i < count; ++i) touching[i] = (double)(bits[i / 64] >> (i % 64) & 1);
+    free(bits);
+}
+
+static void batch_distances(void *m, size_t count, const void *poses, double *distances) {
+    fct_distance *found = bench_allocate(count, sizeof *found);
+    fct_bvh_distances(((model *)m)->bvh, ((model *)m)->bvh, count, poses, NULL, found);
+    for (size_t i = 0; i < count; ++i) distances[i] = found[i].distance;
+    free(found);
+}
+
+static void count_touching(void *m, uint32_t count, uint32_t frames, const fct_pose *poses, double *pairs) {
+    fct_body *bodies = bench_allocate(count, sizeof *bodies);
+    for (uint32_t f = 0; f < frames; ++f) {
+        size_t found;
+        for (uint32_t i = 0; i < count; ++i)
+            bodies[i] = (fct_body){((model *)m)->bvh, poses[(size_t)f * count + i]};
+        bench_check(fct_bodies_touching(&((model *)m)->env, count, bodies, 0, NULL, &found), "bodies");
+        pairs[f] = (double)found;
+    }
+    free(bodies);
+}
+
+const bench_side bench_facetree = {
+    .name = "facetree",
+    .most_triangles = UINT32_MAX,
+    .build = build_model,
+    .destroy = destroy_model,
+    .bytes = count_bytes,
+    .ask = {[BENCH_CLOSEST_HIT] = find_closest_hits,
+            [BENCH_ANY_HIT] = find_any_hits,
+            [BENCH_CLOSEST_POINT] = find_closest_points,
+            [BENCH_OVERLAP] = find_overlaps,
+            [BENCH_DISTANCE] = find_distances},
+    .count_touching = count_touching,
+};
+
+const bench_side bench_batch = {
+    .name = "batch",
+    .most_triangles = UINT32_MAX,
+    .whole = true,
+    .build = build_batch_model,
+    .destroy = destroy_model,
+    .bytes = count_bytes,
+    .ask = {[BENCH_CLOSEST_HIT] = batch_closest_hits,
+            [BENCH_ANY_HIT] = batch_any_hits,
+            [BENCH_CLOSEST_POINT] = batch_points,
+            [BENCH_SIGNED_DISTANCE] = batch_signed_distances,
+            [BENCH_OVERLAP] = batch_overlaps,
+            [BENCH_DISTANCE] = batch_distances},
+};
+
+const bench_side *const bench_sides[] = {
+    &bench_facetree, &bench_batch, &bench_embree, &bench_robust,
+#ifdef BENCH_CGAL
+    &bench_cgal,
+#endif
+#ifdef BENCH_BULLET
+    &bench_bullet,
+#endif
+#ifdef BENCH_FCL
+    &bench_fcl,
+#endif
+};
+const size_t bench_side_count = sizeof bench_sides / sizeof *bench_sides;
