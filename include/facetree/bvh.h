@@ -95,7 +95,8 @@ FCT_API size_t fct_bvh_all_hits(const fct_bvh *bvh, const fct_ray *ray, size_t c
                                 fct_visits *visits);
 /* Whether the ray hits anything. */
 FCT_API bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits);
-/* The same for `count` rays, on the threads of the environment. */
+/* The same as the single queries for `count` rays, on the threads of the environment. On large models several
+ * rays of a thread take turns, so a batch is faster than single rays. */
 FCT_API void fct_bvh_closest_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, fct_hit *hits);
 /* Bit i % 64 of occluded[i / 64] tells whether ray i hits anything. `occluded` has (count + 63) / 64 words.
  */
