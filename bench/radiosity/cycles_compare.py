@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Bakes scenes and compares the light of vertices with Blender's Cycles, which lights the same mesh.
-usage: cycles_compare.py FACETREE OUT [--scenes NAME,...] [--points N] [--samples N] [--bake "OPTIONS"] [--csv FILE] [--picture SAMPLES]
+usage: cycles_compare.py FACETREE OUT [--scenes NAME,...] [--points N] [--samples N] [--bake "OPTIONS"] [--csv FILE]
+                         [--picture SAMPLES] [--units]
 Reads the light, the normals, the emission and the reflectance from the .glb of the bake. Cycles renders the radiance at a subset
 of the vertices with two seeds. The product of the two differences has the mean (x - truth)^2, because the noise of the two is
 independent. Vertices count by the area around them; emitters are left out. Needs numpy and Blender."""
@@ -78,8 +79,8 @@ class Glb:
                 keys = primitive["attributes"]
                 material = self.json["materials"][primitive["material"]]
                 extras, base = material.get("extras", {}), material.get("pbrMetallicRoughness", {})
-                strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
-                emission = np.array(material.get("emissiveFactor", [0, 0, 0])) * strength
+                strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+                emission = np.array(material.get("emissiveFactor", [0, 0, 0])) * strength.get("emissiveStrength", 1)
                 normals = self.array(keys["NORMAL"]) @ np.linalg.inv(place[:3, :3])
                 result.append({
                     "name": name, "positions": self.array(keys["POSITION"]) @ place[:3, :3].T + place[:3, 3],
@@ -104,10 +105,11 @@ def find_matrix(node):
     if "matrix" in node:
         return np.array(node["matrix"]).reshape(4, 4).T
     x, y, z, w = node.get("rotation", [0, 0, 0, 1])
+    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
     result = np.eye(4)
-    result[:3, :3] = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                               [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                               [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]) * node.get("scale", [1, 1, 1])
+    result[:3, :3] = turn * node.get("scale", [1, 1, 1])
     result[:3, 3] = node.get("translation", [0, 0, 0])
     return result
 
@@ -157,7 +159,7 @@ def insert_points(item, chosen):
 
 
 def write_points(path, objects, limit):
-    """Writes the mesh for Cycles; vertices per object that are points, at most `limit` of each that is not black."""
+    """Writes the mesh for Cycles; returns the vertices that are points, at most `limit` per object."""
     random = np.random.default_rng(3)
     parts, picks, points, vertices = [], [], 0, 0
     for i, item in enumerate(objects):
@@ -198,7 +200,7 @@ def find_errors(sums):
 
 
 def draw(tool, out, name, file, objects, samples):
-    """A picture of our light, that of Cycles at all vertices, and grey plus ten times the difference."""
+    """A picture of our light, that of Cycles at all vertices, and grey plus ten times the difference; see --picture."""
     picks, lights = light_points(out, objects, max(len(x["positions"]) for x in objects), [f"{samples}:5"])
     ours = [x["light"].copy() for x in objects]
     theirs = [x.copy() for x in ours]
@@ -211,8 +213,8 @@ def draw(tool, out, name, file, objects, samples):
     for part, light in (("facetree", ours), ("cycles", theirs), ("difference", grey)):
         file.save(f"{out}/{name}-{part}.glb", [np.maximum(x, 0) for x in light], objects)
         images.append(f"{out}/{name}-{part}.png")
-        subprocess.run([tool, "render", f"{out}/{name}-{part}.glb", "-q", "-o", images[-1], "--shading", "light", "--tone", "clamp",
-                        "--exposure", str(exposure), "--size", "800x600", "--samples", "4"], check=True)
+        subprocess.run([tool, "render", f"{out}/{name}-{part}.glb", "-q", "-o", images[-1], "--shading", "light", "--tone",
+                        "clamp", "--exposure", str(exposure), "--size", "800x600", "--samples", "4"], check=True)
     run_blender("join", f"{out}/{name}.png", *images)
     print(f"    {out}/{name}.png: Facetree, Cycles with {samples} samples, ten times the difference")
 
@@ -239,45 +241,48 @@ def make_scene(tool, out, name):
     return scenes.make_scene(tool, out, name) + "/scene.json"
 
 
+def find_crossing(lights, runs, samples, ratio, count, vertices):
+    """Samples at which Cycles has our RMS error, and its CPU seconds for all vertices. Its variance falls with the number of
+    samples: `ratio` is that of the squared errors, its own with samples[1] over ours. The time is linear in the samples."""
+    slow, fast = (lights[runs[0]][1] + lights[runs[1]][1]) / 2, lights[runs[2]][1]
+    each = (slow - fast) / (samples[0] - samples[1]) / count
+    equal = max(1, samples[1] * ratio)
+    return equal, fast + each * (equal * vertices - samples[1] * count)
+
+
 def measure_scene(tool, out, name, options):
     scene, baked = make_scene(tool, out, name), f"{out}/{name}-baked.glb"
-    stats, own_seconds = run_timed([tool, "bake", scene, "-o", baked, *options.bake.split()])
+    stats, seconds = run_timed([tool, "bake", scene, "-o", baked, *options.bake.split()])
     file = Glb(baked)
     objects = file.objects()
-    n = options.samples
-    few = max(n // 16, 1)
-    runs = [f"{n}:1", f"{n}:2", f"{few}:3"]
+    samples = options.samples, max(options.samples // 16, 1)
+    runs = [f"{samples[0]}:1", f"{samples[0]}:2", f"{samples[1]}:3"]
     picks, lights = light_points(out, objects, options.points, runs)
-    halves = [lights[r][0] for r in runs[:2]]
     rows, total, rival = [], np.zeros(4), np.zeros(4)
     for i, (item, pick) in enumerate(zip(objects, picks)):
         if not len(pick):
             continue
         faces, areas = measure_areas(item)
         share = areas[pick] * (faces.sum() / areas[pick].sum())
-        two = [h[i] for h in halves]
-        sums = sum_up(item["light"][pick], two, share)
+        halves = [lights[r][0][i] for r in runs[:2]]
+        sums = sum_up(item["light"][pick], halves, share)
         total += sums
-        rival += sum_up(lights[runs[2]][0][i], two, share)
+        rival += sum_up(lights[runs[2]][0][i], halves, share)
         rms, ratio = find_errors(sums)
-        noise = (share[:, None] * (two[0] - two[1]) ** 2).sum() / 3 / 4
-        rows.append({"scene": name, "object": item["name"], "rms": rms, "ratio": ratio,
-                     "noise": (noise * sums[0]) ** .5 / sums[2], "vertices": len(item["positions"]), "points": len(pick)})
+        noise = (share[:, None] * (halves[0] - halves[1]) ** 2).sum() / 12  # of the mean of both, over three channels
+        rows.append({"scene": name, "object": item["name"], "rms": rms, "ratio": ratio, "vertices": len(item["positions"]),
+                     "points": len(pick), "noise": (noise * sums[0]) ** .5 / sums[2]})
     rms, ratio = find_errors(total)
-    rival_rms = find_errors(rival)[0]
-    equal = max(1, few * (rival_rms / rms) ** 2)
-    vertices = sum(len(x["positions"]) for x in objects if max(x["emission"]) <= 0)
-    count = sum(len(p) for p in picks)
-    slow, fast = (lights[runs[0]][1] + lights[runs[1]][1]) / 2, lights[runs[2]][1]
-    each = (slow - fast) / (n - few) / count
-    seconds = fast + each * (equal * vertices - few * count)
-    rows.insert(0, {"scene": name, "object": "total", "rms": rms, "ratio": ratio, "vertices": vertices,
-                    "estimate": stats["error_estimate"], "points": sum(r["points"] for r in rows), "equal_samples": equal,
-                    "own_seconds": own_seconds, "cycles_seconds": seconds, "noise": rival_rms})
-    print(f"{name}: ratio {ratio:.4f} rms {100 * rms:.2f} % (estimate {100 * stats['error_estimate']:.2f} %), {vertices} vertices; "
-          f"CPU {own_seconds:.1f} s, Cycles {seconds:.1f} s with {equal:.0f} samples: {seconds / own_seconds:.1f} times")
+    vertices, count = sum(r["vertices"] for r in rows), sum(r["points"] for r in rows)
+    equal, rival_seconds = find_crossing(lights, runs, samples, (find_errors(rival)[0] / rms) ** 2, count, vertices)
+    estimate = stats["error_estimate"]
+    rows.insert(0, {"scene": name, "object": "total", "rms": rms, "ratio": ratio, "vertices": vertices, "points": count,
+                    "noise": "", "estimate": estimate, "seconds": seconds, "cycles_samples": equal,
+                    "cycles_seconds": rival_seconds})
+    print(f"{name}: ratio {ratio:.4f}, rms {100 * rms:.2f} % (estimate {100 * estimate:.2f} %), {vertices} vertices; CPU "
+          f"{seconds:.1f} s, Cycles {rival_seconds:.1f} s with {equal:.0f} samples: {rival_seconds / seconds:.1f} times")
     for row in sorted(rows[1:], key=lambda r: -r["rms"]):
-        print(f"    {row['object']:24} ratio {row['ratio']:.4f} rms {100 * row['rms']:.2f} %  (noise of Cycles "
+        print(f"    {row['object']:16} ratio {row['ratio']:.4f}  rms {100 * row['rms']:.2f} %  (noise of Cycles "
               f"{100 * row['noise']:.2f} %, {row['points']} points)", flush=True)
     if options.picture:
         draw(tool, out, name, file, objects, options.picture)
