@@ -241,13 +241,13 @@ def make_scene(tool, out, name):
     return scenes.make_scene(tool, out, name) + "/scene.json"
 
 
-def find_crossing(lights, runs, samples, ratio, count, vertices):
-    """Samples at which Cycles has our RMS error, and its CPU seconds for all vertices. Its variance falls with the number of
-    samples: `ratio` is that of the squared errors, its own with samples[1] over ours. The time is linear in the samples."""
-    slow, fast = (lights[runs[0]][1] + lights[runs[1]][1]) / 2, lights[runs[2]][1]
-    each = (slow - fast) / (samples[0] - samples[1]) / count
-    equal = max(1, samples[1] * ratio)
-    return equal, fast + each * (equal * vertices - samples[1] * count)
+def find_crossing(errors, rms):
+    """Samples at which Cycles has the RMS error. errors: those of growing numbers of samples; between and beyond two of them
+    the error is a power of the samples. It falls faster than with independent samples, because those of Cycles are even."""
+    x, y = np.log(list(errors)), np.log(list(errors.values()))
+    k = min(max(int((y > np.log(rms)).sum()), 1), len(y) - 1)
+    slope = min((y[k] - y[k - 1]) / (x[k] - x[k - 1]), -.25)
+    return float(np.exp(x[k] + (np.log(rms) - y[k]) / slope))
 
 
 def measure_scene(tool, out, name, options):
@@ -255,10 +255,10 @@ def measure_scene(tool, out, name, options):
     stats, seconds = run_timed([tool, "bake", scene, "-o", baked, *options.bake.split()])
     file = Glb(baked)
     objects = file.objects()
-    samples = options.samples, max(options.samples // 16, 1)
-    runs = [f"{samples[0]}:1", f"{samples[0]}:2", f"{samples[1]}:3"]
+    n, steps = options.samples, [max(options.samples // k, 1) for k in (64, 16, 4)]
+    runs = [f"{n}:1", f"{n}:2"] + [f"{k}:3" for k in steps]
     picks, lights = light_points(out, objects, options.points, runs)
-    rows, total, rival = [], np.zeros(4), np.zeros(4)
+    rows, total, rivals, noises = [], np.zeros(4), np.zeros((len(steps), 4)), 0
     for i, (item, pick) in enumerate(zip(objects, picks)):
         if not len(pick):
             continue
@@ -267,20 +267,27 @@ def measure_scene(tool, out, name, options):
         halves = [lights[r][0][i] for r in runs[:2]]
         sums = sum_up(item["light"][pick], halves, share)
         total += sums
-        rival += sum_up(lights[runs[2]][0][i], halves, share)
+        rivals += [sum_up(lights[r][0][i], halves, share) for r in runs[2:]]
         rms, ratio = find_errors(sums)
         noise = (share[:, None] * (halves[0] - halves[1]) ** 2).sum() / 12  # of the mean of both, over three channels
+        noises += noise
         rows.append({"scene": name, "object": item["name"], "rms": rms, "ratio": ratio, "vertices": len(item["positions"]),
                      "points": len(pick), "noise": (noise * sums[0]) ** .5 / sums[2]})
     rms, ratio = find_errors(total)
     vertices, count = sum(r["vertices"] for r in rows), sum(r["points"] for r in rows)
-    equal, rival_seconds = find_crossing(lights, runs, samples, (find_errors(rival)[0] / rms) ** 2, count, vertices)
+    errors = {k: find_errors(r)[0] for k, r in zip(steps, rivals)}
+    errors[n] = (2 * noises * total[0]) ** .5 / total[2]
+    equal = find_crossing(errors, rms)
+    first = lights[runs[2]][1]  # CPU seconds are linear in the samples of all points
+    each = ((lights[runs[0]][1] + lights[runs[1]][1]) / 2 - first) / (n - steps[0]) / count
+    rival_seconds = first + each * (equal * vertices - steps[0] * count)
     estimate = stats["error_estimate"]
     rows.insert(0, {"scene": name, "object": "total", "rms": rms, "ratio": ratio, "vertices": vertices, "points": count,
                     "noise": "", "estimate": estimate, "seconds": seconds, "cycles_samples": equal,
                     "cycles_seconds": rival_seconds})
     print(f"{name}: ratio {ratio:.4f}, rms {100 * rms:.2f} % (estimate {100 * estimate:.2f} %), {vertices} vertices; CPU "
           f"{seconds:.1f} s, Cycles {rival_seconds:.1f} s with {equal:.0f} samples: {rival_seconds / seconds:.1f} times")
+    print("    Cycles:", ", ".join(f"{100 * e:.2f} % with {k}" for k, e in errors.items()))
     for row in sorted(rows[1:], key=lambda r: -r["rms"]):
         print(f"    {row['object']:16} ratio {row['ratio']:.4f}  rms {100 * row['rms']:.2f} %  (noise of Cycles "
               f"{100 * row['noise']:.2f} %, {row['points']} points)", flush=True)
