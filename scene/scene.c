@@ -346,7 +346,7 @@ fct_result fct_scene_set_transform(const fct_env *env, const char *name, const f
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) frame->linear[3 * i + j] = (float)frame->to_model[4 * i + j];
     frame->identity = memcmp(m, fct_transform_identity, sizeof fct_transform_identity) == 0;
-    frame->shrink = fct_transform_shrink(instance);
+    fct_mapped_frame_make(instance->to_world, &frame->mapped);
     return FCT_OK;
 }
 

@@ -212,8 +212,7 @@ FCT_API bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, f
 FCT_API bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits);
 /* The surface point nearest to `point` over all instances, in world distance; returns whether it is within
  * max_distance, which may be infinity. Equal distances: the lower instance. *out is in the world; *instance
- * is FCT_NONE on a miss. Both backends answer. Exact under every transform, but slower under one that is not
- * uniform. */
+ * is FCT_NONE on a miss. Both backends answer. Exact under every transform. */
 FCT_API bool fct_scene_closest_point(const fct_scene *scene, const float point[3], float max_distance,
                                      uint32_t *instance, fct_closest *out);
 
