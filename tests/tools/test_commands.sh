@@ -137,7 +137,7 @@ check "no rays, no hits" test ! -s out
 # A pile of 300 squares: a chunk has no room for the hits of one ray, and few rays fit one text.
 awk 'BEGIN { print "OFF"; print 1200, 300, 0; for (i = 0; i < 300; ++i) { z = i * 7 % 300
     print 0, 0, z; print 1, 0, z; print 1, 1, z; print 0, 1, z } for (i = 0; i < 300; ++i) print 4, 4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3 }' >pile.off
-awk 'BEGIN { for (i = 0; i < 500; ++i) print .1 + i / 1000, .05, i % 2 ? -1 : 9, 0, 0, i % 3 ? 1 : -1, 0, i % 5 ? 100.5 : "inf" }' >many.txt
+awk 'BEGIN { for (i = 0; i < 500; ++i) print .1 + i / 1000, .05, i % 2 ? -1 : 9, 0, 0, i % 3 ? 1 : -1, 0, i % 97 ? 100.5 : "inf" }' >many.txt
 expect 0 raycast pile.off --rays many.txt --all -o pile.txt
 expect 0 raycast pile.off --rays many.txt --all -o one.txt --threads 1
 check "all hits on every number of threads" cmp pile.txt one.txt
