@@ -11,9 +11,8 @@
 fct_result fct_mesh_parse(const fct_env *env, const char *name, const void *data, size_t size,
                           const char *format, fct_mesh *out);
 
-/* The same, and fct_mesh_load, with corner_normals where the corners of a vertex have different normals. */
+/* The same with corner_normals, as fct_mesh_load_shaded. */
 fct_result fct_mesh_parse_shaded(const fct_env *env, const char *name, const void *data, size_t size,
                                  const char *format, fct_mesh *out);
-fct_result fct_mesh_load_shaded(const fct_env *env, const char *path, fct_mesh *out);
 
 #endif

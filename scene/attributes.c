@@ -24,7 +24,8 @@ fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const f
     *out = (fct_attributes){0};
     const bool normals = has_values(mesh->normals, 3 * (size_t)mesh->vertex_count);
     const bool corners = !normals && has_values(mesh->corner_normals, 9 * (size_t)mesh->face_count);
-    if (!mesh->texcoords && !normals && !corners) return FCT_OK;
+    const bool colors = mesh->face_colors && !mesh->colors;
+    if (!mesh->texcoords && !normals && !corners && !colors) return FCT_OK;
     fct_result result = fct_tree_check(env, tree);
     if (result != FCT_OK) return result;
     const fct_tree_view t = fct_tree_get(tree);
@@ -37,6 +38,8 @@ fct_result fct_attributes_copy(const fct_env *env, const fct_mesh *mesh, const f
         result = copy_rows(env, mesh->normals, t.vertex_ids, t.vertex_count, 3, &out->normals);
     if (result == FCT_OK && corners)
         result = copy_rows(env, mesh->corner_normals, t.face_ids, t.face_count, 9, &out->corner_normals);
+    if (result == FCT_OK && colors)
+        result = copy_rows(env, mesh->face_colors, t.face_ids, t.face_count, 3, &out->face_colors);
     return result;
 }
 

@@ -1,4 +1,4 @@
-/* scene/rays.c: closest hit and any hit through the instances.
+/* scene/rays.c: closest hit, any hit and all hits through the instances.
  *
  * A plain loop tests the eight children of a node, so that compilers vectorise it. The traversal visits the
  * nearest child first. At an instance it transforms the ray to the model without normalising the direction,
@@ -12,6 +12,8 @@
 #include <float.h>
 #include <math.h>
 
+#include "base/sift.h"
+#include "bvh/ray/ray.h"
 #include "scene/scene.h"
 #include "scene/transform.h"
 
@@ -131,6 +133,18 @@ static inline void meet_instance(const fct_scene *scene, const fct_ray *ray, uin
     s->best = found, s->limit = found.t, s->instance = i, s->lit = lit;
 }
 
+/* Takes the normal of a model to the world. */
+static inline void set_world_normal(const fct_scene *scene, const float model[3], fct_scene_hit *hit) {
+    v3 normal = v3_load(model);
+    if (!scene->frames[hit->instance].identity) {
+        /* Normalised first, so that the products of a tiny or huge normal stay in range. */
+        const fct_instance *placed = scene->instances + hit->instance;
+        normal = fct_transform_normal(placed->normal_matrix, v3_unit(normal));
+        if (placed->mirrored) normal = v3_scale(normal, -1);
+    }
+    v3_store(hit->normal, v3_unit(normal));
+}
+
 static inline bool find_closest(const fct_scene *scene, const fct_ray *ray, bool lamps_first,
                                 fct_scene_hit *hit, fct_visits *visits) {
     slabs box;
@@ -165,14 +179,7 @@ static inline bool find_closest(const fct_scene *scene, const fct_ray *ray, bool
     hit->instance = s.instance;
     hit->t = s.best.t, hit->u = s.best.u, hit->v = s.best.v;
     hit->face = s.best.face, hit->place = s.best.place;
-    v3 normal = v3_load(s.best.normal);
-    if (!scene->frames[hit->instance].identity) {
-        /* Normalised first, so that the products of a tiny or huge normal stay in range. */
-        const fct_instance *placed = scene->instances + hit->instance;
-        normal = fct_transform_normal(placed->normal_matrix, v3_unit(normal));
-        if (placed->mirrored) normal = v3_scale(normal, -1);
-    }
-    v3_store(hit->normal, v3_unit(normal));
+    set_world_normal(scene, s.best.normal, hit);
     return true;
 }
 
@@ -185,7 +192,11 @@ bool fct_scene_light_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_h
     return find_closest(scene, ray, true, hit, visits);
 }
 
-bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits) {
+/* Calls visit(user, instance, ray) for the instances whose boxes the ray meets, with the ray in the model's
+ * space, until one call returns true. Returns whether one did. */
+typedef bool fct_visit_instance(void *user, uint32_t instance, const fct_ray *local, fct_visits *visits);
+static inline bool visit_instances(const fct_scene *scene, const fct_ray *ray, fct_visit_instance *visit,
+                                   void *user, fct_visits *visits) {
     slabs s;
     uint32_t stack[STACK];
     int top = 0;
@@ -202,10 +213,86 @@ bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *v
             if (visits) visits->nodes += 1, visits->boxes += FCT_SCENE_WIDTH;
             continue;
         }
-        const fct_scene_frame *frame = scene->frames + (child & ~FCT_SCENE_LEAF);
+        const uint32_t i = child & ~FCT_SCENE_LEAF;
+        const fct_scene_frame *frame = scene->frames + i;
         fct_ray local;
         if (!frame->identity) move_ray_to_model(frame, ray, ray->t_max, &local);
-        if (fct_bvh_any_hit(frame->bvh, frame->identity ? ray : &local, visits)) return true;
+        if (visit(user, i, frame->identity ? ray : &local, visits)) return true;
     }
     return false;
+}
+
+static bool meets_instance(void *user, uint32_t instance, const fct_ray *local, fct_visits *visits) {
+    const fct_scene *const *scene = user;
+    return fct_bvh_any_hit((*scene)->frames[instance].bvh, local, visits);
+}
+
+bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits) {
+    return visit_instances(scene, ray, meets_instance, &scene, visits);
+}
+
+/* The first `capacity` hits so far: a heap, the last hit on top. */
+typedef struct hit_list {
+    const fct_scene *scene;
+    fct_scene_hit *hits;
+    size_t capacity, found; /* found counts all hits */
+    uint32_t instance;      /* that the ray meets now */
+} hit_list;
+
+static bool is_before(const void *items, size_t i, size_t j) {
+    const fct_scene_hit *a = (const fct_scene_hit *)items + i, *b = (const fct_scene_hit *)items + j;
+    if (a->t != b->t) return a->t < b->t;
+    return a->instance != b->instance ? a->instance < b->instance : a->face < b->face;
+}
+
+static void swap_hits(void *items, size_t i, size_t j) {
+    fct_scene_hit *hits = items, kept = hits[i];
+    hits[i] = hits[j];
+    hits[j] = kept;
+}
+
+static void keep_hit(void *user, const fct_hit *found) {
+    hit_list *list = user;
+    const fct_scene_hit hit = {.t = found->t,
+                               .u = found->u,
+                               .v = found->v,
+                               .instance = list->instance,
+                               .face = found->face,
+                               .place = found->place};
+    size_t count = list->found++;
+    if (count < list->capacity) {
+        list->hits[count] = hit;
+        fct_sift_up(list->hits, count, is_before, swap_hits);
+    } else if (list->capacity) {
+        const fct_scene_hit both[2] = {hit, list->hits[0]};
+        if (!is_before(both, 0, 1)) return;
+        list->hits[0] = hit;
+        fct_sift_down(list->hits, 0, list->capacity, is_before, swap_hits);
+    }
+}
+
+static const fct_bvh *get_obb(const fct_scene *scene, uint32_t instance) {
+    const fct_scene_model *own = scene->own + scene->instances[instance].model;
+    return own->points ? own->points : own->bvh;
+}
+
+static bool list_hits(void *user, uint32_t instance, const fct_ray *local, fct_visits *visits) {
+    hit_list *list = user;
+    list->instance = instance;
+    fct_ray_visit_hits(get_obb(list->scene, instance), local, keep_hit, list, visits);
+    return false;
+}
+
+size_t fct_scene_all_hits(const fct_scene *scene, const fct_ray *ray, size_t capacity, fct_scene_hit *hits,
+                          fct_visits *visits) {
+    hit_list list = {.scene = scene, .hits = hits, .capacity = capacity};
+    visit_instances(scene, ray, list_hits, &list, visits);
+    size_t kept = list.found < capacity ? list.found : capacity;
+    fct_sift_sort(hits, kept, is_before, swap_hits);
+    for (size_t i = 0; i < kept; ++i) {
+        fct_hit hit = {.place = hits[i].place};
+        fct_hit_set_normal(get_obb(scene, hits[i].instance), &hit);
+        set_world_normal(scene, hit.normal, &hits[i]);
+    }
+    return list.found;
 }

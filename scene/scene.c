@@ -36,6 +36,7 @@ static void release_model(const fct_env *env, fct_scene_model *model) {
     fct_release(env, model->attributes.texcoords);
     fct_release(env, model->attributes.normals);
     fct_release(env, model->attributes.corner_normals);
+    fct_release(env, model->attributes.face_colors);
 }
 
 void fct_scene_destroy(fct_scene *scene) {
@@ -163,6 +164,7 @@ static fct_result add_model(fct_scene *scene, const char *name, fct_scene_model 
                        .texcoords = own->attributes.texcoords,
                        .normals = own->attributes.normals,
                        .corner_normals = own->attributes.corner_normals,
+                       .face_colors = own->attributes.face_colors,
                        .inward = fct_tree_get(own->tree).inward};
     fct_result result = copy_name(env, "model", name, model.name, sizeof model.name);
     uint32_t depth = fct_tree_get(own->tree).depth;
@@ -346,7 +348,7 @@ fct_result fct_scene_set_transform(const fct_env *env, const char *name, const f
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) frame->linear[3 * i + j] = (float)frame->to_model[4 * i + j];
     frame->identity = memcmp(m, fct_transform_identity, sizeof fct_transform_identity) == 0;
-    frame->shrink = fct_transform_shrink(instance);
+    fct_mapped_frame_make(instance->to_world, &frame->mapped);
     return FCT_OK;
 }
 

@@ -2,6 +2,7 @@
 #ifndef FCT_SCENE_SCENE_H
 #define FCT_SCENE_SCENE_H
 
+#include "bvh/near/mapped.h"
 #include "cluster/tree/coarse.h"
 #include "scene/attributes.h"
 #include "scene/texture/image.h"
@@ -26,8 +27,8 @@ typedef struct fct_scene_frame {
     bool identity;
     bool emits, two_sided; /* of the material */
     const fct_bvh *bvh;
-    double shrink; /* world distance >= shrink * model distance */
-    double at[3];  /* the model's local origin in the file's coordinates */
+    double at[3];            /* the model's local origin in the file's coordinates */
+    fct_mapped_frame mapped; /* for closest points, if the scale is not uniform */
 } fct_scene_frame;
 
 typedef struct fct_scene_model {

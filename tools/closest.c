@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "tools/kit/chunks.h"
 #include "tools/kit/command.h"
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
@@ -94,6 +95,22 @@ static int find_in_model(tool *t, const closest_options *o, const tool_rows *row
     return code;
 }
 
+typedef struct scene_points {
+    const fct_scene *scene;
+    const float *points;
+    float max_distance;
+    const answers *out;
+} scene_points;
+
+static void find_chunk_in_scene(void *user, size_t begin, size_t end, size_t chunk) {
+    (void)chunk;
+    const scene_points *s = user;
+    for (size_t i = begin; i < end; ++i)
+        if (!fct_scene_closest_point(s->scene, s->points + 3 * i, s->max_distance, s->out->instances + i,
+                                     s->out->found + i))
+            s->out->found[i].face = FCT_NONE;
+}
+
 static int find_in_scene(tool *t, const closest_options *o, const tool_rows *rows, answers *a) {
     fct_scene *scene;
     float *points = NULL;
@@ -101,10 +118,14 @@ static int find_in_scene(tool *t, const closest_options *o, const tool_rows *row
     if (code != TOOL_DONE) return code;
     memcpy(a->origin, fct_scene_get(scene).origin, sizeof a->origin);
     code = place_points(t, rows, a, &points);
-    for (size_t i = 0; code == TOOL_DONE && i < rows->count; ++i)
-        if (!fct_scene_closest_point(scene, points + 3 * i, (float)o->max_distance, a->instances + i,
-                                     a->found + i))
-            a->found[i].face = FCT_NONE;
+    scene_points job = {scene, points, (float)o->max_distance, a};
+    tool_loop loop = {.count = rows->count,
+                      .grain = 256,
+                      .body = find_chunk_in_scene,
+                      .user = &job,
+                      .phase = "points",
+                      .to = 1};
+    if (code == TOOL_DONE && rows->count) code = tool_run_loop(t, &loop);
     tool_release(t, points);
     fct_scene_destroy(scene);
     return code;
@@ -152,7 +173,8 @@ static int run_closest(tool *t, void *options) {
                          t->inputs[0]);
     tool_rows points;
     totals sum = {0, 0};
-    int code = tool_rows_read(t, o->points, 3, 3, NULL, &points);
+    const tool_row_format format = {.least = 3, .columns = 3};
+    int code = tool_rows_read(t, o->points, &format, &points);
     if (code != TOOL_DONE) return code;
     answers a = {.found = tool_allocate(t, points.count, sizeof *a.found)};
     if (a.found && scene) a.instances = tool_allocate(t, points.count, sizeof *a.instances);
@@ -169,7 +191,7 @@ static int run_closest(tool *t, void *options) {
 }
 
 int tool_closest(int argc, char **argv) {
-    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"ray structure", 50}, {0}};
+    static const tool_stage stages[] = {TOOL_TREE_STAGES, {"ray structure", 50}, {"points", 50}, {0}};
     static const tool_command command = {
         .name = "closest",
         .synopsis = "IN --points FILE [-o FILE]",

@@ -28,10 +28,16 @@ static inline uint32_t fct_push_children(const fct_bvh *bvh, uint64_t *stack, ui
     return height + count;
 }
 
+/* Stores squared lower bounds of the distances from `at` to the children of a node, and returns the mask of
+ * those within limit2. `at` is the point as the function sees it; for fct_measure_children an fct_at. */
+typedef uint32_t fct_bound_children(const fct_bvh *bvh, uint32_t ref, const void *at, float limit2,
+                                    float distance2[8], const uint32_t **child);
+
 /* Calls visit(user, ref) for the leaves whose boxes are within the limit, near ones first. The visitor may
  * lower *limit2, a squared distance. */
-static inline void fct_descend(const fct_bvh *bvh, const fct_at *at, const float *limit2,
-                               void (*visit)(void *user, uint32_t ref), void *user, fct_visits *visits) {
+static inline void fct_descend(const fct_bvh *bvh, fct_bound_children *bound, const void *at,
+                               const float *limit2, void (*visit)(void *user, uint32_t ref), void *user,
+                               fct_visits *visits) {
     uint64_t stack[FCT_STACK_SIZE];
     uint32_t height = 1;
     stack[0] = bvh->root;
@@ -45,7 +51,7 @@ static inline void fct_descend(const fct_bvh *bvh, const fct_at *at, const float
         }
         float distance2[8];
         const uint32_t *child;
-        uint32_t met = fct_measure_children(bvh, ref, at, *limit2, distance2, &child);
+        uint32_t met = bound(bvh, ref, at, *limit2, distance2, &child);
         ++visits->nodes;
         visits->boxes += 8;
         height = fct_push_children(bvh, stack, height, met, distance2, child);

@@ -94,9 +94,10 @@ static inline uint32_t fct_measure_oriented_boxes(const fct_oriented_node *node,
     return f8_le(sum, f8_set(limit2));
 }
 
-/* Measures the children of a node, of either kind. */
-static inline uint32_t fct_measure_children(const fct_bvh *bvh, uint32_t ref, const fct_at *a, float limit2,
+/* Measures the children of a node, of either kind, from an fct_at. */
+static inline uint32_t fct_measure_children(const fct_bvh *bvh, uint32_t ref, const void *at, float limit2,
                                             float distance2[8], const uint32_t **child) {
+    const fct_at *a = at;
     if (ref & FCT_REF_ORIENTED) {
         const fct_oriented_node *node = fct_bvh_node(bvh, ref);
         *child = node->child;

@@ -160,7 +160,7 @@ bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double m
     double reach = max_distance * bvh->scale;
     s.best2 = reach * reach;
     set_bound(&s, sqrt(s.best2));
-    fct_descend(bvh, &s.at, &s.limit2, search_leaf, &s, &s.visits);
+    fct_descend(bvh, fct_measure_children, &s.at, &s.limit2, search_leaf, &s, &s.visits);
     measure_waiting(&s);
     fct_visits_add(visits, &s.visits);
     if (s.place == FCT_NONE) return false;

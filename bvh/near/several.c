@@ -116,7 +116,7 @@ uint32_t fct_several_search(const fct_bvh *bvh, v3 point, uint32_t k, double max
     s.at = fct_at_make(bvh, s.point);
     double reach = max_distance * bvh->scale;
     set_reach(&s, reach * reach);
-    fct_descend(bvh, &s.at, &s.limit2, search_leaf, &s, &s.visits);
+    fct_descend(bvh, fct_measure_children, &s.at, &s.limit2, search_leaf, &s, &s.visits);
     fct_sift_sort(out, s.count, is_nearer, swap_items);
     for (uint32_t i = 0; i < s.count; ++i) fill_item(&s, &out[i]);
     fct_visits_add(visits, &s.visits);

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/sift.h"
 #include "bvh/ray/embree.h"
 #include "bvh/ray/traverse.h"
 
@@ -65,19 +66,60 @@ bool fct_bvh_closest_hit_except(const fct_bvh *bvh, const fct_ray *ray, uint32_t
     return true;
 }
 
-size_t fct_bvh_all_hits(const fct_bvh *bvh, const fct_ray *ray, size_t capacity, fct_hit *hits,
+void fct_ray_visit_hits(const fct_bvh *bvh, const fct_ray *ray, fct_visit_hit *visit, void *user,
                         fct_visits *visits) {
     fct_prepared_ray prepared;
-    if (bvh->embree || !fct_ray_prepare(bvh, ray, &prepared)) return 0;
-    size_t found = fct_traverse_all(bvh, ray, &prepared, capacity, hits, visits);
-    for (size_t i = 0; i < found && i < capacity; ++i) {
-        const uint32_t *corners = bvh->view.triangles + 3 * (size_t)hits[i].place;
-        v3 p[3];
-        for (int c = 0; c < 3; ++c)
-            p[c] = fct_bvh_to_scaled(bvh, v3_load(bvh->view.positions + 3 * (size_t)corners[c]));
-        unscale_normal(bvh, v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), hits[i].normal);
+    if (!bvh->embree && fct_ray_prepare(bvh, ray, &prepared))
+        fct_traverse_all(bvh, ray, &prepared, visit, user, visits);
+}
+
+void fct_hit_set_normal(const fct_bvh *bvh, fct_hit *hit) {
+    const uint32_t *corners = bvh->view.triangles + 3 * (size_t)hit->place;
+    v3 p[3];
+    for (int c = 0; c < 3; ++c)
+        p[c] = fct_bvh_to_scaled(bvh, v3_load(bvh->view.positions + 3 * (size_t)corners[c]));
+    unscale_normal(bvh, v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), hit->normal);
+}
+
+/* The first `capacity` hits so far: a heap, the last hit on top. */
+typedef struct hit_list {
+    fct_hit *hits;
+    size_t capacity, found; /* found counts all hits */
+} hit_list;
+
+static bool is_before(const void *items, size_t i, size_t j) {
+    const fct_hit *a = (const fct_hit *)items + i, *b = (const fct_hit *)items + j;
+    return a->t < b->t || (a->t == b->t && a->face < b->face);
+}
+
+static void swap_hits(void *items, size_t i, size_t j) {
+    fct_hit *hits = items, kept = hits[i];
+    hits[i] = hits[j];
+    hits[j] = kept;
+}
+
+static void keep_hit(void *user, const fct_hit *hit) {
+    hit_list *list = user;
+    size_t found = list->found++;
+    if (found < list->capacity) {
+        list->hits[found] = *hit;
+        fct_sift_up(list->hits, found, is_before, swap_hits);
+    } else if (list->capacity) {
+        const fct_hit both[2] = {*hit, list->hits[0]};
+        if (!is_before(both, 0, 1)) return;
+        list->hits[0] = *hit;
+        fct_sift_down(list->hits, 0, list->capacity, is_before, swap_hits);
     }
-    return found;
+}
+
+size_t fct_bvh_all_hits(const fct_bvh *bvh, const fct_ray *ray, size_t capacity, fct_hit *hits,
+                        fct_visits *visits) {
+    hit_list list = {hits, capacity, 0};
+    fct_ray_visit_hits(bvh, ray, keep_hit, &list, visits);
+    size_t kept = list.found < capacity ? list.found : capacity;
+    fct_sift_sort(hits, kept, is_before, swap_hits);
+    for (size_t i = 0; i < kept; ++i) fct_hit_set_normal(bvh, &hits[i]);
+    return list.found;
 }
 
 bool fct_bvh_any_hit(const fct_bvh *bvh, const fct_ray *ray, fct_visits *visits) {

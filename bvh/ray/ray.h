@@ -40,4 +40,12 @@ float fct_ray_clamp_t(const fct_ray *ray, double t);
  * visits may be NULL. */
 bool fct_ray_closest(const fct_bvh *bvh, const fct_ray *ray, fct_raw_hit *hit, double *t, fct_visits *visits);
 
+/* Receives every hit of a ray once, in any order, without its normal. */
+typedef void fct_visit_hit(void *user, const fct_hit *hit);
+/* Visits all hits of the caller's ray. The Embree backend visits none. */
+void fct_ray_visit_hits(const fct_bvh *bvh, const fct_ray *ray, fct_visit_hit *visit, void *user,
+                        fct_visits *visits);
+/* Sets hit->normal from hit->place. */
+void fct_hit_set_normal(const fct_bvh *bvh, fct_hit *hit);
+
 #endif

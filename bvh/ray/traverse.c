@@ -16,21 +16,21 @@
 /* Rays of a batch that go on in turns. While one waits for memory, the others compute. */
 enum { LANES = 8 };
 
-/* The nearest hits so far, sorted. */
-typedef struct hit_list {
+/* Receives all hits. */
+typedef struct hit_visitor {
     const fct_ray *ray; /* the caller's */
-    fct_hit *hits;
-    size_t capacity, found; /* found counts all hits */
-} hit_list;
+    fct_visit_hit *visit;
+    void *user;
+} hit_visitor;
 
 typedef struct traversal {
     const fct_bvh *bvh;
     const fct_prepared_ray *ray;
-    hit_list *all;        /* NULL unless all hits are wanted; then hit.t stays t_max */
-    fct_raw_hit hit;      /* the closest so far; hit.t is ray->t_max before the first */
-    const fct_leaf *leaf; /* of the hit */
-    uint32_t number;      /* of the hit triangle in its leaf */
-    double weight[3];     /* of the hit: those of corners 1 and 2, and the sum of all three */
+    const hit_visitor *all; /* NULL unless all hits are wanted; then hit.t stays t_max */
+    fct_raw_hit hit;        /* the closest so far; hit.t is ray->t_max before the first */
+    const fct_leaf *leaf;   /* of the hit */
+    uint32_t number;        /* of the hit triangle in its leaf */
+    double weight[3];       /* of the hit: those of corners 1 and 2, and the sum of all three */
     fct_visits visits;
 } traversal;
 
@@ -187,20 +187,6 @@ static void compute_exact_weights(const octet *o, uint32_t i, double w[3]) {
     }
 }
 
-/* Inserts a hit before those that are farther, or as far with a higher face id. The farthest drops out of a
- * full list. */
-static void insert_hit(hit_list *list, const fct_hit *hit) {
-    size_t at = list->found < list->capacity ? list->found : list->capacity;
-    ++list->found;
-    while (at > 0) {
-        const fct_hit *before = &list->hits[at - 1];
-        if (before->t < hit->t || (before->t == hit->t && before->face < hit->face)) break;
-        if (at < list->capacity) list->hits[at] = *before;
-        --at;
-    }
-    if (at < list->capacity) list->hits[at] = *hit;
-}
-
 /* Tests triangle i of an octet, which is triangle `number` of the leaf and which the eight-wide test has not
  * rejected. Records a hit that is nearer, or as near with a lower face id. */
 static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t number, const octet *o,
@@ -229,7 +215,7 @@ static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t nu
                        .v = (float)(s.w[2] / det),
                        .face = ids[place],
                        .place = place};
-        insert_hit(t->all, &hit);
+        t->all->visit(t->all->user, &hit);
         return false;
     }
     if (at == t->hit.t && t->hit.place != FCT_NONE && ids[place] > ids[t->hit.place]) return false;
@@ -436,12 +422,11 @@ void fct_traverse_many(const fct_bvh *bvh, size_t count, const fct_prepared_ray 
         traverse_many(bvh, count, rays, hits, false);
 }
 
-size_t fct_traverse_all(const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray,
-                        size_t capacity, fct_hit *hits, fct_visits *visits) {
-    hit_list all = {.ray = caller, .hits = hits, .capacity = capacity};
+void fct_traverse_all(const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray,
+                      fct_visit_hit *visit, void *user, fct_visits *visits) {
+    const hit_visitor all = {caller, visit, user};
     traversal t = begin_traversal(bvh, ray);
     t.all = &all;
     traverse_nodes(&t, false);
     add_visits(&t, visits);
-    return all.found;
 }

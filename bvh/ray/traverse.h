@@ -18,11 +18,10 @@ FCT_DECLARE_KERNEL(bool, fct_traverse_any,
 FCT_DECLARE_KERNEL(void, fct_traverse_many,
                    (const fct_bvh *bvh, size_t count, const fct_prepared_ray *rays, bool any,
                     fct_raw_hit *hits));
-/* The nearest hits in order of (t, face), `capacity` of them at most; t is the caller's. Returns how many
- * there are in all. hits[i].normal is not set. */
+/* Visits every hit. */
 #define fct_traverse_all FCT_KERNEL(fct_traverse_all)
-FCT_DECLARE_KERNEL(size_t, fct_traverse_all,
-                   (const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray, size_t capacity,
-                    fct_hit *hits, fct_visits *visits));
+FCT_DECLARE_KERNEL(void, fct_traverse_all,
+                   (const fct_bvh *bvh, const fct_ray *caller, const fct_prepared_ray *ray,
+                    fct_visit_hit *visit, void *user, fct_visits *visits));
 
 #endif

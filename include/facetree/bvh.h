@@ -89,8 +89,7 @@ FCT_API bool fct_bvh_closest_hit_except(const fct_bvh *bvh, const fct_ray *ray, 
                                         fct_visits *visits);
 /* All hits in order of t, and of face ids where t is equal. `hits` receives the first `capacity` of them and
  * may be NULL if that is 0. Returns how many a complete answer has, so a result above `capacity` asks for a
- * larger array. The time grows with the number of hits times the smaller of that number and `capacity`. OBB
- * backend only: others return 0. */
+ * larger array. OBB backend only: others return 0. */
 FCT_API size_t fct_bvh_all_hits(const fct_bvh *bvh, const fct_ray *ray, size_t capacity, fct_hit *hits,
                                 fct_visits *visits);
 /* Whether the ray hits anything. */

@@ -75,6 +75,22 @@ FCT_API void fct_memory_release(const fct_env *env, void *memory);
  * Errors: MEMORY (also above 2^31 vertices or faces). */
 FCT_API fct_result fct_mesh_join(const fct_env *env, const fct_mesh *parts, size_t count, fct_mesh *out);
 
+/* The attributes of a surface at one point. */
+typedef struct fct_surface_point {
+    unsigned found;  /* FCT_MESH_NORMALS, FCT_MESH_TEXCOORDS, FCT_MESH_COLORS: the members that are set; the
+                        others are 0 */
+    float normal[3]; /* unit length; 0 where the normals of the corners cancel */
+    float texcoord[2];
+    float color[3]; /* linear */
+} fct_surface_point;
+/* Interpolates the attributes at the point (1 - u - v) p0 + u p1 + v p2 of a face, as fct_hit and fct_closest
+ * give it:
+ *     a(u, v) = (1 - u - v) a0 + u a1 + v a2
+ * a_k is that of corner k: of its vertex (`normals`, `colors`) or its own (`corner_normals`, `texcoords`). A
+ * normal is divided by its length afterwards. A mesh without `colors` has one colour per face (`face_colors`)
+ * or none. face < face_count; u and v are finite. */
+FCT_API void fct_mesh_point(const fct_mesh *mesh, uint32_t face, float u, float v, fct_surface_point *out);
+
 /* Counts of a mesh. All counts of defects are zero for a closed oriented manifold. */
 typedef struct fct_mesh_report {
     uint32_t polygons;              /* faces before triangulation */
@@ -111,6 +127,8 @@ FCT_API fct_result fct_mesh_validate(const fct_env *env, const fct_mesh *mesh);
  * Messages name the data that a mesh cannot store (lines, normals that differ by corner, ...). docs/mesh.md
  * lists the formats. Errors: INPUT, DATA (with file and line or element), MEMORY, CANCELLED. */
 FCT_API fct_result fct_mesh_load(const fct_env *env, const char *path, fct_mesh *out);
+/* The same with corner_normals, where the corners of a vertex have different normals in an OBJ. */
+FCT_API fct_result fct_mesh_load_shaded(const fct_env *env, const char *path, fct_mesh *out);
 
 /* The counts of a file that can be clustered without loading it (a binary PLY of triangles), from its header.
  * *known is false for other files. Errors: INPUT, DATA, MEMORY. */

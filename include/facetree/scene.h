@@ -73,6 +73,7 @@ typedef struct fct_model {
     const float *texcoords;      /* faces x 3 x 2, per place and corner */
     const float *normals;        /* vertices x 3, per tree vertex */
     const float *corner_normals; /* faces x 3 x 3, per place and corner: instead of `normals` */
+    const float *face_colors;    /* faces x 3, per place; NULL if the tree has colours */
     bool inward; /* closed and wound inwards, as rooms are: the tree is, or the mesh before it was split */
 } fct_model;
 
@@ -205,15 +206,26 @@ FCT_API void fct_scene_reflectance(const fct_scene *scene, uint32_t instance, ui
 /* Whether fct_scene_reflectance depends on the point. */
 FCT_API bool fct_scene_is_painted(const fct_scene *scene, uint32_t instance);
 
+/* The attributes at barycentrics (u, v) of the face at `place` of an instance's tree, by the formula of
+ * fct_mesh_point. The normal is in the world: the interpolated normal of the model times the inverse
+ * transpose of R, over its length. Texture coordinates and colours are those of fct_model, without the
+ * material. */
+FCT_API void fct_scene_point(const fct_scene *scene, uint32_t instance, uint32_t place, float u, float v,
+                             fct_surface_point *out);
+
 /* Rays in the world; t is in units of the given direction. Equal t: the lower instance. hit->instance and
  * hit->face are FCT_NONE on a miss. visits may be NULL. */
 FCT_API bool fct_scene_closest_hit(const fct_scene *scene, const fct_ray *ray, fct_scene_hit *hit,
                                    fct_visits *visits);
 FCT_API bool fct_scene_any_hit(const fct_scene *scene, const fct_ray *ray, fct_visits *visits);
+/* All hits of all instances in order of t, then of instances, then of face ids. `hits` receives the first
+ * `capacity` of them and may be NULL if that is 0. Returns how many a complete answer has, so a result above
+ * `capacity` asks for a larger array. Both backends answer, with the OBB structure. */
+FCT_API size_t fct_scene_all_hits(const fct_scene *scene, const fct_ray *ray, size_t capacity,
+                                  fct_scene_hit *hits, fct_visits *visits);
 /* The surface point nearest to `point` over all instances, in world distance; returns whether it is within
  * max_distance, which may be infinity. Equal distances: the lower instance. *out is in the world; *instance
- * is FCT_NONE on a miss. Both backends answer. Exact under every transform, but slower under one that is not
- * uniform. */
+ * is FCT_NONE on a miss. Both backends answer. Exact under every transform. */
 FCT_API bool fct_scene_closest_point(const fct_scene *scene, const float point[3], float max_distance,
                                      uint32_t *instance, fct_closest *out);
 

@@ -40,6 +40,7 @@ write_outputs() {
         "$@" meshlets "$in/mesh.ply" -o "$out/meshlets.bin" --quiet
         "$@" boxes "$in/mesh.ply" -k 30 -o "$out/boxes.txt" --quiet
         "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" -o "$out/hits.txt" --quiet
+        "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" --all -o "$out/all-hits.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" -o "$out/closest.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" --signed -o "$out/signed.txt" --quiet
         for measure in pairs contacts distance; do

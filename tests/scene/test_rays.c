@@ -283,6 +283,142 @@ static void closest_points_agree_with_brute_force(void **unused) {
     }
 }
 
+/* The attributes of a hit under transforms of every kind: the normal is the inverse transpose's, written with
+ * a linear solve, and the others are those of the model. */
+static void points_have_the_attributes_of_their_model(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    for (int kind = 0; kind < 6; ++kind) {
+        fct_mesh grid = make_grid(&env, 3), mesh;
+        unsigned colors = kind % 2 ? FCT_MESH_COLORS : FCT_MESH_FACE_COLORS;
+        unsigned normals = kind % 3 ? FCT_MESH_NORMALS : FCT_MESH_CORNER_NORMALS;
+        assert_int_equal(fct_mesh_create(&env, grid.vertex_count, grid.face_count,
+                                         FCT_MESH_TEXCOORDS | colors | normals, &mesh),
+                         FCT_OK);
+        memcpy(mesh.positions, grid.positions, 12 * (size_t)grid.vertex_count);
+        memcpy(mesh.triangles, grid.triangles, 12 * (size_t)grid.face_count);
+        state = 3;
+        for (size_t k = 0; k < 9 * (size_t)mesh.face_count; ++k) {
+            double value = between(.1, 1);
+            if (mesh.corner_normals) mesh.corner_normals[k] = (float)value;
+            if (mesh.normals && k < 3 * (size_t)mesh.vertex_count) mesh.normals[k] = (float)value;
+            if (mesh.colors && k < 3 * (size_t)mesh.vertex_count) mesh.colors[k] = (float)(2 * value);
+            if (mesh.face_colors && k < 3 * (size_t)mesh.face_count) mesh.face_colors[k] = (float)(2 * value);
+            if (k < 6 * (size_t)mesh.face_count) mesh.texcoords[k] = (float)(3 * value);
+        }
+        fct_scene *scene;
+        fct_material material = {.name = "m"};
+        uint32_t id;
+        float m[12];
+        random_transform(kind, m);
+        assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+        assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+        assert_int_equal(fct_scene_add_object(scene, "object", &mesh, NULL, m, id, NULL), FCT_OK);
+        assert_int_equal(fct_scene_commit(scene), FCT_OK);
+        fct_tree_view tree = fct_tree_get(fct_scene_get(scene).models[0].tree);
+        for (uint32_t place = 0; place < tree.face_count; ++place) {
+            fct_surface_point p, expected;
+            fct_scene_point(scene, 0, place, .3f, .1f, &p);
+            fct_mesh_point(&mesh, tree.face_ids[place], .3f, .1f, &expected);
+            assert_int_equal(p.found, FCT_MESH_TEXCOORDS | FCT_MESH_COLORS | FCT_MESH_NORMALS);
+            assert_memory_equal(p.texcoord, expected.texcoord, sizeof p.texcoord);
+            assert_memory_equal(p.color, expected.color, sizeof p.color);
+            /* R^T n is along the normal of the model, on the same side. */
+            v3 back = {0, 0, 0};
+            for (size_t r = 0; r < 3; ++r)
+                back = v3_mad(back, p.normal[r], v3_make(m[4 * r], m[4 * r + 1], m[4 * r + 2]));
+            assert_true(fabs(v3_norm(v3_load(p.normal)) - 1) < 1e-6);
+            assert_true(v3_norm(v3_sub(v3_unit(back), v3_load(expected.normal))) < 1e-5);
+        }
+        fct_scene_destroy(scene);
+        fct_mesh_release(&env, &mesh);
+        fct_mesh_release(&env, &grid);
+    }
+}
+
+/* Each ray against every triangle; hits on rims leave the count in doubt. */
+static void all_hits_are_sorted_and_complete(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    for (int backend = 0; backend < 2; ++backend) {
+        fct_scene *scene = make_scene(&env, backend ? FCT_BACKEND_EMBREE : FCT_BACKEND_OBB);
+        fct_scene_view view = fct_scene_get(scene);
+        int checked = 0, several = 0;
+        for (int k = 0; k < 400; ++k) {
+            enum { MOST = 64 };
+            fct_ray ray = random_ray(k);
+            fct_scene_hit hits[MOST], fewer[3], first;
+            size_t count = fct_scene_all_hits(scene, &ray, MOST, hits, NULL);
+            assert_true(count <= MOST);
+            assert_int_equal(fct_scene_all_hits(scene, &ray, 0, NULL, NULL), count);
+            assert_int_equal(fct_scene_all_hits(scene, &ray, 3, fewer, NULL), count);
+            assert_memory_equal(fewer, hits, (count < 3 ? count : 3) * sizeof *hits);
+            assert_int_equal(fct_scene_closest_hit(scene, &ray, &first, NULL), count > 0);
+            if (count && !backend) assert_memory_equal(&first, hits, sizeof first);
+            size_t expected = 0, at = 0;
+            bool certain = true;
+            v3 o = v3_load(ray.origin), d = v3_load(ray.direction);
+            for (uint32_t i = 0; i < view.instance_count; ++i)
+                for (uint32_t f = 0; f < face_count(&view, i); ++f) {
+                    double t, rim;
+                    v3 a = corner(&view, i, f, 0), b = corner(&view, i, f, 1), c = corner(&view, i, f, 2);
+                    if (!hit_triangle(o, d, a, b, c, &t, &rim)) continue;
+                    if (t < ray.t_min - 1e-4 || t > ray.t_max + 1e-4) continue;
+                    certain = certain && rim > 1e-4 && t > ray.t_min + 1e-4 && t < ray.t_max - 1e-4;
+                    ++expected;
+                    for (at = 0; at < count; ++at)
+                        if (hits[at].instance == i && hits[at].place == f) break;
+                    if (rim < 1e-4 || t < ray.t_min + 1e-4 || t > ray.t_max - 1e-4) continue;
+                    assert_true(at < count && fabs(hits[at].t - t) < 1e-4);
+                    double sign = view.instances[i].mirrored ? -1 : 1;
+                    v3 n = v3_scale(v3_unit(v3_cross(v3_sub(b, a), v3_sub(c, a))), sign);
+                    assert_true(v3_norm(v3_sub(v3_load(hits[at].normal), n)) < 1e-3);
+                }
+            if (certain) assert_int_equal(count, expected);
+            for (size_t i = 1; i < count; ++i) {
+                const fct_scene_hit *a = &hits[i - 1], *b = &hits[i];
+                assert_true(a->t < b->t ||
+                            (a->t == b->t && (a->instance < b->instance ||
+                                              (a->instance == b->instance && a->face < b->face))));
+            }
+            checked += certain, several += count > 2;
+        }
+        assert_true(checked > 300 && several > 20);
+        fct_scene_destroy(scene);
+    }
+}
+
+/* Two grids in one place: equal t are in the order of the instances, then of the faces. */
+static void equal_hits_are_in_order(void **unused) {
+    (void)unused;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_grid(&env, 2);
+    fct_scene *scene;
+    fct_material material = {.name = "m"};
+    uint32_t id;
+    assert_int_equal(fct_scene_create(&env, FCT_BACKEND_OBB, &scene), FCT_OK);
+    assert_int_equal(fct_scene_add_material(scene, &material, &id), FCT_OK);
+    assert_int_equal(fct_scene_add_object(scene, "object", &mesh, NULL, NULL, id, NULL), FCT_OK);
+    assert_int_equal(fct_scene_add_instance(scene, "again", 0, NULL, FCT_NONE), FCT_OK);
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    const float *middle = mesh.positions + 3 * (mesh.vertex_count / 2);
+    fct_ray ray = {{middle[0], middle[1], middle[2] + 5}, 0, {0, 0, -1}, INFINITY};
+    fct_scene_hit hits[32], last[32];
+    size_t count = fct_scene_all_hits(scene, &ray, 32, hits, NULL);
+    assert_true(count >= 4 && count <= 32 && count % 2 == 0);
+    for (size_t i = 0; i < count; ++i) {
+        assert_true(hits[i].t == hits[0].t);
+        assert_int_equal(hits[i].instance, i >= count / 2);
+        if (i % (count / 2)) assert_true(hits[i - 1].face < hits[i].face);
+    }
+    for (size_t capacity = 1; capacity < count; ++capacity) {
+        assert_int_equal(fct_scene_all_hits(scene, &ray, capacity, last, NULL), count);
+        assert_memory_equal(last, hits, capacity * sizeof *hits);
+    }
+    fct_scene_destroy(scene);
+    fct_mesh_release(&env, &mesh);
+}
+
 static void instances_say_what_their_transforms_do(void **unused) {
     (void)unused;
     fct_env env = fct_env_default();
@@ -455,6 +591,9 @@ int main(void) {
         cmocka_unit_test(what_has_no_area_is_refused),
         cmocka_unit_test(useless_rays_hit_nothing),
         cmocka_unit_test(closest_points_agree_with_brute_force),
+        cmocka_unit_test(points_have_the_attributes_of_their_model),
+        cmocka_unit_test(all_hits_are_sorted_and_complete),
+        cmocka_unit_test(equal_hits_are_in_order),
         cmocka_unit_test(instances_say_what_their_transforms_do),
         cmocka_unit_test(volumes_hold_every_instance_once),
         cmocka_unit_test(bounds_are_exact),

@@ -265,7 +265,7 @@ done
 for bad in '1 0 0 0 0 1 0 0 1 0 0 0' '0 0 0 0 0 0 0 0 0 0 0 0' '1 2 3 0 4 5 6 0 7 8 9 0'; do
     { moved 0 0 0; moved 1 1 1; echo "$bad"; } >bad.txt
     expect 65 collide cube.off cube.off --poses bad.txt
-    says "bad.txt: pose 2: expected a matrix with an inverse, found the determinant 0"
+    says "bad.txt:3: pose 2: expected a matrix with an inverse, found the determinant 0"
 done
 : >none.txt
 expect 1 collide cube.off cube.off --poses none.txt

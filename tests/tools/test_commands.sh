@@ -104,6 +104,7 @@ expect 0 info boxes.ply --json
 holds "$(value faces) == 72 && $(value vertices) == 48 && $(value boundary_edges) == 0 && $(value misoriented_edges) == 0"
 
 # --- raycast, closest ---
+: >none.txt
 cat >rays.txt <<'END'
 # from outside, from inside, beside, too short, beginning behind
 .1 .2 5  0 0 -1
@@ -124,6 +125,51 @@ check "occlusion" test "$(tr '\n' ' ' <out)" = "1 1 0 0 1 "
 expect 0 raycast cube.off --rays rays.txt --json
 keys rays hits seconds
 holds "$(value rays) == 5 && $(value hits) == 3"
+expect 0 raycast cube.off --rays rays.txt --all
+check "all hits of a cube" test "$(awk '{ print $1 ":" ($2 < 0 ? "miss" : $3) }' out | tr '\n' ' ')" = "0:4 0:6 1:1 2:miss 3:miss 4:3 "
+cp out all.txt
+check "the first of all hits is the closest" cmp -s <(awk '$1 != p { p = $1; $1 = ""; print substr($0, 2) }' p=-1 all.txt) obb.txt
+expect 0 raycast cube.off --rays rays.txt --all --json
+keys rays hits rays_hit seconds
+holds "$(value rays) == 5 && $(value hits) == 4 && $(value rays_hit) == 3"
+expect 0 raycast cube.off --rays none.txt --all
+check "no rays, no hits" test ! -s out
+# A pile of 300 squares: a chunk has no room for the hits of one ray, and few rays fit one text.
+awk 'BEGIN { print "OFF"; print 1200, 300, 0; for (i = 0; i < 300; ++i) { z = i * 7 % 300
+    print 0, 0, z; print 1, 0, z; print 1, 1, z; print 0, 1, z } for (i = 0; i < 300; ++i) print 4, 4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3 }' >pile.off
+awk 'BEGIN { for (i = 0; i < 500; ++i) print .1 + i / 1000, .05, i % 2 ? -1 : 9, 0, 0, i % 3 ? 1 : -1, 0, i % 97 ? 100.5 : "inf" }' >many.txt
+expect 0 raycast pile.off --rays many.txt --all -o pile.txt
+expect 0 raycast pile.off --rays many.txt --all -o one.txt --threads 1
+check "all hits on every number of threads" cmp pile.txt one.txt
+awk '{ up = $6 > 0; last = $8 == "inf" ? 1e9 : $8; start = $3; any = 0
+    for (k = 0; k < 300; ++k) { z = up ? k : 299 - k; t = up ? z - start : start - z; if (t >= 0 && t <= last) { print NR - 1, t; any = 1 } }
+    if (!any) print NR - 1, "miss" }' many.txt >wanted.txt
+check "each square of the pile is hit in order" cmp -s <(awk '{ print $1, ($2 < 0 ? "miss" : $3) }' pile.txt) wanted.txt
+# Attributes: linear fields on a square. The mesh has no normals.
+cat >field.obj <<'END'
+v 0 0 0 1 0 0
+v 2 0 0 0 1 0
+v 2 2 0 0 0 1
+v 0 2 0 1 1 1
+vt 0 0
+vt 1 0
+vt 1 .5
+vt 0 .5
+vn 1 0 1
+vn 0 0 1
+f 1/1/1 2/2/2 3/3/2
+f 1/1/2 3/3/2 4/4/1
+END
+echo '1.5 .5 3 0 0 -2' >field-ray.txt
+expect 0 raycast field.obj --rays field-ray.txt --attributes normal,uv,color
+holds "$(awk '{ print NF == 12 && $1 == 0 && $2 == 1.5 && ($5 - .242536) ^ 2 < 1e-10 && $6 == 0 && ($7 - .970143) ^ 2 < 1e-10 }' out)"
+holds "$(awk '{ print $8 == .75 && $9 == .125 && $10 == .25 && $11 == .5 && $12 == .25 }' out)"
+expect 0 raycast field.obj --rays field-ray.txt --attributes uv --all
+check "attributes of all hits" test "$(cut -d " " -f 1,6,7 out)" = "0 .75 .125" -o "$(cut -d " " -f 1,6,7 out)" = "0 0.75 0.125"
+expect 65 raycast cube.off --rays rays.txt --attributes normal
+says "cube.off: expected normals for --attributes, found none"
+expect 65 raycast sphere.fct --rays rays.txt --attributes color,uv
+says "sphere.fct: expected"
 expect 0 raycast sphere.fct --check --json
 keys rays hits differences explained unexplained seconds obb embree
 holds "$(value rays) == 1000000 && $(value unexplained) == 0 && $(value hits) > 100000"
@@ -135,7 +181,6 @@ for bad in '0 0 0 1 1' '0 0 0 1 1 1 0 1 2' '0 0 x 1 1 1' '0 0 nan 1 1 1' 'inf 0 
     says "bad.txt:2: expected"
 done
 expect 66 raycast cube.off --rays missing.txt
-: >none.txt
 expect 0 raycast cube.off --rays none.txt
 check "no rays, no hits" test ! -s out
 printf '3 0 0\n0.9 0 0\n' >points.txt

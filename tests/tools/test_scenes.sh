@@ -54,6 +54,9 @@ holds "($(value emitted) - $(value absorbed) - $(value escaped)) ^ 2 < ($(value 
 check "the probe lies on the room" grep -q '"object": "room"' out
 expect 0 info lit.ply --json
 check "the bake has colours" test "$(value vertex_colors)" = true
+printf "# a comment\n0 0 -1  0 0 1\n\n0 0 0  0 0 0\n" >bad-probes.txt
+expect 65 bake furnace.json --probe bad-probes.txt
+says "bad-probes.txt:4: expected a normal"
 expect 0 bake furnace.json --probe - <probes.txt
 check "probes without -o are printed" grep -q '^probe 0 0 -1: radiosity' out
 expect 0 bake furnace.json -o lit.glb --visibility embree --final direct --error 5e-5 --exposure .5 --max-edge .5 --quiet
@@ -166,6 +169,13 @@ for file in lit/*.ply; do expect 0 info "$file"; done
 printf '0 0 0 1 0 0\n0 0 0 0 0 1\n9 9 9 1 0 0\n' >rays.txt
 expect 0 raycast two.json --rays rays.txt
 check "rays through a scene" test "$(awk '{ print $1 < 0 ? -1 : $1 }' out | tr '\n' ' ')" = "2 0 -1 "
+expect 0 raycast two.json --rays rays.txt --all
+check "all hits in a scene" test "$(awk '$1 != p { print $1, $2 < 0 ? -1 : $2; p = $1 }' p=-1 out | tr '\n' ' ')" = "0 2 1 0 2 -1 "
+check "all hits of a scene are sorted" sort -s -c -k 1,1n -k 4,4g out
+expect 0 raycast two.json --rays rays.txt --all --json
+holds "$(value rays_hit) == 2 && $(value hits) >= 2"
+expect 65 raycast two.json --rays rays.txt --attributes uv
+says 'two.json: model "'
 expect 0 raycast two.json --rays rays.txt --occlusion --backend embree
 check "occlusion in a scene" test "$(tr '\n' ' ' <out)" = "1 1 0 "
 echo '.1 0 0' >points.txt

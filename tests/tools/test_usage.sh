@@ -101,6 +101,15 @@ expect 64 raycast cube.off
 expect 64 raycast cube.off --check --backend obb
 expect 64 raycast cube.off --check --occlusion
 expect 64 raycast cube.off --count 5
+expect 64 raycast cube.off --check --all
+expect 64 raycast cube.off --rays r --all --occlusion
+expect 64 raycast cube.off --rays r --occlusion --attributes uv
+expect 64 raycast cube.off --make-rays 5 --all
+expect 64 raycast cube.off --rays r --all --backend embree
+says "--all: expected the backend obb, found embree"
+expect 64 raycast cube.off --rays r --attributes smell
+says "expected normal, uv or color, found 'smell'"
+expect 64 raycast cube.off --rays r --attributes uv,uv
 expect 64 raycast cube.off --rays r --backend bvh
 expect 64 raycast - --rays -
 expect 64 raycast scene.json --check

@@ -23,24 +23,28 @@ static json_t *describe_probes(const fct_scene_view *scene, const float *points,
     return list;
 }
 
+static int check_normal(tool *t, const char *place, double *row, void *user) {
+    (void)user;
+    if (row[3] != 0 || row[4] != 0 || row[5] != 0) return TOOL_DONE;
+    return tool_fail(t, TOOL_DATA, "%s: expected a normal, found a vector of length 0", place);
+}
+
 int bake_read_probes(tool *t, const char *path, bake_probes *set) {
-    int code = tool_rows_read(t, path, 6, 6, NULL, &set->rows);
+    const tool_row_format format = {.least = 6, .columns = 6, .check = check_normal};
+    int code = tool_rows_read(t, path, &format, &set->rows);
     if (code != TOOL_DONE) return code;
     set->count = set->rows.count;
     set->points = tool_allocate(t, set->count, 3 * sizeof *set->points);
     set->normals = tool_allocate(t, set->count, 3 * sizeof *set->normals);
-    if (!set->points || !set->normals) code = TOOL_MEMORY;
-    for (size_t i = 0; i < set->count && code == TOOL_DONE; ++i) {
-        const double *row = set->rows.values + 6 * i;
-        double length = sqrt(row[3] * row[3] + row[4] * row[4] + row[5] * row[5]);
-        if (!(length > 0)) {
-            code = tool_fail(t, TOOL_DATA, "%s: row %zu: expected a normal, found a vector of length 0", path,
-                             i + 1);
-            break;
-        }
-        for (size_t c = 0; c < 3; ++c) set->normals[3 * i + c] = (float)(row[3 + c] / length);
+    if (!set->points || !set->normals) return TOOL_MEMORY;
+    for (size_t i = 0; i < set->count; ++i) {
+        const double *n = set->rows.values + 6 * i + 3;
+        double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2]))), x = n[0] / largest,
+               y = n[1] / largest, z = n[2] / largest, length = sqrt(x * x + y * y + z * z);
+        set->normals[3 * i] = (float)(x / length), set->normals[3 * i + 1] = (float)(y / length);
+        set->normals[3 * i + 2] = (float)(z / length);
     }
-    return code;
+    return TOOL_DONE;
 }
 
 static void print_probes(tool *t, const bake_probes *set, const fct_probe *probes) {

@@ -54,24 +54,32 @@ static bool is_similar(const double *row) {
     return true;
 }
 
-static int check_poses(tool *t, const char *name, const tool_rows *rows) {
-    bool warned = false;
-    for (size_t i = 0; i < rows->count; ++i) {
-        const double *row = rows->values + COLUMNS * i;
-        double determinant = find_determinant(row);
-        if (!has_inverse(row, determinant))
-            return tool_fail(t, TOOL_DATA,
-                             "%s: pose %zu: expected a matrix with an inverse, found the determinant %g",
-                             name, i, determinant);
-        if (!warned && !is_similar(row))
-            tool_warn(t, "%s: pose %zu: the matrix shears or scales unequally, so its queries are slow", name,
-                      i);
-        warned = warned || !is_similar(row);
-    }
+/* The rows so far. */
+typedef struct pose_check {
+    size_t count;
+    bool warned;
+} pose_check;
+
+static int check_pose(tool *t, const char *place, double *row, void *user) {
+    pose_check *so_far = user;
+    double determinant = find_determinant(row);
+    size_t number = so_far->count++;
+    if (!has_inverse(row, determinant))
+        return tool_fail(t, TOOL_DATA,
+                         "%s: pose %zu: expected a matrix with an inverse, found the determinant %g", place,
+                         number, determinant);
+    if (so_far->warned || is_similar(row)) return TOOL_DONE;
+    tool_warn(t, "%s: pose %zu: the matrix shears or scales unequally, so its queries are slow", place,
+              number);
+    so_far->warned = true;
     return TOOL_DONE;
 }
 
 /* --- Reading --- */
+
+static tool_row_format make_format(pose_check *so_far) {
+    return (tool_row_format){.least = COLUMNS, .columns = COLUMNS, .check = check_pose, .user = so_far};
+}
 
 /* The numbers may be separated by commas. */
 static int parse_pose(tool *t, const char *text, tool_rows *rows) {
@@ -82,11 +90,12 @@ static int parse_pose(tool *t, const char *text, tool_rows *rows) {
     for (size_t i = 0; i <= length; ++i) copy[i] = text[i] == ',' || text[i] == '\n' ? ' ' : text[i];
     FILE *file = fmemopen(copy, length, "r");
     if (!file) return tool_fail(t, TOOL_MEMORY, "--pose: out of memory");
-    int code = tool_rows_parse(t, "--pose", file, COLUMNS, COLUMNS, NULL, rows);
+    pose_check so_far = {0};
+    const tool_row_format format = make_format(&so_far);
+    int code = tool_rows_parse(t, "--pose", file, &format, rows);
     fclose(file);
     if (code == TOOL_DONE && rows->count == 0)
         code = tool_fail(t, TOOL_USAGE, "--pose: expected 12 numbers, found none");
-    if (code == TOOL_DONE) code = check_poses(t, "--pose", rows);
     return code == TOOL_DATA ? TOOL_USAGE : code;
 }
 
@@ -103,8 +112,9 @@ int collide_poses_read(tool *t, const char *text, const char *path, collide_pose
     *out = (collide_poses){0};
     if (text) return parse_pose(t, text, &out->rows);
     if (!path) return set_identity(t, &out->rows);
-    int code = tool_rows_read(t, path, COLUMNS, COLUMNS, NULL, &out->rows);
-    return code == TOOL_DONE ? check_poses(t, strcmp(path, "-") ? path : "standard input", &out->rows) : code;
+    pose_check so_far = {0};
+    const tool_row_format format = make_format(&so_far);
+    return tool_rows_read(t, path, &format, &out->rows);
 }
 
 void collide_poses_release(tool *t, collide_poses *poses) {

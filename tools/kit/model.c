@@ -7,22 +7,39 @@
 #include "facetree/dual.h"
 #include "tools/kit/file.h"
 
-int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree) {
-    *tree = NULL;
-    if (tool_has_format(t, path, "fct")) return tool_result(t, fct_tree_open(&t->env, path, tree));
+/* Builds the tree of a mesh file. *mesh is that of the file. */
+static int build_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree, fct_mesh *mesh) {
     fct_tree_def used = def ? *def : fct_tree_def_default();
     used.weld = !t->no_weld;
-    fct_mesh mesh;
-    int code = tool_result(t, fct_mesh_load(&t->env, path, &mesh));
-    if (code != TOOL_DONE) return code;
-    t->bar.items = mesh.face_count;
+    t->bar.items = mesh->face_count;
     t->bar.unit = "faces";
-    if (mesh.face_count == 0)
-        code = tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", path);
-    else
-        code = tool_result(t, fct_tree_build(&t->env, &mesh, &used, NULL, tree));
-    fct_mesh_release(&t->env, &mesh);
-    return tool_context(t, code, path);
+    if (mesh->face_count == 0)
+        return tool_fail(t, TOOL_DATA, "%s: expected at least one face, found none", path);
+    return tool_context(t, tool_result(t, fct_tree_build(&t->env, mesh, &used, NULL, tree)), path);
+}
+
+int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree) {
+    return tool_open_tree_mesh(t, path, def, tree, NULL);
+}
+
+int tool_open_tree_mesh(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree, fct_mesh *mesh) {
+    fct_mesh own = {0}, *read = mesh ? mesh : &own;
+    *tree = NULL;
+    *read = own;
+    int code;
+    if (tool_has_format(t, path, "fct")) {
+        code = tool_result(t, fct_tree_open(&t->env, path, tree));
+        if (code == TOOL_DONE && mesh) code = tool_result(t, fct_tree_mesh(&t->env, *tree, mesh));
+    } else {
+        code = tool_result(t, mesh ? fct_mesh_load_shaded(&t->env, path, mesh)
+                                   : fct_mesh_load(&t->env, path, read));
+        if (code == TOOL_DONE) code = build_tree(t, path, def, tree, read);
+    }
+    if (!mesh || code != TOOL_DONE) fct_mesh_release(&t->env, read);
+    if (code == TOOL_DONE) return code;
+    fct_tree_destroy(*tree);
+    *tree = NULL;
+    return code;
 }
 
 void tool_warn_inward(tool *t, const char *path, bool inward) {

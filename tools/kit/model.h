@@ -8,6 +8,9 @@
 /* The hierarchy of a .fct file, or one built from a mesh file with `def` (NULL: the default), and with
  * --no-weld if the command got it. */
 int tool_open_tree(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree);
+/* The same, and the mesh with all its attributes, in the order of the file; a .fct has only colours. The
+ * caller releases it. mesh may be NULL. */
+int tool_open_tree_mesh(tool *t, const char *path, const fct_tree_def *def, fct_tree **tree, fct_mesh *mesh);
 /* Warns if the surface is closed and wound inwards. */
 void tool_warn_inward(tool *t, const char *path, bool inward);
 /* The mesh of a tree with the triangles that connect its faces: with --no-weld those of the input, else

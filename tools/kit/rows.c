@@ -21,8 +21,7 @@ typedef struct reader {
     tool *t;
     const char *path;
     size_t line;
-    int least, columns;
-    const double *missing;
+    const tool_row_format *format;
 } reader;
 
 /* Reads the numbers of one line into `row`; *found receives their count. */
@@ -37,21 +36,22 @@ static int parse_row(const reader *r, const char *text, double *row, int *found)
         if (end == text || !strchr(" \t\r\n\v\f#", *end))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number, found '%s'", r->path, r->line,
                              copy_word(text, word));
-        bool must_be_finite = *found < r->least || isnan(value);
+        bool must_be_finite = *found < r->format->least || isnan(value);
         bool written_infinite = strncasecmp(text + strspn(text, "+-"), "inf", 3) == 0;
         if (!isfinite((float)value) && (must_be_finite || !written_infinite))
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected a number below 3.4e38, found '%s'", r->path,
                              r->line, copy_word(text, word));
-        if (*found == r->columns)
+        if (*found == r->format->columns)
             return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers at most, found more: '%s'",
-                             r->path, r->line, r->columns, copy_word(text, word));
+                             r->path, r->line, r->format->columns, copy_word(text, word));
         row[(*found)++] = value;
         text = end;
     }
-    if (*found && *found < r->least)
-        return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers, found %d", r->path, r->line, r->least,
-                         *found);
-    for (int i = *found; *found && i < r->columns; ++i) row[i] = r->missing[i - r->least];
+    if (*found && *found < r->format->least)
+        return tool_fail(r->t, TOOL_DATA, "%s:%zu: expected %d numbers, found %d", r->path, r->line,
+                         r->format->least, *found);
+    for (int i = *found; *found && i < r->format->columns; ++i)
+        row[i] = r->format->missing[i - r->format->least];
     return TOOL_DONE;
 }
 
@@ -67,6 +67,13 @@ static int reserve_row(tool *t, tool_rows *rows, size_t *capacity, int columns) 
     return TOOL_DONE;
 }
 
+static int check_row(const reader *r, double *row) {
+    char place[1024];
+    if (!r->format->check) return TOOL_DONE;
+    snprintf(place, sizeof place, "%s:%zu", r->path, r->line);
+    return r->format->check(r->t, place, row, r->format->user);
+}
+
 static int read_rows(reader *r, FILE *file, tool_rows *rows) {
     char *text = NULL;
     size_t size = 0, capacity = 0;
@@ -79,9 +86,11 @@ static int read_rows(reader *r, FILE *file, tool_rows *rows) {
             code = tool_fail(r->t, TOOL_DATA, "%s:%zu: expected text, found a zero byte", r->path, r->line);
             break;
         }
-        code = reserve_row(r->t, rows, &capacity, r->columns);
+        code = reserve_row(r->t, rows, &capacity, r->format->columns);
         if (code == TOOL_DONE)
-            code = parse_row(r, text, rows->values + rows->count * (size_t)r->columns, &found);
+            code = parse_row(r, text, rows->values + rows->count * (size_t)r->format->columns, &found);
+        if (code == TOOL_DONE && found)
+            code = check_row(r, rows->values + rows->count * (size_t)r->format->columns);
         if (code == TOOL_DONE && found) ++rows->count;
     }
     if (code == TOOL_DONE && (ferror(file) || !feof(file)))
@@ -90,23 +99,21 @@ static int read_rows(reader *r, FILE *file, tool_rows *rows) {
     return code;
 }
 
-int tool_rows_parse(tool *t, const char *name, FILE *file, int least, int columns, const double *missing,
-                    tool_rows *rows) {
+int tool_rows_parse(tool *t, const char *name, FILE *file, const tool_row_format *format, tool_rows *rows) {
     *rows = (tool_rows){0};
-    reader r = {t, name, 0, least, columns, missing};
+    reader r = {t, name, 0, format};
     int code = read_rows(&r, file, rows);
     if (code != TOOL_DONE) tool_rows_release(t, rows);
     return code;
 }
 
-int tool_rows_read(tool *t, const char *path, int least, int columns, const double *missing,
-                   tool_rows *rows) {
+int tool_rows_read(tool *t, const char *path, const tool_row_format *format, tool_rows *rows) {
     *rows = (tool_rows){0};
-    if (!strcmp(path, "-")) return tool_rows_parse(t, "standard input", stdin, least, columns, missing, rows);
+    if (!strcmp(path, "-")) return tool_rows_parse(t, "standard input", stdin, format, rows);
     FILE *file = fopen(path, "re");
     if (!file) return tool_fail(t, TOOL_INPUT, "%s: cannot be read: %s", path, strerror(errno));
     int code = tool_note_input(t, path);
-    if (code == TOOL_DONE) code = tool_rows_parse(t, path, file, least, columns, missing, rows);
+    if (code == TOOL_DONE) code = tool_rows_parse(t, path, file, format, rows);
     fclose(file);
     return code;
 }

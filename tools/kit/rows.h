@@ -9,13 +9,20 @@ typedef struct tool_rows {
     double *values; /* count x columns; those that are finite fit a float */
 } tool_rows;
 
-/* Reads rows of least..columns numbers; "-" is stdin. missing (columns - least): the values of absent
- * columns. Empty lines and text after # are skipped. The first `least` columns must be finite. Returns an
- * exit code. */
-int tool_rows_read(tool *t, const char *path, int least, int columns, const double *missing, tool_rows *rows);
+/* What a row holds. */
+typedef struct tool_row_format {
+    int least, columns;    /* numbers; the first `least` must be there, and finite */
+    const double *missing; /* columns - least: the values of absent columns */
+    /* Checks a row; `place` is "FILE:LINE". Returns an exit code. NULL: every row is good. */
+    int (*check)(tool *t, const char *place, double *row, void *user);
+    void *user;
+} tool_row_format;
+
+/* Reads rows; "-" is stdin. Empty lines and text after # are skipped. Errors name the line. Returns an exit
+ * code. */
+int tool_rows_read(tool *t, const char *path, const tool_row_format *format, tool_rows *rows);
 /* The same for an open file. `name` is used in messages. */
-int tool_rows_parse(tool *t, const char *name, FILE *file, int least, int columns, const double *missing,
-                    tool_rows *rows);
+int tool_rows_parse(tool *t, const char *name, FILE *file, const tool_row_format *format, tool_rows *rows);
 /* Writes count points relative to the origin: columns [column, column + 3) of each row. */
 void tool_rows_points(const tool_rows *rows, int columns, int column, const double origin[3], float *points);
 void tool_rows_release(tool *t, tool_rows *rows);
