@@ -2,7 +2,8 @@
 """Bakes the scenes of scenes.py and measures what a viewer shows, colours interpolated inside triangles, against paths.
 usage: measure.py FACETREE OUT [--scenes NAME,...] [--points N] [--paths N] [--bake "OPTIONS"] [--csv FILE] [--map]
 Prints per scene: RMS, bias and 99th percentile of the error over the mean, also of the worst object of at least .5 % of the
-area; rays per vertex, times, and the estimate of the bake itself. Emitters are left out. With --map also how well the error of
+area; rays per vertex, times, and the estimate of the bake itself. Emitters are left out, and so are points that no path of
+light reaches: they lie under other bodies, where no viewer sees them. With --map also how well the error of
 each vertex predicts: the error at the points in ten groups of the same size, from the least to the largest prediction. Needs
 numpy."""
 import argparse
@@ -69,6 +70,8 @@ def trace_points(tool, scene, path, paths):
 
 def judge(shown, halves, area):
     """RMS, bias, 99th percentile over the mean; the error of the reference cancels in the product of its halves."""
+    seen = (halves[0] + halves[1]).sum(1) > 0
+    shown, halves = shown[seen], [h[seen] for h in halves]
     truth = (halves[0] + halves[1]) / 2
     mean = truth.mean()
     square = ((shown - halves[0]) * (shown - halves[1])).mean()

@@ -133,7 +133,11 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
             note_sight(q, slot, visible);
         }
         bool mixed = all <= 0 || (seen > 0 && seen < all);
-        if (!mixed || q->fixed) break;
+        if (!mixed || (q->fixed && (all > 0 || sent >= MAX_RAYS))) break;
+        if (q->fixed) { /* no point has a weight yet; without any, the light would be lost */
+            goal += q->base_rays;
+            continue;
+        }
         goal = count_wanted_rays(q, all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
     }
     return all > 0 ? seen / all : 0;

@@ -32,9 +32,8 @@
 #define TENT_SHARE .5
 /* Least standard error over the irradiance. */
 #define LEAST_SHARE .003
-/* The squared scale of the pattern counts as much as this number of points of the check. Small surfaces have
- * 16 points, which miss the few places with large errors: in the museum, the check finds 3.0 % for the gyroid
- * and 16.5 % for a vase, the pattern 11 and 13 %, and paths 8.8 and 5.4 %. */
+/* The squared scale of the pattern counts as much as this number of points of the check, because the points
+ * of small surfaces may miss the few places with large errors. */
 #define PATTERN_POINTS 32
 /* Least factor on the squared pattern, because a check may come out negative by chance. */
 #define LEAST_FACTOR (1. / 9)

@@ -5,6 +5,7 @@
 
 #include "radiosity/solve/iterate.h"
 #include "radiosity/solve/oracle.h"
+#include "radiosity/surface/cover.h"
 #include "scene/coarse.h"
 #include "scene/rays.h"
 
@@ -54,6 +55,7 @@ typedef struct gathering {
     uint32_t *hits;     /* leaf x rays: the element hit, HIT_NOTHING or HIT_BLACK */
     float *spread;      /* per leaf: fct_direct_spread; NULL once splitting is over */
     float *bare;        /* per leaf: fraction of the surface that no other face covers exactly */
+    float *open;        /* per leaf: fraction of the surface that some ray can see; 1 if none can */
     double *irradiance; /* per leaf x 3: of the sweep under way */
     uint64_t *chunk_rays;
     uint32_t rays; /* per leaf */
@@ -113,19 +115,31 @@ static bool is_bare(const fct_elements *set, uint32_t instance, const fct_elemen
     return hit.instance == instance && hit.place == p->place;
 }
 
+static bool is_covered(const gathering *g, const fct_element_point *p, uint64_t seed, uint64_t *rays) {
+    return fct_point_is_covered(g->set->scene, p->position, p->normal, p->offset, seed, NULL, rays);
+}
+
+/* The fraction of the uncovered surface that no other face covers exactly. */
+static float measure_bare(const gathering *g, uint32_t id, uint64_t seed, uint64_t *rays) {
+    uint32_t bare = 0, points = 0;
+    for (uint32_t k = 0; k < BARE_POINTS; ++k) {
+        fct_element_point p;
+        fct_element_point_at(g->set, id, 4 * k, &p);
+        const bool alone = is_bare(g->set, g->set->items[id].instance, &p);
+        if (!alone && is_covered(g, &p, fct_hash3(seed, k, 1), rays)) continue;
+        ++points, bare += alone;
+    }
+    return points > 0 ? (float)bare / (float)points : 1;
+}
+
 static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     gathering *g = user;
     (void)thread;
+    uint64_t rays = (uint64_t)(end - begin) * g->rays;
     for (size_t l = begin; l < end; ++l) {
-        uint32_t id = g->leaves[l];
+        uint32_t id = g->leaves[l], covered = 0;
         uint64_t seed = fct_hash2(g->seed ^ 0x6761746865720001u, id);
-        uint32_t instance = g->set->items[id].instance, bare = 0;
-        for (uint32_t k = 0; k < BARE_POINTS; ++k) {
-            fct_element_point p;
-            fct_element_point_at(g->set, id, 4 * k, &p);
-            bare += is_bare(g->set, instance, &p);
-        }
-        g->bare[l] = (float)bare / BARE_POINTS;
+        g->bare[l] = measure_bare(g, id, seed, &rays);
         for (uint32_t k = 0; k < g->rays; ++k) {
             double plane[2], place[2];
             fct_plane_point(k, seed, plane);
@@ -141,9 +155,11 @@ static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32
             g->hits[l * g->rays + k] = found.leaf != FCT_NONE ? found.leaf
                                        : found.black          ? HIT_BLACK
                                                               : HIT_NOTHING;
+            covered += found.black && is_covered(g, &p, fct_hash3(seed, k, 2), &rays);
         }
+        g->open[l] = covered < g->rays ? 1 - (float)covered / (float)g->rays : 1;
     }
-    g->chunk_rays[chunk] += (uint64_t)(end - begin) * g->rays;
+    g->chunk_rays[chunk] += rays;
 }
 
 /* Irradiance of leaf l: direct light plus the mean over the hits. halves (may be NULL) receives the
@@ -157,10 +173,11 @@ static void leaf_irradiance(const gathering *g, size_t l, double total[3], doubl
         for (int c = 0; c < 3; ++c) sums[2 * k >= g->rays][c] += b[c];
     }
     const double *direct = g->out->direct + 3 * (size_t)g->leaves[l];
-    for (int c = 0; c < 3; ++c) total[c] = direct[c] + (sums[0][c] + sums[1][c]) / g->rays;
+    const double open = g->open[l];
+    for (int c = 0; c < 3; ++c) total[c] = (direct[c] + (sums[0][c] + sums[1][c]) / g->rays) / open;
     for (int h = 0; halves && h < 2; ++h) {
         halves[h] = 0;
-        for (int c = 0; c < 3; ++c) halves[h] += direct[c] + 2 * sums[h][c] / g->rays;
+        for (int c = 0; c < 3; ++c) halves[h] += (direct[c] + 2 * sums[h][c] / g->rays) / open;
     }
 }
 
@@ -215,7 +232,8 @@ static void balance_power(gathering *g) {
     double noise = 0, level = 0;
     for (size_t l = 0; l < g->leaf_count; ++l) {
         const fct_element *e = &g->set->items[g->leaves[l]];
-        double irradiance[3], halves[2], lost = 0, dark = 0, area = e->area * g->bare[l];
+        double irradiance[3], halves[2], lost = 0, dark = 0, area = e->area * g->bare[l],
+                                         hidden = 1 - g->open[l];
         leaf_irradiance(g, l, irradiance, halves);
         for (uint32_t k = 0; k < g->rays; ++k) {
             lost += g->hits[l * g->rays + k] == HIT_NOTHING;
@@ -224,7 +242,8 @@ static void balance_power(gathering *g) {
         for (int c = 0; c < 3; ++c) {
             double b = e->emission[c] + e->reflectance[c] * irradiance[c];
             out->emitted += e->emission[c] * area;
-            out->absorbed += (1 - e->reflectance[c]) * irradiance[c] * area + b * area * dark / g->rays;
+            out->absorbed += (1 - e->reflectance[c]) * irradiance[c] * area * (1 - hidden);
+            out->absorbed += (b * (dark / g->rays - hidden) + e->emission[c] * hidden) * area;
             out->escaped += b * area * lost / g->rays;
         }
         level += e->area * (halves[0] + halves[1]) * (halves[0] + halves[1]) / 4;
@@ -306,7 +325,8 @@ static fct_result gather_and_solve(gathering *g, double tolerance) {
     const fct_env *env = g->set->env;
     size_t count = g->leaf_count, chunks = fct_chunk_count(count, LEAF_GRAIN);
     const fct_array arrays[] = {FCT_ARRAY(g->hits, count * g->rays), FCT_ARRAY_ZERO(g->chunk_rays, chunks),
-                                FCT_ARRAY(g->bare, count), FCT_ARRAY(g->irradiance, 3 * count)};
+                                FCT_ARRAY(g->bare, count), FCT_ARRAY(g->open, count),
+                                FCT_ARRAY(g->irradiance, 3 * count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the solution");
     if (result != FCT_OK) return result;
     result = fct_parallel_for_progress(env, "direct light", count, LEAF_GRAIN, direct_chunk, g);

@@ -471,6 +471,28 @@ static void fractions_are_unbiased(void **state) {
     end(&f);
 }
 
+/* Points of a lamp below the horizon have no weight. Two such points must not lose the light of the rest:
+ * here a fifth of the lamp is above the horizon of a receiver that sees it on edge. */
+static void points_below_the_horizon_lose_no_light(void **state) {
+    (void)state;
+    fixture f = begin();
+    add_ground(&f);
+    place_sheet(&f.env, f.scene, place_material(f.scene, 0, 1, false), 1, v3_make(1, -.5, -.8),
+                v3_make(0, 0, 1), v3_make(0, 1, 0));
+    light_up(&f);
+    const double point[3] = {0, 0, 0}, normal[3] = {0, 0, 1};
+    const double open = open_light(&f, v3_make(0, 0, 0), up);
+    assert_true(open > 0);
+    for (uint32_t base = 1; base <= 4; base *= 2)
+        for (uint64_t seed = 0; seed < 200; ++seed) {
+            double e[3];
+            fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, 0, NULL, e,
+                             NULL);
+            assert_near(e[0], open, 1e-9);
+        }
+    end(&f);
+}
+
 /* Each allocation in turn fails; nothing leaks. */
 static void memory_runs_out(void **state) {
     (void)state;
@@ -567,6 +589,7 @@ int main(void) {
         cmocka_unit_test(single_triangle),
         cmocka_unit_test(points_have_the_light_as_mean),
         cmocka_unit_test(fractions_are_unbiased),
+        cmocka_unit_test(points_below_the_horizon_lose_no_light),
         cmocka_unit_test(memory_runs_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -150,6 +150,10 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
             fct_lamp_point p = fct_cut_point(lamp, rec, cut, u[0], u[1]);
             if (p.weight > 0) all += p.weight, seen += sees(q, lamp, slot, sent < known, p.y) ? p.weight : 0;
         }
+        if (fixed && all == 0 && sent < 64) {
+            goal += base;
+            continue;
+        }
         if (fixed || (all > 0 && (seen == 0 || seen == all))) break;
         goal = count_rays(base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
     }

@@ -4,6 +4,7 @@
 #include "../place.h"
 #include "../soup.h"
 #include "radiosity/solve/transport.h"
+#include "radiosity/surface/cover.h"
 
 static fct_env plain; /* outlives every scene */
 
@@ -166,11 +167,11 @@ static void follow_splits(const fct_elements *set, const fct_lamps *lamps, size_
     assert_int_equal(next, set->count);
 }
 
-enum { NOTHING = -1, BLACK = -2 };
+enum { NOTHING = -1, BLACK = -2, COVERED = -3 };
 
-/* The leaf that ray k of a leaf finds, NOTHING or BLACK. */
+/* The leaf that ray k of a leaf finds, NOTHING or BLACK; COVERED: black, from a covered point. */
 static int64_t trace_ray(const fct_elements *set, const fct_transport *t, uint64_t seed, uint32_t id,
-                         uint32_t k, uint32_t rays) {
+                         uint32_t k, uint32_t rays, uint64_t *sent) {
     uint64_t own = fct_hash2(seed ^ 0x6761746865720001u, id);
     double plane[2], place[2];
     fct_element_point p;
@@ -181,7 +182,11 @@ static int64_t trace_ray(const fct_elements *set, const fct_transport *t, uint64
     v3_store(origin, v3_mad(v3_load(p.position), p.offset, v3_load(p.normal)));
     v3_store(direction, fct_cosine_direction(v3_load(p.normal), plane[0], plane[1]));
     fct_found f = fct_transport_look(set, t->stored, origin, direction);
-    return f.leaf != FCT_NONE ? (int64_t)f.leaf : f.black ? BLACK : NOTHING;
+    if (f.leaf != FCT_NONE) return (int64_t)f.leaf;
+    if (!f.black) return NOTHING;
+    return fct_point_is_covered(set->scene, p.position, p.normal, p.offset, fct_hash3(own, k, 2), NULL, sent)
+               ? COVERED
+               : BLACK;
 }
 
 static void solutions_solve_the_equations(void **state) {
@@ -205,8 +210,8 @@ static void solutions_solve_the_equations(void **state) {
         uint32_t rays = (uint32_t)(512 * fineness);
         int64_t *hits = malloc(set.count * rays * sizeof *hits);
         double *e = calloc(3 * set.count, sizeof *e), *next = calloc(3 * set.count, sizeof *next),
-               *direct = calloc(3 * set.count, sizeof *direct), emitted = 0, absorbed = 0, escaped = 0,
-               noise = 0, level = 0;
+               *direct = calloc(3 * set.count, sizeof *direct), *open = calloc(set.count, sizeof *open),
+               emitted = 0, absorbed = 0, escaped = 0, noise = 0, level = 0;
         for (uint32_t id = 0; id < set.count; ++id) {
             const fct_element *x = &set.items[id];
             if (x->child_count) continue;
@@ -217,7 +222,9 @@ static void solutions_solve_the_equations(void **state) {
                 for (int c = 0; c < 3; ++c) direct[3 * (size_t)id + (size_t)c] += light[c] / 4;
             }
             for (uint32_t k = 0; k < rays; ++k)
-                hits[(size_t)id * rays + k] = trace_ray(&set, &t, seed, id, k, rays);
+                open[id] +=
+                    (hits[(size_t)id * rays + k] = trace_ray(&set, &t, seed, id, k, rays, &sent)) != COVERED;
+            open[id] = open[id] > 0 ? open[id] / rays : 1;
         }
         assert_int_equal(t.rays, sent + count * rays);
         /* Jacobi; gather rays find the emission of emitters that are no lamps. */
@@ -232,7 +239,7 @@ static void solutions_solve_the_equations(void **state) {
                         sum += (double)y->reflectance[c] * e[3 * (size_t)h + c] +
                                (fct_lamps_sampled(lamps, y->instance) ? 0 : (double)y->emission[c]);
                     }
-                    next[3 * id + c] = direct[3 * id + c] + sum / rays;
+                    next[3 * id + c] = (direct[3 * id + c] + sum / rays) / open[id];
                 }
             double *swap = e;
             e = next, next = swap;
@@ -244,9 +251,9 @@ static void solutions_solve_the_equations(void **state) {
             double halves[2] = {0, 0}, lost = 0, dark = 0;
             for (uint32_t k = 0; k < rays; ++k) {
                 int64_t h = hits[id * rays + k];
-                lost += h == NOTHING, dark += h == BLACK;
+                lost += h == NOTHING, dark += h == BLACK || (h == COVERED && open[id] >= 1);
                 for (size_t c = 0; c < 3 && h >= 0; ++c)
-                    halves[k >= (rays + 1) / 2] += 2. / rays * (double)t.stored[3 * (size_t)h + c];
+                    halves[k >= (rays + 1) / 2] += 2. / rays * (double)t.stored[3 * (size_t)h + c] / open[id];
             }
             misses += lost > 0, blacks += dark > 0;
             for (size_t c = 0; c < 3; ++c) {
@@ -257,9 +264,11 @@ static void solutions_solve_the_equations(void **state) {
                 assert_near(x->irradiance[c], expected, 2e-6 * (1 + expected));
                 assert_near(x->radiosity[c], b, 2e-6 * (1 + b));
                 assert_near(t.stored[3 * id + c], b - (lamp ? (double)x->emission[c] : 0), 2e-6 * (1 + b));
-                halves[0] += direct[3 * id + c], halves[1] += direct[3 * id + c];
+                halves[0] += direct[3 * id + c] / open[id], halves[1] += direct[3 * id + c] / open[id];
                 emitted += x->area * x->emission[c];
-                absorbed += x->area * ((1 - (double)x->reflectance[c]) * expected + b * dark / rays);
+                absorbed +=
+                    x->area * (open[id] * (1 - (double)x->reflectance[c]) * expected + b * dark / rays);
+                absorbed += x->area * (1 - open[id]) * (double)x->emission[c]; /* the covered part keeps it */
                 escaped += x->area * b * lost / rays;
                 flux[c] += x->area * b;
             }
@@ -272,7 +281,7 @@ static void solutions_solve_the_equations(void **state) {
         assert_near(t.noise, sqrt(noise / level), 1e-5 * t.noise);
         for (int c = 0; c < 3; ++c) assert_near(set.items[0].radiosity[c], flux[c] / area, 1e-5);
         assert_true(t.converged && t.change < 1e-9 && t.sweeps > 10);
-        free(hits), free(e), free(next), free(direct);
+        free(hits), free(e), free(next), free(direct), free(open);
         fct_transport_release(&plain, &t);
         fct_elements_release(&set);
         fct_lamps_destroy(lamps);
