@@ -20,7 +20,10 @@
 
 /* In scaled units, more than the float test can move a triangle (model.h). */
 #define ROUNDING ((double)FCT_AXIS_PAD)
-enum { SLICE = 65536 /* rays per step */, AROUND = 16 /* rays of the ring in surface_covers */ };
+enum { SLICE = 65536 }; /* rays per step */
+/* Rays of the ring in surface_covers. Few rays settle most differences. A surface that folds back at a corner
+ * can leave a narrow gap, so many must agree: they are closer to each other than 2^-24. */
+enum { FEW = 16, MANY = 1024 };
 
 /* The ray in scaled units, with a unit direction. `origin` is the point of the ray's line nearest to the
  * centre of the model; distances start there. */
@@ -200,10 +203,11 @@ static uint64_t hash_sides_near(v3 point, const v3 p[3]) {
  *   3. each side that passes near the point belongs to an even number of faces. Faces that only touch (a
  * corner on another's side, or a face without area between them) may leave a slit after rounding. Only hits
  * before `farthest` count, because at a silhouette the rays of the ring also meet the surface behind. */
-static bool surface_covers(const checker *c, const exact_ray *e, v3 point, double farthest) {
+static bool surface_covers(const checker *c, const exact_ray *e, v3 point, double farthest, int around) {
     const fct_bvh *bvh = c->obb;
     const fct_tree_view *view = &bvh->view;
-    uint32_t height = 0, covered = 0;
+    bool covered[MANY] = {false};
+    uint32_t height = 0;
     uint64_t unpaired = 0;
     bool met = false;
     for (uint32_t r = 0; r < view->root_count; ++r) c->stack[height++] = view->roots[r];
@@ -225,13 +229,14 @@ static bool surface_covers(const checker *c, const exact_ray *e, v3 point, doubl
         unpaired ^= hash_sides_near(point, p);
         measure_rim_distance(e, p, 0, 0, &at);
         met = met || (at < farthest && crosses_exactly(bvh, e, place));
-        for (int i = 0; i < AROUND; ++i) {
-            double angle = 6.283185307179586 * i / AROUND, radius = 1.5 * ROUNDING;
+        for (int i = 0; i < around; ++i) {
+            double angle = 6.283185307179586 * i / around, radius = 1.5 * ROUNDING;
             double rim = measure_rim_distance(e, p, radius * fct_cos(angle), radius * fct_sin(angle), &at);
-            if (rim >= 0 && at < farthest) covered |= 1u << i;
+            covered[i] = covered[i] || (rim >= 0 && at < farthest);
         }
     }
-    return met && !unpaired && covered == (1u << AROUND) - 1;
+    for (int i = 0; i < around; ++i) met = met && covered[i];
+    return met && !unpaired;
 }
 
 /* Whether we missed a nearer hit of Embree's: cases 2 and 3 at the top of this file. A place is FCT_NONE on a
@@ -250,7 +255,8 @@ static bool misses_nearer_face(const checker *c, const exact_ray *e, uint32_t ou
     }
     if (their_distance < e->t_min + c->near || their_distance > e->t_max - c->near) return false;
     double farthest = ours == FCT_NONE ? INFINITY : (our_distance + their_distance) / 2;
-    return surface_covers(c, e, v3_mad(e->origin, their_distance, e->direction), farthest);
+    v3 point = v3_mad(e->origin, their_distance, e->direction);
+    return surface_covers(c, e, point, farthest, FEW) && surface_covers(c, e, point, farthest, MANY);
 }
 
 /* The place of the closest hit, or FCT_NONE. *at receives its distance from e->origin, without the rounding
