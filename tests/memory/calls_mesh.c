@@ -71,6 +71,12 @@ static fct_result load_mesh(const fct_env *env, const char *path) {
     return finish_mesh(env, &mesh, STARVE(fct_mesh_load(env, path, &mesh)));
 }
 
+/* A corner with two normals. */
+static fct_result load_shaded(const fct_env *env) {
+    fct_mesh mesh;
+    return finish_mesh(env, &mesh, STARVE(fct_mesh_load_shaded(env, IN "shaded.obj", &mesh)));
+}
+
 static fct_result load_ply(const fct_env *env) {
     return load_mesh(env, IN "sheet.ply");
 }
@@ -244,6 +250,7 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_mesh_extract", "", extract_mesh, false},
                                   {"fct_mesh_inspect", "", inspect_mesh, false},
                                   {"fct_mesh_validate", "", validate_mesh, false},
+                                  {"fct_mesh_load_shaded", "", load_shaded, false},
                                   {"fct_mesh_load", "ply", load_ply, false},
                                   {"fct_mesh_load", "text ply", load_text_ply, false},
                                   {"fct_mesh_load", "obj", load_obj, false},

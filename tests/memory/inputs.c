@@ -101,6 +101,8 @@ static void write_inputs(void) {
     fwrite(picture, 1, sizeof picture, file);
     assert_int_equal(fclose(file), 0);
     write_text(IN "lit.mtl", "newmtl lamp\nKe 1 1 1\nnewmtl floor\nKd .5 .5 .5\nmap_Kd -s 2 2 picture.png\n");
+    write_text(IN "shaded.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvn 0 1 0\n"
+                                "f 1//1 2//1 3//1\nf 1//2 4//2 2//2\n");
     write_text(IN "lit.obj", "mtllib lit.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no one\nusemtl lamp\n"
                              "f 1 2 3\no two\nusemtl floor\nf 1 2 4\nusemtl lamp\nf 1 3 4\n");
     write_text(IN "lit.json",
