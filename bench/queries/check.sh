@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the benchmark of queries on small meshes: the program fails unless Embree gives the same answers.
+# Runs the benchmark of queries on small meshes: the program fails unless Embree gives the same answers, but for rays at rims.
 # usage: check.sh PROGRAMS WORK
 set -eu
 programs=$1 work=$2

@@ -3,7 +3,8 @@
 usage: measure.py FACETREE OUT [--scenes NAME,...] [--points N] [--paths N] [--bake "OPTIONS"] [--csv FILE] [--map]
 Prints per scene: RMS, bias and 99th percentile of the error over the mean, also of the worst object of at least .5 % of the
 area; rays per vertex, times, and the estimate of the bake itself. Emitters are left out, and so are points that no path of
-light reaches: they lie under other bodies, where no viewer sees them. With --map also how well the error of
+light reaches: most lie under other bodies, where no viewer sees them. Their number is printed, and the median of what they
+show over the mean, which a leak of light into a dark place would raise. With --map also how well the error of
 each vertex predicts: the error at the points in ten groups of the same size, from the least to the largest prediction. Needs
 numpy."""
 import argparse
@@ -70,8 +71,6 @@ def trace_points(tool, scene, path, paths):
 
 def judge(shown, halves, area):
     """RMS, bias, 99th percentile over the mean; the error of the reference cancels in the product of its halves."""
-    seen = (halves[0] + halves[1]).sum(1) > 0
-    shown, halves = shown[seen], [h[seen] for h in halves]
     truth = (halves[0] + halves[1]) / 2
     mean = truth.mean()
     square = ((shown - halves[0]) * (shown - halves[1])).mean()
@@ -79,10 +78,10 @@ def judge(shown, halves, area):
             "square": square, "p99": np.percentile(np.abs(shown - truth).max(1), 99) / mean}
 
 
-def print_map(picks, halves, mean):
+def print_map(picks, halves, seen, mean):
     """True RMS errors over the mean, in ten groups of points by predicted error, and the predicted ones."""
-    shown, predicted = (np.concatenate([p[k] for p in picks]) for k in (2, 3))
-    square = ((shown - halves[0]) * (shown - halves[1])).mean(1)
+    shown, predicted = (np.concatenate([p[k] for p in picks])[seen] for k in (2, 3))
+    square = ((shown - halves[0][seen]) * (shown - halves[1][seen])).mean(1)
     groups = np.array_split(np.argsort(predicted), 10)
     for name, values in (("true", square), ("predicted", predicted ** 2)):
         print(f"    {name:9}", *("%6.2f" % (100 * max(values[g].mean(), 0) ** .5 / mean) for g in groups), "%")
@@ -105,8 +104,12 @@ def measure_scene(tool, out, name, options):
     np.savetxt(f"{baked}/points", np.hstack([np.concatenate([p[k] for p in picks]) for k in (0, 1)]), fmt="%.9g")
     halves = trace_points(tool, scene, f"{baked}/points", options.paths)
     rows, n = {}, options.points
+    seen = (halves[0] + halves[1]).sum(1) > 0
+    shown = np.concatenate([p[2] for p in picks])
     for i, (file, pick) in enumerate(zip(files, picks)):
-        rows[file["object"]] = judge(pick[2], [h[i * n:(i + 1) * n] for h in halves], pick[4])
+        lit_points = seen[i * n:(i + 1) * n]
+        if lit_points.any():
+            rows[file["object"]] = judge(pick[2][lit_points], [h[i * n:(i + 1) * n][lit_points] for h in halves], pick[4])
     area = sum(r["area"] for r in rows.values())
     weigh = lambda key: sum(r[key] * r["area"] for r in rows.values()) / area
     big = {k: r for k, r in rows.items() if r["area"] > .005 * area}
@@ -117,14 +120,16 @@ def measure_scene(tool, out, name, options):
     result = {"scene": name, "rms": total, "bias": bias, "worst": worst, "worst_rms": big[worst]["rms"],
               "worst_bias": big[worst]["bias"], "p99": max(r["p99"] for r in big.values()),
               "estimate": stats["error_estimate"], "vertices": stats["vertices"],
+              "dark": int((~seen).sum()), "dark_shown": np.median(shown[~seen].mean(1)) / weigh("mean") if not seen.all() else 0,
               "rays_per_vertex": stats["output_rays"] / stats["vertices"], "solve_rays": stats["rays"],
               "seconds": seconds["total"], "output_seconds": seconds["push"]}
     print("%-10s rms %.2f %% bias %+.2f  worst %s %.1f %% (bias %+.1f)  p99 %.0f %%  estimate %.2f %%  %.1f rays a vertex, "
-          "%d vertices, %.1f s" % (name, 100 * total, 100 * bias, worst, 100 * result["worst_rms"],
+          "%d vertices, %.1f s; %d dark points show %.0f %%" % (name, 100 * total, 100 * bias, worst, 100 * result["worst_rms"],
                                    100 * result["worst_bias"], 100 * result["p99"], 100 * result["estimate"],
-                                   result["rays_per_vertex"], stats["vertices"], seconds["total"]), flush=True)
+                                   result["rays_per_vertex"], stats["vertices"], seconds["total"], result["dark"],
+                                   100 * result["dark_shown"]), flush=True)
     if options.map:
-        print_map(picks, halves, weigh("mean"))
+        print_map(picks, halves, seen, weigh("mean"))
     if options.objects:
         for key, row in sorted(big.items(), key=lambda item: -item[1]["rms"])[:8]:
             print(f"    {key}: {100 * row['rms']:.1f} % (bias {100 * row['bias']:+.1f})")

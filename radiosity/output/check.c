@@ -11,10 +11,11 @@
 
 #include "radiosity/surface/cover.h"
 
-/* Points per scene, by area; at least and at most this many per side of an instance, but no more than one per
- * VERTICES_PER_POINT vertices, unless the instances together have no more than SMALL_POINTS. */
-enum { SCENE_POINTS = 2048, LEAST_POINTS = 64, MOST_POINTS = 512, VERTICES_PER_POINT = 32 };
-enum { SMALL_POINTS = 4096 };
+/* Points per scene, by area; at most MOST_POINTS per side of an instance, and at least its part of
+ * SMALL_POINTS, within the limits of LEAST_POINTS. Otherwise no more than one per VERTICES_PER_POINT
+ * vertices. */
+enum { SCENE_POINTS = 2048, MOST_POINTS = 512, VERTICES_PER_POINT = 32, SMALL_POINTS = 4096 };
+static const double LEAST_POINTS[2] = {16, 64};
 /* Share of the points that follow the differences of light. A larger share leaves too few points where the
  * light is even, of which each then counts too much. */
 #define STEEP_SHARE .5
@@ -156,9 +157,10 @@ static void check_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
 
 static size_t count_points(const checking *k, double area) {
     const double share = area / k->s->elements.items[0].area;
-    const double small = fct_min(LEAST_POINTS, SMALL_POINTS / (double)k->s->elements.view.instance_count);
+    const double small = fct_min(LEAST_POINTS[1], SMALL_POINTS / (double)k->s->elements.view.instance_count);
     const double most = fct_max(k->surface->mesh.vertex_count / VERTICES_PER_POINT + 1, small);
-    return (size_t)fct_min(fct_min(fct_max(share * SCENE_POINTS, LEAST_POINTS), MOST_POINTS), most);
+    const double least = fct_max(LEAST_POINTS[0], small);
+    return (size_t)fct_min(fct_min(fct_max(share * SCENE_POINTS, least), MOST_POINTS), most);
 }
 
 /* Adds the points that are not covered to the sums of the surface, whose faces have the area. */

@@ -22,6 +22,9 @@ enum { MOST_ROUNDS = 8, MOST_SWEEPS = 1000 };
 #define BENT            .95
 #define LEAST_BENT_AREA 2e-6
 enum { LEAF_GRAIN = 16 }; /* leaves per chunk */
+/* The least open part of a leaf that counts. Its direct light comes from few points, so a smaller divisor
+ * would make single leaves far too bright. */
+#define LEAST_OPEN .125F
 /* Hits that are not a leaf. */
 #define HIT_NOTHING FCT_NONE
 #define HIT_BLACK   (FCT_NONE - 1)
@@ -52,10 +55,10 @@ typedef struct gathering {
     fct_transport *out;
     const uint32_t *leaves;
     size_t leaf_count;
-    uint32_t *hits;     /* leaf x rays: the element hit, HIT_NOTHING or HIT_BLACK */
-    float *spread;      /* per leaf: fct_direct_spread; NULL once splitting is over */
-    float *bare;        /* per leaf: fraction of the surface that no other face covers exactly */
-    float *open;        /* per leaf: fraction of the surface that some ray can see; 1 if none can */
+    uint32_t *hits; /* leaf x rays: the element hit, HIT_NOTHING or HIT_BLACK */
+    float *spread;  /* per leaf: fct_direct_spread; NULL once splitting is over */
+    float *bare;    /* per leaf: fraction of the surface that no other face covers exactly */
+    float *open; /* per leaf: fraction of the surface that some ray can see, at least LEAST_OPEN; 1 if none */
     double *irradiance; /* per leaf x 3: of the sweep under way */
     uint64_t *chunk_rays;
     uint32_t rays; /* per leaf */
@@ -157,7 +160,8 @@ static void hit_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32
                                                               : HIT_NOTHING;
             covered += found.black && is_covered(g, &p, fct_hash3(seed, k, 2), &rays);
         }
-        g->open[l] = covered < g->rays ? 1 - (float)covered / (float)g->rays : 1;
+        const float open = 1 - (float)covered / (float)g->rays;
+        g->open[l] = open == 0 ? 1 : open > LEAST_OPEN ? open : LEAST_OPEN;
     }
     g->chunk_rays[chunk] += rays;
 }

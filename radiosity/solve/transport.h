@@ -2,9 +2,10 @@
  *
  * Input: the elements that the links chose, with the links' solution as a start. Each leaf takes its direct
  * light D_i from the lamps at four of its points and sends cosine-distributed rays from points all over its
- * surface. The hits stay in memory, so the iteration of E_i = D_i + mean of b over the hits needs no further
- * ray. Rows sum to at most 1 for any mesh, because each ray counts one hit or none; so a furnace is exact.
- * Cost: leaves x rays.
+ * surface. The hits stay in memory, so the iteration of E_i = (D_i + mean of b over the hits) / O_i needs no
+ * further ray. O_i is the open part of the leaf: rays that meet a black back close by start on a part that
+ * another body covers. Rows sum to at most 1 for any mesh, because each ray counts one hit or none; so a
+ * furnace is exact. Cost: leaves x rays, and up to eight short rays for each that meets a black back.
  */
 #ifndef FCT_RADIOSITY_TRANSPORT_H
 #define FCT_RADIOSITY_TRANSPORT_H
@@ -15,7 +16,7 @@
 typedef struct fct_transport {
     float *stored;  /* per element x 3: radiosity that a gather ray finds; without the emission of lamps,
                        because shadow rays bring that */
-    double *direct; /* per element x 3: mean direct irradiance of a leaf */
+    double *direct; /* per element x 3: mean direct irradiance of a leaf, also over its covered part */
     uint64_t rays;
     uint32_t sweeps;
     double change; /* of the last sweep, relative to the solution */

@@ -64,21 +64,46 @@ static fct_result find_light(const fct_env *env, const char *path, bool *out) {
     return FCT_OK;
 }
 
-/* Whether a mesh file has normals. True in doubt: then the mesh is read. */
-static fct_result find_normals(const fct_env *env, const char *path, bool *out) {
+/* Whether [text, end) contains the word between blanks. A word that begins with a quotation mark may stand
+ * anywhere. */
+static bool has_word(const char *text, const char *end, const char *word) {
+    const size_t length = strlen(word);
+    for (const char *at = text; at && (at = memmem(at, (size_t)(end - at), word, length)); ++at) {
+        const bool begins = at == text || (unsigned char)at[-1] <= ' ';
+        const bool ends = at + length == end || (unsigned char)at[length] <= ' ';
+        if (*word == '"' || (begins && ends)) return true;
+    }
+    return false;
+}
+
+static bool has_any(const char *text, const char *end, const char *const words[5]) {
+    for (int i = 0; i < 5 && words[i]; ++i)
+        if (has_word(text, end, words[i])) return true;
+    return false;
+}
+
+/* Whether a mesh file has what a hierarchy file does not store: normals, texture coordinates, colours of
+ * faces. True in doubt: then the mesh is read. */
+static fct_result find_attributes(const fct_env *env, const char *path, bool *out) {
     static const struct {
-        const char *format, *sign;
-    } signs[] = {{"ply", " nx"}, {"obj", "vn"}, {"gltf", "\"NORMAL\""}, {"glb", "\"NORMAL\""}};
+        const char *format, *words[5];
+    } formats[] = {{"ply", {"nx", "s", "u", "texture_u", "texcoord"}},
+                   {"obj", {"vn", "vt"}},
+                   {"gltf", {"\"NORMAL\"", "\"TEXCOORD_"}},
+                   {"glb", {"\"NORMAL\"", "\"TEXCOORD_"}}};
+    static const char *const colors[5] = {"red", "diffuse_red"};
     const char *format = fct_file_format(env, path);
     fct_file file;
     *out = strcasecmp(format, "stl") != 0;
-    for (size_t i = 0; i < FCT_LENGTH(signs); ++i) {
-        if (strcasecmp(format, signs[i].format)) continue;
+    for (size_t i = 0; i < FCT_LENGTH(formats); ++i) {
+        if (strcasecmp(format, formats[i].format)) continue;
         fct_result result = fct_file_open(env, path, &file);
         if (result != FCT_OK) return result;
         const char *text = (const char *)file.data;
         const char *end = i == 0 ? fct_ply_find_body(text, file.size) : text + file.size;
-        *out = end && memmem(text, (size_t)(end - text), signs[i].sign, strlen(signs[i].sign));
+        *out = end && has_any(text, end, formats[i].words);
+        if (i == 0 && end)
+            *out |= has_any(memmem(text, (size_t)(end - text), "element face", 12), end, colors);
         fct_file_close(env, &file);
     }
     return FCT_OK;
@@ -86,14 +111,14 @@ static fct_result find_normals(const fct_env *env, const char *path, bool *out) 
 
 fct_result fct_model_open(const fct_env *env, const char *path, bool want_mesh, bool want_paint,
                           fct_model_file *out) {
-    bool shaded = false;
+    bool more = false;
     *out = (fct_model_file){0};
     out->light = true;
     if (!strcasecmp(fct_file_format(env, path), "fct")) return fct_tree_open(env, path, &out->tree);
     fct_result result = want_mesh || env->flip_inward ? FCT_OK : open_hierarchy_beside(env, path, &out->tree);
     if (result == FCT_OK && want_paint) result = find_light(env, path, &out->light);
-    if (result == FCT_OK && out->tree && !want_paint) result = find_normals(env, path, &shaded);
-    if (result != FCT_OK || (out->tree && !want_paint && !shaded)) return result;
+    if (result == FCT_OK && out->tree && !want_paint) result = find_attributes(env, path, &more);
+    if (result != FCT_OK || (out->tree && !want_paint && !more)) return result;
     result = load_mesh(env, path, &out->mesh);
     if (result == FCT_OK && out->mesh.face_count == 0) {
         result = fct_fail(env, FCT_ERROR_DATA, "%s: a model needs at least one face, found none", path);

@@ -316,6 +316,51 @@ static void opens_the_hierarchy_beside_a_mesh(void **unused) {
     assert_int_equal(r.alive, 0);
 }
 
+/* A hierarchy file has no texture coordinates and no colours of faces, so the mesh is read for them. */
+static void reads_the_attributes_of_a_mesh_with_a_hierarchy(void **unused) {
+    (void)unused;
+    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                              "property float z\n%selement face 1\nproperty list uchar int vertex_indices\n%s"
+                              "end_header\n0 0 0%s\n1 0 0%s\n0 1 0%s\n3 0 1 2%s\n";
+    static const char st[] = "property float s\nproperty float t\n",
+                      rgb[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    for (int k = 0; k < 4; ++k) {
+        fct_env env = fct_env_default();
+        const char *name = k == 0 ? "attribute.obj" : "attribute.ply";
+        char text[1024];
+        if (k == 0)
+            snprintf(text, sizeof text, "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+        else
+            snprintf(text, sizeof text, ply, k == 1 ? st : "", k == 2 ? rgb : "", k == 1 ? " 0 0" : "",
+                     k == 1 ? " 1 0" : "", k == 1 ? " 0 1" : "", k == 2 ? " 255 0 0" : "");
+        write_text(name, text);
+        fct_mesh mesh;
+        fct_tree *tree;
+        fct_file file;
+        fct_scene *scene;
+        fct_tree_def def = fct_tree_def_default();
+        assert_int_equal(fct_mesh_load(&env, path_of(name), &mesh), FCT_OK);
+        assert_int_equal(fct_file_open(&env, path_of(name), &file), FCT_OK);
+        def.source = "told by the test";
+        def.source_hash = XXH3_64bits(file.data, file.size);
+        fct_file_close(&env, &file);
+        assert_int_equal(fct_tree_build(&env, &mesh, &def, NULL, &tree), FCT_OK);
+        assert_int_equal(fct_tree_save(&env, tree, path_of("attribute.fct")), FCT_OK);
+        assert_int_equal(load(&env, name, &scene), FCT_OK);
+        fct_scene_view v = fct_scene_get(scene);
+        assert_string_equal(fct_tree_get(v.models[0].tree).source, "told by the test");
+        assert_int_equal(v.models[0].texcoords != NULL, k < 2);
+        assert_int_equal(v.models[0].face_colors != NULL, k == 2);
+        fct_surface_point point;
+        fct_scene_point(scene, 0, 0, .25F, .5F, &point);
+        if (k < 2) assert_true(point.texcoord[0] == .25F && point.texcoord[1] == .5F);
+        if (k == 2) assert_true(point.color[0] == 1 && point.color[1] == 0);
+        fct_scene_destroy(scene);
+        fct_tree_destroy(tree);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 /* face_materials has a name for every polygon of the file, also for those that are left out. */
 static void names_polygons_that_are_left_out(void **unused) {
     (void)unused;
@@ -461,6 +506,7 @@ int main(void) {
         cmocka_unit_test(refuses_bad_scenes_and_says_where),
         cmocka_unit_test(fails_cleanly_at_every_allocation),
         cmocka_unit_test(opens_the_hierarchy_beside_a_mesh),
+        cmocka_unit_test(reads_the_attributes_of_a_mesh_with_a_hierarchy),
         cmocka_unit_test(names_polygons_that_are_left_out),
         cmocka_unit_test(models_follow_the_choice_of_the_weld),
         cmocka_unit_test(missing_files_are_told),

@@ -149,7 +149,8 @@ static int require_attributes(tool *t, const raycast_attributes *wanted, unsigne
                               const char *model) {
     for (int i = 0; i < wanted->count; ++i) {
         if (held & wanted->kind[i]) continue;
-        const char *hint = tool_has_format(t, path, "fct") ? "; a hierarchy file stores only colours" : "";
+        const char *hint =
+            tool_has_format(t, path, "fct") ? "; a hierarchy file stores only colours of vertices" : "";
         return tool_fail(t, TOOL_DATA, "%s: %s%s%sexpected %s for --attributes, found none%s", path,
                          model ? "model \"" : "", model ? model : "", model ? "\": " : "",
                          name_attribute(wanted->kind[i]), hint);
@@ -280,7 +281,7 @@ int tool_raycast(int argc, char **argv) {
         .examples = "  facetree raycast bunny.fct --make-rays 1000 -o rays.txt\n"
                     "  facetree raycast bunny.fct --rays rays.txt -o hits.txt\n"
                     "  facetree raycast bunny.fct --rays rays.txt --all -o all.txt\n"
-                    "  facetree raycast spot.obj --rays rays.txt --attributes normal,uv\n"
+                    "  facetree raycast spot.obj --rays rays.txt --attributes uv\n"
                     "  facetree raycast bunny.fct --check",
         .options = ray_options_table,
         .parse = parse_raycast,

@@ -172,10 +172,12 @@ static int shoot_round(tool *t, round_state *s, size_t grain, FILE *stream, rayc
         totals->hits += c->hits, totals->rays_hit += c->rays_hit;
         s->first += c->done;
         *stopped = c->done < (left < grain ? left : grain);
-        if (*stopped && c->done == 0) {
-            code = shoot_alone(t, s->question, s->first, stream, totals);
-            ++s->first;
-        }
+        if (!*stopped || c->done > 0) continue;
+        start = tool_seconds();
+        code = shoot_alone(t, s->question, s->first, stream, totals);
+        totals->seconds += tool_seconds() - start;
+        ++s->first;
+        *stopped = grain > 1; /* a chunk of one ray is complete now */
     }
     return code;
 }
