@@ -1,10 +1,10 @@
 /* radiosity/output/check.h: the error of the light that a surface shows.
  *
- * At random points of the surface, half of them by area, half where the light differs, the light that a viewer shows, interpolated between
- * the vertices of a face, is compared with two independent gathers of many rays. With their values r1 and r2,
- * the product (x - r1)(x - r2) has the mean (x - truth)^2: the noise of the gathers cancels. So the estimate
- * contains the noise of the rays, the distances between anchors and the size of the triangles. It does not
- * contain an error of the stored solution, which both gathers look up.
+ * At random points of the surface, half of them by area, half where the light differs, the light that a
+ * viewer shows, interpolated between the vertices of a face, is compared with two independent gathers of many
+ * rays. With their values r1 and r2, the product (x - r1)(x - r2) has the mean (x - truth)^2: the noise of
+ * the gathers cancels. So the estimate contains the noise of the rays, the distances between anchors and the
+ * size of the triangles. It does not contain an error of the stored solution, which both gathers look up.
  */
 #ifndef FCT_RADIOSITY_CHECK_H
 #define FCT_RADIOSITY_CHECK_H
