@@ -9,7 +9,8 @@
 /* Items per task of a batch: both are 1,024 rays. */
 enum { CLOSEST_CHUNK = 1024, WORD_CHUNK = 1024 / 64 };
 enum { TURNS_BYTES = 4 << 20 };
-enum { GROUP = 128 }; /* rays that are traversed together; of any hits, whole words */
+#define ALIKE (1.F / 32) /* in scaled units, and in the tangents of directions */
+enum { GROUP = 128 };    /* rays that are traversed together; of any hits, whole words */
 
 /* The scaled normal in the model's unit. If a float would overflow or vanish, the result is another positive
  * multiple of it. */
@@ -148,12 +149,35 @@ static bool takes_turns(const fct_bvh *bvh) {
     return !bvh->embree && bvh->node_bytes + bvh->leaf_bytes > TURNS_BYTES;
 }
 
+/* Whether most rays begin close to the one before, in nearly its direction. Such rays find what they need in
+ * the caches, where the one before has been. */
+static bool are_alike(const ray_group *g) {
+    uint32_t count = 0;
+    for (uint32_t i = 1; i < g->count; ++i) {
+        const fct_prepared_ray *a = &g->rays[i - 1], *b = &g->rays[i];
+        bool alike = a->axis[2] == b->axis[2] && a->side[a->axis[2]] == b->side[a->axis[2]];
+        for (int k = 0; k < 3; ++k) alike = alike && fabsf(a->origin[k] - b->origin[k]) < ALIKE;
+        for (int k = 0; k < 2; ++k) alike = alike && fabsf(a->shear[k] - b->shear[k]) < ALIKE;
+        count += alike;
+    }
+    return 4 * count >= 3 * g->count;
+}
+
 /* Leaves out the rays that cannot hit. */
 static void traverse_group(const fct_bvh *bvh, const fct_ray *rays, size_t count, bool any, ray_group *g) {
     g->count = 0;
     for (uint32_t i = 0; i < count; ++i)
         if (fct_ray_prepare(bvh, &rays[i], &g->rays[g->count])) g->number[g->count++] = i;
-    fct_traverse_many(bvh, g->count, g->rays, any, g->hits);
+    if (!are_alike(g)) {
+        fct_traverse_many(bvh, g->count, g->rays, any, g->hits);
+        return;
+    }
+    for (uint32_t i = 0; i < g->count; ++i) {
+        if (any)
+            g->hits[i].place = fct_traverse_any(bvh, &g->rays[i], NULL) ? 0 : FCT_NONE;
+        else
+            fct_traverse_closest(bvh, &g->rays[i], &g->hits[i], NULL);
+    }
 }
 
 static void find_closest_hits(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {

@@ -221,6 +221,11 @@ static void check_batches(uint32_t n, size_t count) {
     fct_hit *hits = malloc(count * sizeof *hits);
     uint64_t *occluded = malloc((count + 63) / 64 * sizeof *occluded);
     fct_ray_mix(m.bvh, 2, count, rays);
+    for (size_t i = count / 2; i < count; ++i) { /* as from a camera */
+        fct_ray *ray = &rays[i];
+        *ray = make_ray(v3_make(0, 0, 3), v3_make(.003 * (double)(i % 128) - .2, .002 * (double)(i % 77), -1),
+                        0, INFINITY);
+    }
     rays[count / 2].direction[0] = NAN, rays[count / 3].t_max = -1; /* cannot hit */
     for (env.thread_count = 1; env.thread_count <= 4; ++env.thread_count) {
         fct_bvh_closest_hits(m.bvh, count, rays, hits);
