@@ -20,6 +20,11 @@ make_inputs() {
     awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.6f %.6f %.6f\n", sin(i) / 3, .5 + cos(3 * i), sin(7 * i) / 3 }' >points.txt
     awk 'BEGIN { for (i = 0; i < 400; ++i) printf "%.9f %.9f 0 %.6f %.9f %.9f 0 %.6f 0 0 1 %.6f\n",
         cos(i), -sin(i), sin(i) / 2, sin(i), cos(i), cos(3 * i), sin(7 * i) / 3 }' >poses.txt
+    cat >stretched.json <<END
+{"models": {"m": "mesh.ply"}, "materials": {"white": {"reflectance": 0.5}},
+ "instances": [{"model": "m", "material": "white", "transform": [1, 0.3, 0, 0, 0, 0.7, 0.1, 0, 0.2, 0, 1.4, 0, 0, 0, 0, 1]},
+               {"model": "m", "material": "white", "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.4, 0, 0, 1]}]}
+END
     cd "$here" || exit 2
 }
 
@@ -41,7 +46,9 @@ write_outputs() {
         "$@" boxes "$in/mesh.ply" -k 30 -o "$out/boxes.txt" --quiet
         "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" -o "$out/hits.txt" --quiet
         "$@" raycast "$in/mesh.ply" --rays "$in/rays.txt" --all -o "$out/all-hits.txt" --quiet
+        "$@" raycast "$in/stretched.json" --rays "$in/rays.txt" --all -o "$out/scene-hits.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" -o "$out/closest.txt" --quiet
+        "$@" closest "$in/stretched.json" --points "$in/points.txt" -o "$out/stretched.txt" --quiet
         "$@" closest "$in/mesh.ply" --points "$in/points.txt" --signed -o "$out/signed.txt" --quiet
         for measure in pairs contacts distance; do
             "$@" collide "$in/mesh.ply" "$in/mesh.ply" --poses "$in/poses.txt" --$measure -o "$out/$measure.txt" --quiet
@@ -67,7 +74,7 @@ fine="--error 1e-3" coarse="--error 1e-2 --max-edge .5" # an emulated processor 
 make_inputs inputs 12000
 make_inputs small 1500
 FACETREE_SIMD=baseline write_outputs inputs first "$fine" "$program"
-[ "$(find first -type f -size +0 | wc -l)" = 20 ] || { echo "expected 20 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
+[ "$(find first -type f -size +0 | wc -l)" = 23 ] || { echo "expected 23 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
 variants=baseline
 FACETREE_SIMD=avx2 "$program" --version >/dev/null 2>&1 && variants="baseline avx2"
 threads() { "$@" --threads "$count"; }
