@@ -28,7 +28,8 @@ static int read_text(tool *t, const uint8_t *data, size_t size, int least, int c
                      tool_rows *rows) {
     FILE *file = fmemopen((void *)data, size, "r");
     fuzz_require(file != NULL, "a file in memory");
-    int code = tool_rows_parse(t, "text", file, least, columns, missing, rows);
+    const tool_row_format format = {.least = least, .columns = columns, .missing = missing};
+    int code = tool_rows_parse(t, "text", file, &format, rows);
     fclose(file);
     fuzz_require(code == TOOL_DONE || (code == TOOL_DATA && t->error[0] && !rows->values),
                  "rows, or an error");
