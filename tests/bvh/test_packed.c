@@ -316,7 +316,7 @@ static void nested_leaves_do_not_make_a_deep_top(void **state) {
     fct_top_release(&env, &top);
 }
 
-/* What lies below each node of the top, by trying every leaf and every cluster. */
+/* The test computes each span again: from all leaves below the node, and from all clusters of the tree. */
 static void spans_name_the_clusters_around_their_leaves(void **state) {
     (void)state;
     fct_env env = fct_env_default();

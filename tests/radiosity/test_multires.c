@@ -7,6 +7,7 @@
 #include "facetree/radiosity.h"
 #include "radiosity/bake.h"
 #include "radiosity/output/solution.h"
+#include "radiosity/solve/transport.h"
 #include "scene/coarse.h"
 
 static uint32_t add_material(fct_scene *scene, double reflectance, double emission) {
@@ -161,6 +162,29 @@ static void points_lie_within_the_outline(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* A ray that slips between the patches of a closed body finds the front of a patch, not a black back; so do
+ * all rays from the middle of the body. */
+static void a_closed_body_has_no_black_back(void **state) {
+    (void)state;
+    const fct_env env = fct_env_default();
+    fct_scene *scene = make_room(&env, 40, FCT_BACKEND_MULTIRES);
+    fct_elements set;
+    assert_int_equal(fct_elements_create(&env, fct_scene_coarse(scene), 100, &set), FCT_OK);
+    float *stored = calloc(3 * set.count, sizeof *stored);
+    const float middle[3] = {0, 0, 0};
+    for (int k = 0; k < 200; ++k) {
+        const double z = (k + .5) / 100 - 1, r = sqrt(1 - z * z);
+        float direction[3];
+        v3_store(direction, v3_make(r * cos(2.4 * k), r * sin(2.4 * k), z));
+        const fct_found found = fct_transport_look(&set, stored, middle, direction);
+        assert_true(!found.black && found.leaf < set.count);
+        assert_int_equal(set.items[found.leaf].instance, 1);
+    }
+    free(stored);
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
 static fct_bake *solve(const fct_env *env, const fct_scene *scene, fct_bake_stats *stats) {
     fct_bake *bake;
     const fct_bake_def def = fct_bake_def_default();
@@ -270,7 +294,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_in_a_sphere_is_even),    cmocka_unit_test(points_lie_within_the_outline),
         cmocka_unit_test(elements_refer_to_the_model),  cmocka_unit_test(work_does_not_grow),
-        cmocka_unit_test(output_is_that_of_exact_rays),
+        cmocka_unit_test(output_is_that_of_exact_rays), cmocka_unit_test(a_closed_body_has_no_black_back),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
