@@ -126,35 +126,40 @@ static void spheres_are_even(void **state) {
     }
 }
 
-/* A square of side 1 inside a black sphere that shines evenly, under a small lamp. A flat black body covers a
- * quarter of it. The square is one leaf, and its light is that of the other three quarters: 1 from the
- * sphere, and the direct light, of which the covered quarter has none. */
+/* A square of side 1 inside a black sphere that shines evenly. A flat black body covers a corner of it. With
+ * `coincident` the square's own plane holds another such body; with `lamp`, the square is under a small lamp.
+ */
+static fixture cover_square(double wide_x, double wide_y, bool coincident, bool lamp) {
+    fixture f = begin();
+    const uint32_t grey = place_material(f.scene, .5, 0, false), black = place_material(f.scene, 0, 0, false);
+    const float wide[12] = {.9F, 0, 0, 0, 0, .9F, 0, 0, 0, 0, .9F, 0};
+    const float small[12] = {.02F, 0, 0, .2F, 0, .02F, 0, .2F, 0, 0, .02F, .4F};
+    const v3 x = v3_make(wide_x, 0, 0), y = v3_make(0, wide_y, 0);
+    place_sheet(&plain, f.scene, grey, 1, v3_make(-.5, -.5, 0), v3_make(1, 0, 0), v3_make(0, 1, 0));
+    place_sheet(&plain, f.scene, black, 1, v3_make(-.5, -.5, 4e-4), x, y);
+    if (coincident) place_sheet(&plain, f.scene, black, 1, v3_make(-.5, -.5, 0), y, x);
+    fct_mesh mesh = make_sphere(&plain, 12);
+    if (lamp) place_mesh(f.scene, &mesh, place_material(f.scene, 0, 400, false), small);
+    for (size_t t = 0; t < mesh.face_count; ++t) {
+        uint32_t *c = mesh.triangles + 3 * t, swap = c[1];
+        c[1] = c[2], c[2] = swap;
+    }
+    place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, false), wide);
+    fct_mesh_release(&plain, &mesh);
+    solve(&f, 1, 1e9, 10);
+    assert_int_equal(f.set.items[f.set.roots[0]].child_count, 0);
+    return f;
+}
+
+/* The square is one leaf, of which a quarter is covered. Its light is that of the other three quarters: 1
+ * from the sphere, and the direct light, of which the covered quarter has none. */
 static void covered_parts_do_not_darken(void **state) {
     (void)state;
     for (int turn = 0; turn < 4; ++turn) {
-        const bool coincident = turn & 1, lamp = turn & 2;
-        fixture f = begin();
-        const uint32_t grey = place_material(f.scene, .5, 0, false),
-                       black = place_material(f.scene, 0, 0, false);
-        const float wide[12] = {.9F, 0, 0, 0, 0, .9F, 0, 0, 0, 0, .9F, 0};
-        const float small[12] = {.02F, 0, 0, .2F, 0, .02F, 0, .2F, 0, 0, .02F, .4F};
-        place_sheet(&plain, f.scene, grey, 1, v3_make(-.5, -.5, 0), v3_make(1, 0, 0), v3_make(0, 1, 0));
-        place_sheet(&plain, f.scene, black, 1, v3_make(-.5, -.5, 4e-4), v3_make(.5, 0, 0), v3_make(0, .5, 0));
-        if (coincident)
-            place_sheet(&plain, f.scene, black, 1, v3_make(-.5, -.5, 0), v3_make(0, .5, 0),
-                        v3_make(.5, 0, 0));
-        fct_mesh mesh = make_sphere(&plain, 12);
-        if (lamp) place_mesh(f.scene, &mesh, place_material(f.scene, 0, 400, false), small);
-        for (size_t t = 0; t < mesh.face_count; ++t) {
-            uint32_t *c = mesh.triangles + 3 * t, swap = c[1];
-            c[1] = c[2], c[2] = swap;
-        }
-        place_mesh(f.scene, &mesh, place_material(f.scene, 0, 1, false), wide);
-        fct_mesh_release(&plain, &mesh);
-        solve(&f, 1, 1e9, 10);
+        const bool lamp = turn & 2;
+        fixture f = cover_square(.5, .5, turn & 1, lamp);
         const uint32_t id = f.set.roots[0];
         const fct_element *e = &f.set.items[id];
-        assert_int_equal(e->child_count, 0);
         const double direct = f.transport.direct[3 * (size_t)id];
         assert_true(lamp ? direct > .1 : direct <= 0);
         assert_near(e->irradiance[0], 1 + direct / .75, .015);
@@ -162,6 +167,15 @@ static void covered_parts_do_not_darken(void **state) {
         if (!lamp) assert_near(f.transport.emitted, f.transport.absorbed + f.transport.escaped, .004);
         end(&f);
     }
+}
+
+/* A fiftieth of the square is open: it counts as an eighth, and the balance holds. */
+static void a_small_open_rest_is_not_exaggerated(void **state) {
+    (void)state;
+    fixture f = cover_square(.98, 1, false, false);
+    assert_in_range(1000 * f.set.items[f.set.roots[0]].irradiance[0], 80, 260); /* 160 */
+    assert_near(f.transport.emitted, f.transport.absorbed + f.transport.escaped, .004);
+    end(&f);
 }
 
 /* The noise is the standard error of a leaf's irradiance: it agrees with the spread over seeds. The halves of
@@ -238,6 +252,7 @@ int main(void) {
         cmocka_unit_test(plates_balance),
         cmocka_unit_test(spheres_are_even),
         cmocka_unit_test(covered_parts_do_not_darken),
+        cmocka_unit_test(a_small_open_rest_is_not_exaggerated),
         cmocka_unit_test(noise_is_the_standard_error),
         cmocka_unit_test(borders_split_leaves),
     };
