@@ -33,6 +33,9 @@
 /* Variance of a plate along its side over the squared half side: 1/3 for a rectangle, 1/4 for an ellipse. A
  * cluster's outline lies between the two. */
 #define PLATE_VARIANCE .29
+/* A receiver that sees a face at an angle below this, in radians, lies in its plane. Cones of flat nodes are
+ * up to 6e-7 too wide. */
+#define PLANE_ANGLE 2e-6
 /* Cosines are at least this in error bounds, which would be infinite otherwise. */
 #define LEAST_COSINE .05
 /* A triangle larger than its distance is cut into quarters if it sends more than this share of the lamp's
@@ -106,12 +109,30 @@ static double average_above_zero(double c, double s) {
     return c >= s ? c : c <= -s ? 0 : (c + s) * (c + s) / (4 * s);
 }
 
+/* True if the receiver lies in the planes of all faces of the node or behind them, for a lamp of two sides in
+ * them. `middle` is the center of the node's box relative to the receiver; no point of the node is farther
+ * away than `reach`. */
+static bool cluster_turns_away(const fct_lamp *lamp, const fct_cluster *c, v3 middle, double reach,
+                               double slack) {
+    v3 s = v3_unit(v3_load(c->area_vector));
+    double height = -v3_dot(middle, s);
+    if (lamp->two_sided) height = fabs(height);
+    double room = slack + (PLANE_ANGLE - c->cone_angle) * reach - height;
+    if (!(room >= 0)) return false;
+    fct_box box;
+    fct_cluster_box(c, &box);
+    for (int k = 0; k < 3; ++k) room -= box.half[k] * fabs(v3_dot(v3_load(box.axes[k]), s));
+    return room >= 0;
+}
+
 static outlook estimate_cluster(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
     v3 middle = v3_sub(v3_load(c->box_center), rec->x), d = v3_sub(v3_load(c->centroid), rec->x);
     double half2 = v3_norm2(v3_load(c->box_half)), shift2 = v3_norm2(v3_sub(d, middle));
     double radius = sqrt(half2) + sqrt(shift2), r2 = v3_norm2(d), height = v3_dot(d, rec->n);
     if (height <= -radius) return (outlook){0};
-    double r = sqrt(r2), floor2 = r2 > radius * radius ? r2 : radius * radius;
+    double r = sqrt(r2);
+    if (cluster_turns_away(lamp, c, middle, r + radius, rec->slack)) return (outlook){0};
+    double floor2 = r2 > radius * radius ? r2 : radius * radius;
     double spread = radius < r ? radius / r : 1, cosx = r > 0 ? height / r : 0;
     v3 w = r > 0 ? v3_scale(d, 1 / r) : rec->n;
     int side = find_visible_side(c, w, spread);
@@ -216,10 +237,10 @@ static bool append_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t 
     return fits;
 }
 
-/* Adds the cut of the tree below `node` whose nodes have errors below `share`. False: the cut became too
- * large. */
+/* Adds the cut of the tree below `node` whose nodes have errors below `share`. *coarse: it has clusters.
+ * False: the cut became too large. */
 static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
-                     double reference, fct_cut *cut) {
+                     double reference, fct_cut *cut, bool *coarse) {
     uint32_t stack[STACK_SIZE], depth = 1;
     bool fits = true;
     stack[0] = node;
@@ -237,6 +258,7 @@ static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
         if (full || o.error <= share || o.error <= RELATIVE_ERROR * o.light) {
             if (o.whole) o.light *= 1 + fct_min(fct_max(correct_cluster(rec, c), -.1), .1);
             fits = append_item(cut, node, 1, o.light) && !full && fits;
+            *coarse = true;
         } else {
             stack[depth++] = fct_node_child(lamp->tree, node, 1);
             stack[depth++] = fct_node_child(lamp->tree, node, 0);
@@ -300,14 +322,15 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
         if (light > 0) append_item(cut, view->roots[0], 1, light);
         return;
     }
-    /* The estimate is the first reference; a cut that finds much less light repeats with a smaller one. */
+    /* The estimate is the first reference; a cut of clusters that finds much less light repeats
+     * with a smaller one. */
     for (int round = 0; round < 8 && reference > 0; ++round) {
-        bool fits = true;
+        bool fits = true, coarse = false;
         cut->count = 0, cut->light = 0;
         for (uint32_t i = 0; i < view->root_count; ++i)
-            fits = cut_tree(lamp, rec, view->roots[i], share * reference, reference, cut) && fits;
+            fits = cut_tree(lamp, rec, view->roots[i], share * reference, reference, cut, &coarse) && fits;
         if (!fits) share *= 4;
-        if (fits && cut->light >= .3 * reference) break;
+        if (fits && (!coarse || cut->light >= .3 * reference)) break;
         if (fits) reference = cut->light < .2 * reference ? .2 * reference : cut->light;
     }
 }

@@ -12,6 +12,8 @@
  */
 #include "radiosity/solve/refine.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,6 +26,9 @@
 /* A link is near if its centroids are closer than this multiple of the typical radii: then one sample has an
  * error above 7 % (docs/notes/radiosity.md), and 16 point pairs replace it. */
 #define NEAR_RADII 2
+/* Two triangles that meet at a concave angle below this, in radians, count as a plane. They see less than its
+ * square of each other. */
+#define FLAT_EDGE 1e-5
 /* With a limit, a round splits the pairs whose error is at least this share of the largest one. Smaller
  * values need fewer rounds, and let small errors take room from the children of large ones. */
 #define LIMITED_SHARE .5
@@ -110,6 +115,23 @@ static bool pair_faces_away(const fct_element *i, const fct_element *j, const fc
     return fct_faces_away(i, pair->toward, angle) || fct_faces_away(j, v3_scale(pair->toward, -1), angle);
 }
 
+/* True if every corner of triangle j lies in the plane of triangle i or behind it. The balls of two triangles
+ * with a common edge always reach in front of each other. */
+static bool triangle_lies_behind(const fct_elements *set, const fct_element *i, const fct_element *j) {
+    const float *p = set->corners + 9 * (size_t)i->triangle, *q = set->corners + 9 * (size_t)j->triangle;
+    double largest = 0, slack = FLAT_EDGE * j->radius * i->area;
+    for (int k = 0; k < 9; ++k) largest = fct_max(largest, fct_max(fabs(p[k]), fabs(q[k])));
+    slack += 4 * FLT_EPSILON * largest * i->area;
+    for (int k = 0; k < 3; ++k)
+        if (v3_dot(i->vector, v3_sub(v3_load(q + 3 * k), i->center)) > slack) return false;
+    return true;
+}
+
+static bool triangles_face_away(const fct_elements *set, const fct_element *i, const fct_element *j) {
+    return i->kind == FCT_ELEMENT_TRIANGLE && j->kind == FCT_ELEMENT_TRIANGLE &&
+           (triangle_lies_behind(set, i, j) || triangle_lies_behind(set, j, i));
+}
+
 /* Judges one pair. May send rays and write the link's weight, near and rays. *carried: the error of a pair
  * that shall be split, power. */
 static verdict judge_pair(const fct_elements *set, fct_link *link, double epsilon, float *carried,
@@ -119,7 +141,7 @@ static verdict judge_pair(const fct_elements *set, fct_link *link, double epsilo
     fct_pair pair = fct_pair_place(i, j);
     bool self = link->receiver == link->source;
     if (self && i->kind == FCT_ELEMENT_TRIANGLE) return DROP;
-    if (pair_faces_away(i, j, &pair)) return DROP;
+    if (pair_faces_away(i, j, &pair) || triangles_face_away(set, i, j)) return DROP;
     double flow = fct_pair_flow(i, j, &pair);
     bool can_i = i->child_count > 0 || fct_elements_can_split(set, link->receiver);
     bool can_j = j->child_count > 0 || fct_elements_can_split(set, link->source);

@@ -83,6 +83,24 @@ typedef struct outlook {
     bool whole;
 } outlook;
 
+/* True if the receiver is nowhere in front of the node's faces, which lie in its box and have normals within
+ * the cone, by more than two millionths of a radian. */
+static bool is_turned_away(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c, double far) {
+    fct_box box;
+    fct_cluster_box(c, &box);
+    v3 n = v3_unit(v3_load(c->area_vector));
+    double highest = -INFINITY, lowest = INFINITY;
+    for (int corner = 0; corner < 8; ++corner) {
+        v3 y = v3_load(c->box_center);
+        for (int k = 0; k < 3; ++k)
+            y = v3_mad(y, corner >> k & 1 ? box.half[k] : -box.half[k], v3_load(box.axes[k]));
+        double height = v3_dot(n, v3_sub(rec->x, y));
+        highest = fmax(highest, height), lowest = fmin(lowest, height);
+    }
+    if (lamp->two_sided) highest = fmax(highest, -lowest);
+    return highest + (c->cone_angle - 2e-6) * far <= rec->slack;
+}
+
 static outlook look_plainly(const fct_lamp *lamp, const fct_receiver *rec, const fct_cluster *c) {
     v3 d = v3_sub(v3_load(c->centroid), rec->x), s = v3_load(c->area_vector);
     double half2 = v3_norm2(v3_load(c->box_half)),
@@ -90,7 +108,7 @@ static outlook look_plainly(const fct_lamp *lamp, const fct_receiver *rec, const
     double radius = sqrt(half2) + sqrt(shift2), r = v3_norm(d), height = v3_dot(d, rec->n),
            angle = c->cone_angle;
     outlook o = {0};
-    if (height <= -radius) return o;
+    if (height <= -radius || is_turned_away(lamp, rec, c, r + radius)) return o;
     v3 w = v3_scale(d, 1 / r);
     double spread = fmin(radius / r, 1), cosx = height / r, toward = -v3_dot(s, w);
     int side = 0;
@@ -142,17 +160,18 @@ static void cut_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t lea
         add_item(cut, leaf, part, light);
 }
 
-static void cut_node(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
-                     double reference, fct_cut *cut) {
+/* Returns the number of clusters in the cut. */
+static int cut_node(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
+                    double reference, fct_cut *cut) {
     if (node >= lamp->view.node_count) {
         cut_leaf(lamp, rec, node, 1, reference, cut);
-        return;
+        return 0;
     }
     fct_cluster room;
     fct_box box;
     const fct_cluster *c = fct_node_cluster(lamp->tree, node, &room);
     outlook o = look_plainly(lamp, rec, c);
-    if (o.upper <= 0) return;
+    if (o.upper <= 0) return 0;
     if (o.error <= share || o.error <= .02 * o.light) {
         v3 axes[3];
         fct_cluster_box(c, &box);
@@ -160,10 +179,12 @@ static void cut_node(const fct_lamp *lamp, const fct_receiver *rec, uint32_t nod
         double correction =
             correct_plainly(v3_sub(v3_load(c->centroid), rec->x), rec->n, v3_load(c->area_vector), axes);
         add_item(cut, node, 1, o.whole ? o.light * (1 + fmin(fmax(correction, -.1), .1)) : o.light);
-        return;
+        return 1;
     }
+    int clusters = 0;
     for (int k = 0; k < 2; ++k)
-        cut_node(lamp, rec, fct_node_child(lamp->tree, node, k), share, reference, cut);
+        clusters += cut_node(lamp, rec, fct_node_child(lamp->tree, node, k), share, reference, cut);
+    return clusters;
 }
 
 /* Direction and length of the corner (i, j) of face `face` of the table's cube: faces +x -x +y -y +z -z. */
@@ -214,10 +235,11 @@ static bool cut_plainly(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *
         return true;
     }
     for (int round = 0; round < 8 && reference > 0; ++round) {
+        int clusters = 0;
         cut->count = 0, cut->light = 0;
         for (uint32_t i = 0; i < lamp->view.root_count; ++i)
-            cut_node(lamp, rec, lamp->view.roots[i], 7e-4 * reference, reference, cut);
-        if (cut->light >= .3 * reference) break;
+            clusters += cut_node(lamp, rec, lamp->view.roots[i], 7e-4 * reference, reference, cut);
+        if (clusters == 0 || cut->light >= .3 * reference) break;
         reference = fmax(cut->light, .2 * reference);
     }
     return false;
