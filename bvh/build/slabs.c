@@ -3,6 +3,9 @@
 
 #include "cluster/tree/node.h"
 
+/* An oriented box of a leaf that saves a smaller share of the area is not fitted. */
+#define LEAST_SAVED 1e-5
+
 /* With more roots, the search for an enclosing cluster costs more than its box saves. */
 enum { MOST_ROOTS = 32 };
 
@@ -77,6 +80,16 @@ static fct_slabs make_axis_slabs(const fct_bvh *bvh, const fct_top_node *node) {
     return s;
 }
 
+/* The area of the box that the tree stores for a cluster, as fct_slabs_area of a fit to its faces. */
+static double cluster_area(const fct_bvh *bvh, uint32_t node) {
+    const double pad = 2 * (double)FCT_ORIENTED_PAD;
+    fct_cluster room;
+    const float *half = fct_node_cluster(bvh->tree, node, &room)->box_half;
+    double side[3];
+    for (int k = 0; k < 3; ++k) side[k] = 2 * bvh->scale * (double)half[k] + pad;
+    return fct_half_area(side[0], side[1], side[2]);
+}
+
 fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                            fct_span **out) {
     fct_span *spans = *out = fct_allocate(bvh->env, top->node_count, sizeof *spans);
@@ -106,6 +119,8 @@ fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const f
                         const fct_top_node *node, const fct_span *span) {
     fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
+    const bool is_leaf = node->left == FCT_NONE;
+    if (is_leaf && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED)) return best;
     const uint32_t candidates[2] = {span->largest, span->enclosing};
     for (int i = 0; i < 2; ++i) {
         if (candidates[i] == FCT_NONE || (i == 1 && candidates[1] == candidates[0])) continue;

@@ -190,6 +190,7 @@ static void search_leaf(void *user, uint32_t ref) {
     const fct_leaf *leaf = fct_bvh_leaf(s->bvh, ref);
     fct_near_vertices vertices;
     load_vertices(leaf, &s->at, &vertices);
+    if (!fct_leaf_within(&vertices, leaf->vertex_octets, s->limit2)) return;
     const uint8_t *corners = fct_leaf_corners(leaf);
     for (uint32_t first = 0; first < leaf->count; first += 8, corners += 24) {
         fct_eight_near near = fct_measure_triangles(&vertices, leaf->vertex_octets, corners);

@@ -202,4 +202,28 @@ static inline uint32_t fct_triangles_within(const fct_eight_near *near, float li
     return ~f8_lt(f8_mul(f8_set(limit2), near->upper2), f8_mul(plane, plane)) & 0xffu;
 }
 
+/* Whether the triangles of a leaf may be within sqrt(limit2) of the point: false if the plane through the
+ * vertex nearest to the point, across the way to it, moved to the nearest vertex along that way, lies beyond.
+ * The same lower bound as that of a triangle, with the vertex in place of q, at a tenth of the cost. */
+static inline bool fct_leaf_within(const fct_near_vertices *v, uint32_t vertex_octets, float limit2) {
+    static const uint32_t numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    i8 lane = i8_load(numbers);
+    uint32_t last = vertex_octets - 1;
+    f8x3 low = {v->x[0], v->y[0], v->z[0]}, high = {v->x[last], v->y[last], v->z[last]};
+    f8 low2 = f8x3_dot(low, low), high2 = f8x3_dot(high, high);
+    f8x3 to = {f8_if_lt(high2, low2, high.x, low.x), f8_if_lt(high2, low2, high.y, low.y),
+               f8_if_lt(high2, low2, high.z, low.z)};
+    /* The lowest bits of the keys are lane numbers, so the least key names a lane. */
+    i8 key = i8_or(i8_without(i8_bits(f8_min(high2, low2)), i8_set(7)), lane);
+    for (uint32_t i = 4; i > 0; i /= 2) {
+        i8 other = i8_lookup8(key, i8_xor(lane, i8_set(i)));
+        key = i8_if(i8_less(other, key), other, key);
+    }
+    i8 nearest = i8_and(key, i8_set(7));
+    to = (f8x3){f8_lookup8(to.x, nearest), f8_lookup8(to.y, nearest), f8_lookup8(to.z, nearest)};
+    fct_eight_near plane = {.upper2 = f8x3_dot(to, to),
+                            .plane = f8_min(f8x3_dot(high, to), f8x3_dot(low, to))};
+    return fct_triangles_within(&plane, limit2) != 0;
+}
+
 #endif

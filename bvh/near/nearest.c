@@ -1,7 +1,8 @@
 /* bvh/near/nearest.c: the nearest point of the surface. A kernel file.
  *
- * 1. The search opens the nearest box first. It bounds the distances of eight triangles at a time in float
- *    (measure.h), and the upper bounds shrink the search at once.
+ * 1. The search opens the nearest box first. A plane excludes most leaves whose faces are all too far. In the
+ *    others, it bounds the distances of eight triangles at a time in float (measure.h), and the upper bounds
+ *    shrink the search at once.
  * 2. Triangles whose lower bound is within reach wait in a short list.
  * 3. At the end, the triangles of the list that are still within reach are measured in double. On most
  *    searches these are one or two, so the answer is exact up to double rounding at the price of float.
@@ -15,6 +16,10 @@
 
 /* Triangles that wait for their measurement in double. Most searches keep fewer than ten. */
 enum { WAITING_MAX = 32 };
+
+/* Searches of a batch that go on in turns. While one waits for memory, the others compute. With four, a point
+ * near a torso of a million triangles takes 1.13 times as long, with sixteen as long. */
+enum { LANES = 8 };
 
 typedef struct waiting_triangle {
     float lower2; /* square of the lower bound of its distance */
@@ -120,6 +125,7 @@ static void search_leaf(void *user, uint32_t ref) {
     const fct_leaf *leaf = fct_bvh_leaf(s->bvh, ref);
     fct_near_vertices vertices;
     fct_near_vertices_load(leaf, &s->at, &vertices);
+    if (!fct_leaf_within(&vertices, leaf->vertex_octets, s->reach2)) return;
     const uint8_t *corners = fct_leaf_corners(leaf);
     for (uint32_t first = 0; first < leaf->count; first += 8, corners += 24) {
         fct_eight_near near = fct_measure_triangles(&vertices, leaf->vertex_octets, corners);
@@ -148,22 +154,76 @@ static void report_face(const search *s, double distance2, fct_near *out) {
     out->point = fct_bvh_from_scaled(s->bvh, scaled);
 }
 
-bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
-                        fct_visits *visits) {
+/* Returns false if there is nothing to search for. */
+static inline bool begin_search(search *s, const fct_bvh *bvh, v3 point, const v3 *normal,
+                                double max_distance) {
     double size = fabs(point.x) + fabs(point.y) + fabs(point.z);
     if (bvh->embree || !(size < INFINITY) || !(max_distance >= 0)) return false;
-    search s;
-    s.bvh = bvh, s.point = fct_bvh_to_scaled(bvh, point), s.normal = normal;
-    s.at = fct_at_make(bvh, s.point);
-    s.place = FCT_NONE, s.waiting_count = 0;
-    s.visits = (fct_visits){0, 0, 0};
+    s->bvh = bvh, s->point = fct_bvh_to_scaled(bvh, point), s->normal = normal;
+    s->at = fct_at_make(bvh, s->point);
+    s->place = FCT_NONE, s->waiting_count = 0;
+    s->visits = (fct_visits){0, 0, 0};
     double reach = max_distance * bvh->scale;
-    s.best2 = reach * reach;
-    set_bound(&s, sqrt(s.best2));
-    fct_descend(bvh, fct_measure_children, &s.at, &s.limit2, search_leaf, &s, &s.visits);
-    measure_waiting(&s);
-    fct_visits_add(visits, &s.visits);
-    if (s.place == FCT_NONE) return false;
-    report_face(&s, normal ? s.facing2 : s.best2, out);
+    s->best2 = reach * reach;
+    set_bound(s, sqrt(s->best2));
     return true;
+}
+
+static inline bool end_search(search *s, fct_near *out) {
+    measure_waiting(s);
+    if (s->place == FCT_NONE) return false;
+    report_face(s, s->normal ? s->facing2 : s->best2, out);
+    return true;
+}
+
+bool fct_nearest_search(const fct_bvh *bvh, v3 point, const v3 *normal, double max_distance, fct_near *out,
+                        fct_visits *visits) {
+    search s;
+    if (!begin_search(&s, bvh, point, normal, max_distance)) return false;
+    fct_descend(bvh, fct_measure_children, &s.at, &s.limit2, search_leaf, &s, &s.visits);
+    bool found = end_search(&s, out);
+    fct_visits_add(visits, &s.visits);
+    return found;
+}
+
+/* A search on its way. */
+typedef struct lane {
+    search s;
+    fct_descent at;
+    fct_near *out;
+} lane;
+
+/* Gives the lane the next point that can be searched for. Returns false if there is none. */
+static bool start_lane(lane *l, const fct_bvh *bvh, const float *points, size_t count, size_t *next,
+                       double max_distance, fct_near *out) {
+    while (*next < count) {
+        size_t i = (*next)++;
+        l->out = &out[i];
+        l->out->place = FCT_NONE;
+        if (!begin_search(&l->s, bvh, v3_load(points + 3 * i), NULL, max_distance)) continue;
+        fct_descent_begin(bvh, &l->at);
+        return true;
+    }
+    return false;
+}
+
+void fct_nearest_many(const fct_bvh *bvh, size_t count, const float *points, double max_distance,
+                      fct_near *out) {
+    lane lanes[LANES], *running[LANES];
+    size_t next = 0, active = 0;
+    while (active < LANES && start_lane(&lanes[active], bvh, points, count, &next, max_distance, out)) {
+        running[active] = &lanes[active];
+        ++active;
+    }
+    while (active) {
+        for (size_t i = 0; i < active; ++i) {
+            lane *l = running[i];
+            search *s = &l->s;
+            if (fct_descent_step(bvh, &l->at, fct_measure_children, &s->at, &s->limit2, search_leaf, s,
+                                 &s->visits, true))
+                continue;
+            end_search(s, l->out);
+            if (!start_lane(l, bvh, points, count, &next, max_distance, out)) running[i] = running[--active];
+        }
+    }
 }

@@ -1,15 +1,15 @@
-/* bvh/near/points.h: a query for many points. */
+/* bvh/near/points.h: closest points for many points. */
 #ifndef FCT_BVH_POINTS_H
 #define FCT_BVH_POINTS_H
 
 #include "facetree/bvh.h"
 
-/* Such as fct_bvh_closest_point. */
-typedef bool fct_point_query(const fct_bvh *bvh, const float point[3], float max_distance, fct_closest *out,
-                             fct_visits *visits);
+/* Completes an answer that has a face. */
+typedef void fct_finish_point(const fct_bvh *bvh, const float point[3], fct_closest *out, fct_visits *visits);
 
-/* Asks for `count` points (count x 3), on the threads of the environment. */
-void fct_ask_points(const fct_bvh *bvh, fct_point_query *query, size_t count, const float *points,
-                    float max_distance, fct_closest *out);
+/* Finds the closest points of `count` points (count x 3), on the threads of the environment, and calls
+ * `finish` for each, unless it is NULL. */
+void fct_ask_points(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
+                    fct_closest *out, fct_finish_point *finish);
 
 #endif

@@ -270,15 +270,15 @@ static inline bool test_leaf(traversal *t, const fct_leaf *leaf, bool any) {
 /* Pushes all children in the mask but the nearest, sorted, and returns the nearest. The mask is not empty.
  * Most nodes have one or two such children. */
 static inline uint64_t push_children(const fct_bvh *bvh, uint64_t *stack, uint32_t *height, uint32_t met,
-                                     const float enter[8], const uint32_t child[8]) {
+                                     const float enter[8], const uint32_t child[8], bool in_turns) {
     uint32_t i = (uint32_t)__builtin_ctz(met);
     uint64_t nearest = fct_entry_make(enter[i], child[i]);
-    fct_prefetch_child(bvh, child[i]);
+    if (!in_turns) fct_prefetch_child(bvh, child[i]);
     uint32_t base = *height;
     for (met &= met - 1; met; met &= met - 1) {
         i = (uint32_t)__builtin_ctz(met);
         uint64_t entry = fct_entry_make(enter[i], child[i]);
-        fct_prefetch_child(bvh, child[i]);
+        if (!in_turns) fct_prefetch_child(bvh, child[i]);
         uint64_t waiting = entry < nearest ? nearest : entry;
         nearest = entry < nearest ? entry : nearest;
         uint32_t at = (*height)++;
@@ -300,7 +300,7 @@ static inline void enter_root(const traversal *t, position *at) {
 }
 
 /* Visits the node or leaf of the current entry, and goes on to the next. Returns false at the end. */
-static inline bool visit_next(traversal *t, const wide_ray *wide, position *at, bool any) {
+static inline bool visit_next(traversal *t, const wide_ray *wide, position *at, bool any, bool in_turns) {
     const fct_bvh *bvh = t->bvh;
     const uint32_t ref = (uint32_t)at->entry;
     if (ref & FCT_REF_LEAF) {
@@ -320,7 +320,8 @@ static inline bool visit_next(traversal *t, const wide_ray *wide, position *at, 
             child = node->child;
         }
         if (met) {
-            at->entry = push_children(bvh, at->stack, &at->height, met, enter, child);
+            at->entry = push_children(bvh, at->stack, &at->height, met, enter, child, in_turns);
+            if (in_turns) fct_prefetch_all(bvh, (uint32_t)at->entry);
             return true;
         }
     }
@@ -328,6 +329,7 @@ static inline bool visit_next(traversal *t, const wide_ray *wide, position *at, 
         if (at->height == 0) return false;
         at->entry = at->stack[--at->height];
     } while (fct_entry_distance(at->entry) > t->hit.t);
+    if (in_turns) fct_prefetch_all(bvh, (uint32_t)at->entry);
     return true;
 }
 
@@ -340,7 +342,7 @@ static inline void traverse_nodes(traversal *t, bool any) {
     const wide_ray wide = widen_ray(t->bvh, t->ray);
     position at;
     enter_root(t, &at);
-    while (visit_next(t, &wide, &at, any)) {
+    while (visit_next(t, &wide, &at, any, false)) {
     }
 }
 
@@ -404,7 +406,7 @@ static inline void traverse_many(const fct_bvh *bvh, size_t count, const fct_pre
     while (active) {
         for (size_t i = 0; i < active; ++i) {
             lane *l = running[i];
-            if (visit_next(&l->t, &l->wide, &l->at, any)) continue;
+            if (visit_next(&l->t, &l->wide, &l->at, any, true)) continue;
             hits[l->t.ray - rays] = any ? l->t.hit : describe_hit(&l->t);
             if (next < count)
                 start_lane(l, bvh, &rays[next++]);

@@ -37,6 +37,28 @@ static void set_corners(leaf_room *room, uint32_t vertex_count, bool degenerate,
     }
 }
 
+/* A leaf is within a limit, unless all vertices lie beyond it on the way to the nearest one. Of vertices that
+ * are equally near up to rounding, any is the nearest. */
+static void leaf_is_within(const fct_leaf *leaf, const fct_at *at, const fct_near_vertices *vertices) {
+    const float *rows = fct_leaf_vertices(leaf);
+    uint32_t stride = 8u * leaf->vertex_octets;
+    double nearest2 = INFINITY, least = INFINITY, most = 0;
+    v3 from = v3_load(at->at), v[16];
+    for (uint32_t i = 0; i < stride; ++i) {
+        v[i] = v3_sub(v3_make((double)rows[i], (double)rows[stride + i], (double)rows[2 * stride + i]), from);
+        nearest2 = fmin(nearest2, v3_norm2(v[i]));
+    }
+    for (uint32_t i = 0; i < stride; ++i) {
+        double bound = INFINITY;
+        if (v3_norm2(v[i]) > nearest2 * (1 + 3e-6)) continue;
+        for (uint32_t j = 0; j < stride; ++j) bound = fmin(bound, v3_dot(v[j], v3_unit(v[i])));
+        least = fmin(least, bound), most = fmax(most, bound);
+    }
+    double below = least - at->margin, above = most + at->margin;
+    assert_true(fct_leaf_within(vertices, leaf->vertex_octets, (float)(above * above)));
+    if (below > 0) assert_false(fct_leaf_within(vertices, leaf->vertex_octets, (float)(below * below)));
+}
+
 /* Every bound holds within the margin. If `tight`, both bounds are within the margin of the distance. */
 static void bounds_hold(const fct_bvh *bvh, leaf_room *room, v3 point, bool tight) {
     const fct_leaf *leaf = &room->u.leaf;
@@ -46,6 +68,7 @@ static void bounds_hold(const fct_bvh *bvh, leaf_room *room, v3 point, bool tigh
     fct_eight_near near = fct_measure_triangles(&vertices, leaf->vertex_octets, fct_leaf_corners(leaf));
     float upper2[8], plane[8];
     f8_store(upper2, near.upper2), f8_store(plane, near.plane);
+    leaf_is_within(leaf, &at, &vertices);
     v3 from = v3_load(at.at);
     for (uint32_t i = 0; i < 8; ++i) {
         v3 t[3];

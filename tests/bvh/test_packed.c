@@ -418,6 +418,44 @@ static void the_collapse_has_the_least_cost(void **state) {
     }
 }
 
+/* Grids above each other in the unit cube. */
+static fct_mesh make_layers(const fct_env *env, uint32_t layers) {
+    fct_mesh grid = make_grid(env, 8), mesh;
+    const uint32_t vertices = (uint32_t)grid.vertex_count, faces = (uint32_t)grid.face_count;
+    assert_int_equal(fct_mesh_create(env, layers * vertices, layers * faces, 0, &mesh), FCT_OK);
+    for (uint32_t l = 0; l < layers; ++l) {
+        float *p = mesh.positions + 3 * (size_t)l * vertices;
+        memcpy(p, grid.positions, 3 * (size_t)vertices * sizeof *p);
+        for (uint32_t v = 0; v < vertices; ++v) p[3 * v + 2] = (float)l / (float)(layers - 1);
+        for (uint32_t k = 0; k < 3 * faces; ++k)
+            mesh.triangles[3 * (size_t)l * faces + k] = grid.triangles[k] + l * vertices;
+    }
+    fct_mesh_release(env, &grid);
+    return mesh;
+}
+
+static uint32_t largest_leaf(const fct_bvh *bvh) {
+    uint32_t most = 0;
+    for (size_t at = 0; at < bvh->leaf_bytes;) {
+        const fct_leaf *leaf = (const fct_leaf *)(const void *)(bvh->leaves + at);
+        if (leaf->count > most) most = leaf->count;
+        at += fct_leaf_bytes(leaf->count, leaf->vertex_octets);
+    }
+    return most;
+}
+
+/* A line through the cube meets a layer with a probability of 1/3: about 7 leaves of 20 layers and 27 of 80,
+ * and a little more, because clusters are not squares. */
+static void leaves_of_a_dense_model_are_small(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    model few = model_make(&env, make_layers(&env, 20), FCT_BACKEND_OBB),
+          many = model_make(&env, make_layers(&env, 80), FCT_BACKEND_OBB);
+    assert_true(largest_leaf(few.bvh) > 6 && largest_leaf(many.bvh) <= 6);
+    model_release(&env, &few);
+    model_release(&env, &many);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(boxes_hold_their_vertices_with_the_documented_padding),
@@ -425,6 +463,7 @@ int main(void) {
         cmocka_unit_test(nested_leaves_do_not_make_a_deep_top),
         cmocka_unit_test(spans_name_the_clusters_around_their_leaves),
         cmocka_unit_test(the_collapse_has_the_least_cost),
+        cmocka_unit_test(leaves_of_a_dense_model_are_small),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,16 +29,21 @@ double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visi
     return fct_winding_sum(bvh, p, NUMBER_REACH, visits);
 }
 
+static void set_sign(const fct_bvh *bvh, const float point[3], fct_closest *out, fct_visits *visits) {
+    if (out->distance > 0 && fct_winding_is_inside(bvh, v3_load(point), visits))
+        out->distance = -out->distance;
+}
+
 bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max_distance, fct_closest *out,
                              fct_visits *visits) {
     *out = (fct_closest){.distance = INFINITY, .face = FCT_NONE};
     if (!bvh->has_sign || !fct_bvh_closest_point(bvh, point, max_distance, out, visits)) return false;
-    if (out->distance > 0 && fct_winding_is_inside(bvh, v3_load(point), visits))
-        out->distance = -out->distance;
+    set_sign(bvh, point, out, visits);
     return true;
 }
 
 void fct_bvh_signed_distances(const fct_bvh *bvh, size_t count, const float *points, float max_distance,
                               fct_closest *out) {
-    fct_ask_points(bvh, fct_bvh_signed_distance, count, points, max_distance, out);
+    /* No face is within a negative distance. */
+    fct_ask_points(bvh, count, points, bvh->has_sign ? max_distance : -1, out, set_sign);
 }
