@@ -19,7 +19,7 @@
 #define MOST_DOUBLINGS 8
 /* Relative difference of distances up to which a ray has hit the point at which it aims. */
 #define SAME_POINT 1e-3
-enum { GROUP_GRAIN = 4 }; /* groups per chunk */
+enum { GROUP_GRAIN = 4, VERTEX_GRAIN = 64 }; /* groups, and vertices, per chunk */
 
 typedef struct group {
     uint32_t begin, end;
@@ -35,7 +35,8 @@ typedef struct grouping {
     uint32_t *vertices; /* each group has a range of these */
     group *groups, *next;
     uint32_t *scratch;
-    uint32_t *numbers; /* per vertex: of its anchor; FCT_NONE: it is not an anchor */
+    const fct_anchors *known; /* of lower vertices than def->first */
+    uint32_t *numbers;        /* per vertex: of its anchor; FCT_NONE: it is not an anchor */
     fct_anchor *anchors;
     fct_guide *guides; /* per thread; NULL: none */
     uint64_t *chunk_rays;
@@ -232,14 +233,44 @@ static uint32_t halve_group(const grouping *g, const group *k) {
     return mid == k->begin || mid == k->end ? k->begin + (k->end - k->begin) / 2 : mid;
 }
 
-/* Lists the vertices with a face and a normal that are not covered. Returns their number. */
-static uint32_t list_vertices(const fct_surface *s, const uint8_t *covered, uint32_t *vertices) {
-    uint32_t n = 0;
-    for (uint32_t v = 0; v < s->mesh.vertex_count; ++v) {
-        const float *d = s->normals + 3 * (size_t)v;
-        if (covered && covered[v]) continue;
-        if (s->places[v] != FCT_NONE && (d[0] != 0 || d[1] != 0 || d[2] != 0)) vertices[n++] = v;
+/* Whether some anchor is as near to a vertex as the tolerance asks for. No reach counts as more than that of
+ * another anchor plus the distance to it: an anchor in the open says little about a pit beside it. */
+static bool vertex_has_anchor(const grouping *g, size_t vertex) {
+    const float *p = g->surface->sample_points + 3 * vertex;
+    double apart[FCT_NEAREST_ANCHORS], reach = HUGE_VAL;
+    float n[3];
+    fct_nearest near;
+    fct_surface_normal(g->surface, vertex, g->def->side < 0, n);
+    fct_anchors_nearest(g->known, p, n, &near);
+    for (int i = 0; i < near.count; ++i) {
+        const fct_anchor *a = &g->known->items[near.ids[i]];
+        apart[i] = v3_norm(v3_sub(v3_load(p), v3_load(a->position)));
+        reach = fct_min(reach, a->reach + apart[i]);
     }
+    for (int i = 0; i < near.count; ++i) {
+        const double cosine = v3_dot(v3_load(n), v3_load(g->known->items[near.ids[i]].normal));
+        if (apart[i] / reach + sqrt(fct_max(1 - cosine, 0)) <= g->def->tolerance) return true;
+    }
+    return false;
+}
+
+static void need_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    const grouping *g = user;
+    (void)chunk, (void)thread;
+    for (size_t v = g->def->first + begin; v < g->def->first + end; ++v) {
+        const bool lit = !(g->def->covered && g->def->covered[v]) && fct_surface_is_solid(g->surface, v);
+        g->scratch[v] = lit && !(g->known->count > 0 && vertex_has_anchor(g, v));
+    }
+}
+
+/* Lists the vertices from def->first on that need an anchor: those with a face and a normal that are not
+ * covered and have no anchor near enough. Returns their number. */
+static uint32_t list_vertices(const fct_env *env, grouping *g) {
+    const uint32_t first = g->def->first, count = g->surface->mesh.vertex_count;
+    uint32_t n = 0;
+    fct_parallel_for(env, count - first, VERTEX_GRAIN, need_chunk, g);
+    for (uint32_t v = first; v < count; ++v)
+        if (g->scratch[v]) g->vertices[n++] = v;
     return n;
 }
 
@@ -276,16 +307,17 @@ static fct_result anchor_groups(const fct_env *env, grouping *g, uint32_t pendin
     return FCT_OK;
 }
 
-/* Makes all anchors. */
+/* Adds all anchors. */
 static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *out) {
-    uint32_t total = list_vertices(g->surface, g->def->covered, g->vertices), pending = total > 0 ? 1 : 0;
-    size_t capacity = 0;
+    uint32_t total = list_vertices(env, g), pending = total > 0 ? 1 : 0;
+    size_t capacity = out->count;
     g->groups[0] = (group){.begin = 0, .end = total};
     while (pending > 0) {
         fct_result result = number_anchors(env, g, pending, &capacity, out);
         if (result == FCT_OK) result = anchor_groups(env, g, pending, &pending);
         if (result != FCT_OK) return result;
     }
+    fct_release(env, out->axes);
     out->axes = fct_allocate_zero(env, out->count, 1);
     return out->axes ? FCT_OK : fct_fail_memory(env, "anchors");
 }
@@ -301,12 +333,11 @@ static fct_result make_guides(const fct_env *env, grouping *g) {
     return result;
 }
 
-fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
+fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, const fct_surface *surface,
                               const fct_anchors_def *def, fct_anchors *out) {
-    *out = (fct_anchors){0};
     uint32_t most = surface->mesh.vertex_count;
     size_t chunks = fct_chunk_count(most, GROUP_GRAIN) + 1;
-    grouping g = {.source = source, .surface = surface, .def = def};
+    grouping g = {.source = source, .surface = surface, .def = def, .known = out};
     const fct_array arrays[] = {FCT_ARRAY(g.scratch, most),  FCT_ARRAY(g.next, most),
                                 FCT_ARRAY(g.vertices, most), FCT_ARRAY(g.groups, most),
                                 FCT_ARRAY(g.numbers, most),  FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
@@ -327,4 +358,10 @@ fct_result fct_anchors_create(const fct_env *env, const fct_source *source, cons
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
     if (result != FCT_OK) fct_anchors_release(env, out);
     return result;
+}
+
+fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
+                              const fct_anchors_def *def, fct_anchors *out) {
+    *out = (fct_anchors){0};
+    return fct_anchors_extend(env, source, surface, def, out);
 }

@@ -27,6 +27,7 @@ typedef struct fct_anchors_def {
     double tolerance;  /* of distance / reach + sqrt(1 - n . n'), within a group */
     double side;       /* 1: front of the surface; -1: back */
     uint32_t instance; /* of the surface */
+    uint32_t first;    /* lower vertices need no anchor of their own */
     const uint8_t *covered; /* per vertex: it needs no light. NULL: none is covered */
     const float *nearest;   /* per vertex: distance to some surface in front of it, which limits how far away
                                its anchor may be. NULL: infinity */
@@ -36,6 +37,11 @@ typedef struct fct_anchors_def {
 /* Errors: MEMORY, CANCELLED. */
 fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
                               const fct_anchors_def *def, fct_anchors *out);
+/* Adds anchors, in groups of their own, for the vertices from def->first on that have none within the
+ * tolerance. No reach counts as more than that of another anchor plus the distance to it. anchors->rays
+ * grows. Errors: MEMORY, CANCELLED; the anchors are then released. */
+fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, const fct_surface *surface,
+                              const fct_anchors_def *def, fct_anchors *anchors);
 
 /* Sends `rays` rays from position + offset * normal. Sets reach, irradiance and gradient as weighted means
  * over the rays' directions d, with hits at distance r whose surface has the cosine c' to the ray: E = sum w

@@ -4,8 +4,9 @@
  * border of their cover, and place anchors.
  * 2. Light each other vertex at its sample point: direct light by shadow rays, more of them where neighbours
  * see different parts of a lamp; indirect light from the anchors. With FCT_FINAL_NONE, the links bring both.
- * 3. Split edges across which the light changes, cut new covers, and light the new vertices, up to
- * BORDER_ROUNDS times. So the edges of the mesh follow shadow borders.
+ * 3. Split edges across which the light changes, cut new covers, add anchors where none is near enough to a
+ * new vertex, and light the new vertices, up to BORDER_ROUNDS times. So the edges of the mesh follow shadow
+ * borders.
  * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices show their emission alone.
  * 5. Check the result at random points (check.h), and map the error if it is an output (error_map.h).
  */
@@ -381,7 +382,8 @@ uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]
     return power[back[1]] > FCT_OUTPUT_DARK * power[back[0]] ? 2 : 1;
 }
 
-static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
+/* Anchors for the vertices from l->first on. */
+static fct_result add_anchors(const lighting *l, fct_anchors *anchors) {
     const fct_solution *s = l->s;
     bool dense = s->def.final == FCT_FINAL_GATHER;
     uint32_t rays = (uint32_t)(ANCHOR_RAYS * s->fineness);
@@ -390,11 +392,12 @@ static fct_result make_anchors(const lighting *l, fct_anchors *anchors) {
                            .tolerance = tolerance / sqrt(fct_max(s->fineness, .5)),
                            .side = l->back ? -1 : 1,
                            .instance = l->instance,
+                           .first = l->first,
                            .covered = l->covered,
                            .nearest = l->nearest,
                            .seed = fct_hash2(s->def.seed, l->instance)};
     const fct_source source = fct_solution_source(s);
-    return fct_anchors_create(s->env, &source, l->surface, &def, anchors);
+    return fct_anchors_extend(s->env, &source, l->surface, &def, anchors);
 }
 
 fct_result fct_output_surface(const fct_solution *s, uint32_t instance, bool back, fct_surface *out) {
@@ -430,16 +433,17 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
     result = cover_vertices(&l, rays);
     if (result == FCT_OK && !kept) result = cut_covers(&l, rays);
-    if (result == FCT_OK && gathers) result = make_anchors(&l, &anchors);
-    *rays += anchors.rays;
+    if (result == FCT_OK && gathers) result = add_anchors(&l, &anchors);
     for (int round = 0; result == FCT_OK; ++round) {
         uint32_t added = 0;
         if ((result = light_vertices(&l, rays)) != FCT_OK || round == rounds) break;
         result = fct_surface_refine(env, &surface, cut_at_border, &l, &added);
         if (result == FCT_OK && added > 0) result = cover_vertices(&l, rays);
         if (result == FCT_OK && added > 0) result = cut_covers(&l, rays);
+        if (result == FCT_OK && added > 0 && gathers) result = add_anchors(&l, &anchors);
         if (added == 0) break;
     }
+    *rays += anchors.rays;
     if (result == FCT_OK) result = finish_colors(&l);
     if (result == FCT_OK)
         result = fct_attributes_add(env, s->def.outputs, l.direct, l.indirect, &surface.mesh);

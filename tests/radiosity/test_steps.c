@@ -179,6 +179,11 @@ static void grow_side(side *x, bool covered, bool made) {
     x->known = (uint32_t)count;
 }
 
+/* Cuts may leave a vertex whose faces have no area. It is black. */
+static bool has_faces(const side *x, uint32_t v) {
+    return x->f.places[v] != FCT_NONE && v3_norm2(v3_load(x->f.normals + 3 * (size_t)v)) > 0;
+}
+
 /* Which of the new vertices are covered. */
 static void cover_by_steps(side *x) {
     uint32_t first = x->known;
@@ -187,6 +192,7 @@ static void cover_by_steps(side *x) {
         float n[3];
         v3_store(n, find_normal(x, v));
         x->covered[v] =
+            has_faces(x, v) &&
             fct_point_is_covered(x->s->scene, x->f.sample_points + 3 * (size_t)v, n, x->f.offsets[v],
                                  fct_hash3(x->s->def.seed + 3, x->instance, v), &x->nearest[v], &x->rays);
         x->covers += x->covered[v];
@@ -270,11 +276,6 @@ static void settle_doubts(side *x) {
     }
 }
 
-/* Cuts may leave a vertex whose faces have no area. It is black. */
-static bool has_faces(const side *x, uint32_t v) {
-    return x->f.places[v] != FCT_NONE && v3_norm2(v3_load(x->f.normals + 3 * (size_t)v)) > 0;
-}
-
 static void color_side(side *x) {
     const fct_material *m = find_material(x->s, x->instance);
     for (size_t i = 0; i < 3 * (size_t)x->known; ++i)
@@ -324,25 +325,32 @@ static double has_border(void *user, uint32_t a, uint32_t b) {
     return result ? .5 : 0;
 }
 
+/* Anchors for the vertices that have no light yet. */
+static void anchor_by_steps(side *x) {
+    const fct_solution *s = x->s;
+    if (s->def.final == FCT_FINAL_NONE) return;
+    fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(20 * s->fineness),
+                           .tolerance =
+                               (s->def.final == FCT_FINAL_GATHER ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
+                           .side = x->back ? -1 : 1,
+                           .instance = x->instance,
+                           .first = x->lit,
+                           .covered = x->covered,
+                           .nearest = x->nearest,
+                           .seed = fct_hash2(s->def.seed, x->instance)};
+    const fct_source source = fct_solution_source(s);
+    const uint64_t before = x->anchors.rays;
+    assert_int_equal(fct_anchors_extend(&plain, &source, &x->f, &def, &x->anchors), FCT_OK);
+    x->rays += x->anchors.rays - before;
+}
+
 static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     side x = {.s = s, .instance = instance, .back = back};
     uint32_t added = 0;
     assert_int_equal(fct_surface_build(&plain, SHADE(s->scene, instance), s->max_edge, &x.f), FCT_OK);
     cover_by_steps(&x);
     cut_by_steps(&x);
-    if (s->def.final != FCT_FINAL_NONE) {
-        fct_anchors_def def = {.rays = s->def.samples ? s->def.samples : (uint32_t)(20 * s->fineness),
-                               .tolerance =
-                                   (s->def.final == FCT_FINAL_GATHER ? .4 : .9) / sqrt(fmax(s->fineness, .5)),
-                               .side = back ? -1 : 1,
-                               .instance = instance,
-                               .covered = x.covered,
-                               .nearest = x.nearest,
-                               .seed = fct_hash2(s->def.seed, instance)};
-        const fct_source source = fct_solution_source(s);
-        assert_int_equal(fct_anchors_create(&plain, &source, &x.f, &def, &x.anchors), FCT_OK);
-        x.rays += x.anchors.rays;
-    }
+    anchor_by_steps(&x);
     light_by_steps(&x, 0);
     for (int round = 0; round < 4; ++round) {
         uint32_t old = x.f.mesh.vertex_count;
@@ -350,6 +358,7 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
         if (added == 0) break;
         cover_by_steps(&x);
         cut_by_steps(&x);
+        anchor_by_steps(&x);
         light_by_steps(&x, old);
     }
     if (s->def.final != FCT_FINAL_NONE)

@@ -61,6 +61,8 @@ static void gathers_equal_their_rays(void **state) {
     end_room(&r);
 }
 
+enum { NEAR = FCT_NEAREST_ANCHORS, TERMS = 6 };
+
 /* The anchors that the rules of anchor.h make from the vertices. */
 typedef struct maker {
     const room *r;
@@ -208,7 +210,85 @@ static void groups_follow_the_rules(void **state) {
     assert_true(halved[0] > 20 && halved[1] > 20 && turned > 0 && hidden > 0 && again > 20);
 }
 
-enum { NEAR = FCT_NEAREST_ANCHORS, TERMS = 6 };
+/* Whether the vertex needs an anchor beside the given ones: with r the least reach + distance of the 24
+ * nearest of them, none has distance / r + sqrt(1 - n.n') within the tolerance. */
+static bool needs_anchor(const maker *m, const fct_anchors *t, uint32_t vertex) {
+    const v3 p = at(m->f->sample_points, vertex), n = v3_scale(at(m->f->normals, vertex), m->def.side);
+    double far2[NEAR], reach = INFINITY, most = 8;
+    const fct_anchor *near[NEAR];
+    int count = 0;
+    bool needs = true;
+    for (uint32_t i = 0; i < t->count; ++i)
+        if (v3_norm2(v3_sub(n, v3_load(t->items[i].normal))) < .4) most = .4;
+    for (uint32_t i = 0; i < t->count; ++i) {
+        const fct_anchor *a = &t->items[i];
+        const double turn2 = v3_norm2(v3_sub(n, v3_load(a->normal)));
+        const double d2 = v3_norm2(v3_sub(p, v3_load(a->position))) + t->turn * t->turn * turn2;
+        if (turn2 >= most || (count == NEAR && d2 >= far2[NEAR - 1])) continue;
+        int k = count < NEAR ? count++ : NEAR - 1;
+        for (; k > 0 && far2[k - 1] > d2; --k) far2[k] = far2[k - 1], near[k] = near[k - 1];
+        far2[k] = d2, near[k] = a;
+    }
+    for (int i = 0; i < count; ++i)
+        reach = fmin(reach, v3_norm(v3_sub(p, v3_load(near[i]->position))) + near[i]->reach);
+    for (int i = 0; i < count; ++i) {
+        const double turn = sqrt(fmax(1 - v3_dot(n, v3_load(near[i]->normal)), 0));
+        const double apart = v3_norm(v3_sub(p, v3_load(near[i]->position)));
+        needs &= apart / reach + turn > m->def.tolerance;
+    }
+    return needs;
+}
+
+/* New vertices without an anchor near enough form groups of their own. */
+static void extensions_follow_the_rules(void **state) {
+    (void)state;
+    uint32_t needed = 0, served = 0;
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+        room r = make_room(seed);
+        fct_surface f;
+        assert_int_equal(fct_surface_build(&plain, SHADE(r.scene, r.ball), .3, &f), FCT_OK);
+        fct_anchors t, known;
+        maker m = {.r = &r, .f = &f, .found = &t, .def = {.rays = 17, .tolerance = .9, .seed = seed}};
+        m.def.side = seed % 2 ? -1 : 1, m.longest = 3;
+        const fct_source source = {&r.set, NULL, r.stored, m.longest};
+        const uint32_t all = f.mesh.vertex_count, first = all / 3;
+        uint8_t *covered = calloc(all, 1);
+        for (uint32_t v = 0; v < all; ++v) covered[v] = v >= first || v % 2;
+        m.def.covered = covered;
+        assert_int_equal(fct_anchors_create(&plain, &source, &f, &m.def, &t), FCT_OK);
+        const uint64_t rays = t.rays;
+        known = t;
+        known.items = malloc(t.count * sizeof *t.items);
+        memcpy(known.items, t.items, t.count * sizeof *t.items);
+        for (uint32_t v = 0; v < all; ++v) covered[v] = v % 5 == 0;
+        m.def.first = first;
+        assert_int_equal(fct_anchors_extend(&plain, &source, &f, &m.def, &t), FCT_OK);
+        uint32_t *vertices = malloc(all * sizeof *vertices), count = 0;
+        for (uint32_t v = first; v < all; ++v) {
+            if (f.places[v] == FCT_NONE || covered[v]) continue;
+            if (needs_anchor(&m, &known, v))
+                vertices[count++] = v;
+            else
+                ++served;
+        }
+        m.made = calloc(all, sizeof *m.made);
+        if (count > 0) follow_group(&m, vertices, count);
+        assert_int_equal(known.count + m.count, t.count);
+        assert_int_equal(rays + m.rays, t.rays);
+        for (uint32_t i = 0; i < known.count; ++i) {
+            fct_nearest near;
+            fct_anchors_nearest(&t, known.items[i].position, known.items[i].normal, &near);
+            assert_near(near.distances2[0], 0, 1e-9);
+        }
+        needed += count;
+        free(vertices), free(covered), free(m.made), free(known.items);
+        fct_anchors_release(&plain, &t);
+        fct_surface_release(&plain, &f);
+        end_room(&r);
+    }
+    printf("    %u vertices needed new anchors, %u did not\n", needed, served);
+    assert_true(needed > 20 && served > 20);
+}
 
 /* The value at p of the polynomial that minimizes sum w_i (e_i - f(p_i))^2 / sum w + .02 |linear terms|^2 +
  * .1 |quadratic terms|^2: least squares over one row per anchor and one per penalty, by Gram and Schmidt.
@@ -369,6 +449,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gathers_equal_their_rays),
         cmocka_unit_test(groups_follow_the_rules),
+        cmocka_unit_test(extensions_follow_the_rules),
         cmocka_unit_test(blends_equal_the_formula),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
