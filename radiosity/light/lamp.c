@@ -21,7 +21,7 @@
  * Larger: one visible fraction stands for lamps that differ visibly. */
 #define MAJOR_SHARE .025
 /* Rays per lamp where the first ones disagree: a multiple of RAY_STEP, at most MAX_RAYS. */
-#define RAY_STEP 8
+#define RAY_STEP 4
 #define MAX_RAYS 64
 /* First rays to lamps in doubt, which must find a border that the rays of a neighbour have found. */
 #define DOUBT_RAYS 32
@@ -32,7 +32,7 @@
 #define BRIGHT_SHARE .2
 /* Wanted standard error of a lamp's light as a share of the receiver's light, times the first rays per lamp.
  */
-#define RAY_ERROR .032
+#define RAY_ERROR .016
 /* The standard error of a visible fraction f from n stratified rays is about .6 sqrt(f (1 - f)) / n^(3/4). */
 #define STRATIFIED .6
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
@@ -59,7 +59,8 @@ typedef struct query {
     fct_sight known; /* of the earlier call, if lamps are in doubt */
     fct_sight sight;
     bool fixed;
-    double total; /* sum of the lamps' estimates times strength */
+    double error; /* wanted standard error of a lamp's light as a share of the receiver's light */
+    double total; /* the receiver's light: sum of the lamps' estimates times strength, and other light */
     double scale; /* the same, with exact light in place of the estimates of lamps seen so far */
     uint64_t rays;
 } query;
@@ -100,7 +101,7 @@ static bool point_is_visible(query *q, const fct_lamp *lamp, v3 y) {
 static uint32_t count_wanted_rays(const query *q, double visible, uint32_t sent, double share) {
     /* Counts one more ray as half visible, because the variance of few rays is often too small. */
     const double fraction = (visible * sent + .5) / (sent + 1);
-    const double ratio = STRATIFIED * sqrt(fraction * (1 - fraction)) * share * q->base_rays / RAY_ERROR;
+    const double ratio = STRATIFIED * sqrt(fraction * (1 - fraction)) * share / q->error;
     uint32_t rays = RAY_STEP;
     while (rays < MAX_RAYS && rays * sqrt(rays) < ratio * ratio) rays += RAY_STEP;
     return rays;
@@ -187,7 +188,7 @@ static bool sample_minor_lamps(query *q, double sum, uint32_t count, double all[
 static void add_minor_lamps(query *q, const double light[3], double sum, double irradiance[3], fct_cut *cut) {
     double all[3], seen[3];
     /* Rays to different lamps are not stratified: n rays leave a standard error of at most 1/2 / sqrt(n). */
-    const double ratio = .5 * sum / q->scale * q->base_rays / RAY_ERROR;
+    const double ratio = .5 * sum / q->scale / q->error;
     const uint32_t wanted = (uint32_t)fct_min(fct_max(ratio * ratio, LEAST_MINOR_RAYS), MOST_MINOR_RAYS);
     const bool more = wanted > q->base_rays && !q->fixed;
     if (q->doubt && !more) return; /* the same rays again */
@@ -242,7 +243,8 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
 
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                        uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays) {
+                        const fct_lamp_goal *goal, fct_sight *sight, double irradiance[3], uint64_t *rays) {
+    const uint32_t doubt = goal ? goal->doubt : 0;
     query q = {.lamps = lamps,
                .scene = scene,
                .point = point,
@@ -251,8 +253,10 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
                .base_rays = base_rays & ~FCT_LAMPS_FIXED,
                .doubt = doubt,
                .slots = doubt ? doubt : UINT32_MAX,
+               .total = goal ? goal->other : 0,
                .fixed = (base_rays & FCT_LAMPS_FIXED) != 0};
     for (int k = 0; k < 3; ++k) q.origin[k] = (float)fct_round(point[k] + offset * normal[k]);
+    q.error = RAY_ERROR * (goal ? goal->slack : 1) / fct_max(q.base_rays, 1);
     if (doubt) q.known = q.sight = *sight;
     for (int k = 0; k < 3 && !doubt; ++k) irradiance[k] = 0;
     double open = add_lamps(&q, irradiance);

@@ -37,13 +37,21 @@ static inline uint32_t fct_sight_mixed(fct_sight s) {
     return s.open & s.blocked;
 }
 
+/* What a receiver wants to know of its lamps. */
+typedef struct fct_lamp_goal {
+    double other; /* its light from elsewhere, summed over channels. It hides the noise of the lamps' light */
+    double slack; /* factor on the wanted standard error */
+    uint32_t doubt; /* lamps in doubt, as in fct_sight; 0 in a first call */
+} fct_lamp_goal;
+
 /* Irradiance (RGB) of all lamps at a point with a unit normal, without blockers. */
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]);
 /* The same with shadows. Rays start at point + offset * normal. Each lamp receives base_rays rays (0: no
- * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 3.2 % /
- * base_rays of the receiver's light. Minor lamps share their rays. Equal values of item_seed give equal rays.
- * *rays (may be NULL) grows by the number of rays. Any number of threads may call. Returns the visible
+ * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 1.6 % /
+ * base_rays * slack of the receiver's light. Without a goal (NULL) nothing is in doubt, slack is 1, and the
+ * lamps alone are the receiver's light. Minor lamps share their rays. Equal values of item_seed give equal
+ * rays. *rays (may be NULL) grows by the number of rays. Any number of threads may call. Returns the visible
  * fraction over all lamps, weighted by their light; 0 if no lamp lies above the horizon.
  *
  * Few rays may agree by chance and miss a thin shadow. Neighbours tell: *sight (may be NULL) receives what
@@ -53,6 +61,6 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
  * the first call had sent these. Other lamps get no ray, and no ray is sent twice to a major lamp. */
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
-                        uint32_t doubt, fct_sight *sight, double irradiance[3], uint64_t *rays);
+                        const fct_lamp_goal *goal, fct_sight *sight, double irradiance[3], uint64_t *rays);
 
 #endif

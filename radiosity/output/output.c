@@ -24,6 +24,7 @@
 #include "radiosity/surface/cover.h"
 #include "radiosity/surface/paint.h"
 #include "radiosity/surface/refine.h"
+#include "radiosity/surface/split.h"
 #include "radiosity/surface/tessellate.h"
 
 /* Rounds of splits at shadow borders: each halves the width of a border's blur. */
@@ -39,9 +40,13 @@ enum { BORDER_ROUNDS = 4 };
 enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
 /* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
 enum { DOUBT_ROUNDS = 2 };
+/* The largest factor on the wanted error of the direct light, of vertices with a small area. */
+#define MOST_SLACK 2
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
  * length of the edge that is cut. */
 #define CUT_WIDTH (1. / 256)
+/* How far from a wall the search for the border looks first: less than half of that. */
+#define WALL_WIDTH (.4 * CUT_WIDTH)
 /* Tolerance of the groups of vertices per anchor. Vertices of one group turn at most acos(1 - .4^2) = 33
  * degrees from their anchor with GATHER. A larger tolerance allows 79 degrees, but anchor.c also halves
  * groups that turn by more than the blend accepts. */
@@ -49,12 +54,19 @@ enum { DOUBT_ROUNDS = 2 };
 #define DIRECT_TOLERANCE .9
 enum { VERTEX_GRAIN = 64 }; /* vertices per chunk */
 
+/* An edge that crosses the border of a cover. */
+typedef struct cover_border {
+    uint32_t ends[2]; /* ends[0] < ends[1] */
+    double share;     /* of the way at which it is cut; 0: not at all */
+} cover_border;
+
 typedef struct lighting {
     const fct_solution *s;
     fct_surface *surface;
     const fct_anchors *anchors;
     uint32_t instance;
     bool back;
+    double usual_area;        /* mean over the vertices before any split at a border */
     uint32_t first;           /* lower vertices have their light */
     float *direct, *indirect; /* irradiance, per vertex x 3; `indirect` holds all of it with FCT_FINAL_NONE */
     uint8_t *covered;         /* per vertex */
@@ -65,7 +77,8 @@ typedef struct lighting {
     float *nearest;           /* per vertex: see fct_point_is_covered */
     uint32_t known;           /* lower vertices have room in these arrays */
     uint32_t cut_first;       /* of the vertices before the border of a cover */
-    uint64_t *rays;           /* of the cuts */
+    cover_border *borders;    /* of the edges that cross the border of a cover; NULL: none */
+    fct_edge_table edges;     /* -> place in `borders` */
     uint64_t *chunk_rays;
 } lighting;
 
@@ -78,14 +91,23 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-/* doubt, irradiance: as in fct_lamps_direct. */
+/* The noise of a vertex shows over its area. So vertices that are denser than those of the surface before any
+ * split at a border may have more of it. */
+static double find_slack(const lighting *l, size_t v) {
+    const double area = l->surface->areas[v];
+    return area > 0 ? fct_min(fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK;
+}
+
+/* Once the indirect light is known. doubt, irradiance: as in fct_lamps_direct. */
 static void gather_lamps(const lighting *l, size_t v, const float normal[3], uint32_t doubt,
                          double irradiance[3], uint64_t *rays) {
     const fct_solution *s = l->s;
     const fct_surface *f = l->surface;
     uint32_t rays_each = fct_solution_lamp_rays(s, LAMP_RAYS);
+    fct_lamp_goal goal = {.slack = find_slack(l, v), .doubt = doubt};
+    for (size_t c = 0; c < 3; ++c) goal.other += (double)l->indirect[3 * v + c];
     fct_solution_direct(s, f->sample_points + 3 * v, normal, f->offsets[v],
-                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, doubt, &l->sights[v],
+                        fct_hash3(s->def.seed + 1, l->instance, v), rays_each, &goal, &l->sights[v],
                         irradiance, rays);
 }
 
@@ -111,17 +133,19 @@ static void light_chunk(void *user, size_t begin, size_t end, size_t chunk, uint
         float normal[3];
         double direct[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
         fct_surface_normal(l->surface, v, l->back, normal);
-        if (fct_surface_is_solid(l->surface, v) && !l->covered[v]) {
+        const bool lit = fct_surface_is_solid(l->surface, v) && !l->covered[v];
+        if (lit) {
             if (l->s->def.final == FCT_FINAL_NONE) {
                 gather_links(l, v, normal, indirect);
             } else {
-                gather_lamps(l, v, normal, 0, direct, &l->chunk_rays[chunk]);
                 fct_anchors_irradiance(l->anchors, &l->s->elements, f->sample_points + 3 * v, normal,
                                        f->offsets[v], f->flat[v], indirect, &l->chunk_rays[chunk]);
             }
         }
-        for (size_t c = 0; c < 3; ++c)
-            l->direct[3 * v + c] = (float)direct[c], l->indirect[3 * v + c] = (float)indirect[c];
+        for (size_t c = 0; c < 3; ++c) l->indirect[3 * v + c] = (float)indirect[c];
+        if (lit && l->s->def.final != FCT_FINAL_NONE)
+            gather_lamps(l, v, normal, 0, direct, &l->chunk_rays[chunk]);
+        for (size_t c = 0; c < 3; ++c) l->direct[3 * v + c] = (float)direct[c];
     }
 }
 
@@ -177,17 +201,22 @@ static void color_vertices(const lighting *l, bool painted) {
 
 typedef void run_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread);
 
-/* Runs the function for vertices [first, vertex_count), less `first`. Errors: MEMORY, CANCELLED. */
-static fct_result run_vertices(lighting *l, const char *phase, uint32_t first, run_chunk *run,
-                               uint64_t *rays) {
+/* Runs the function for [0, count). Errors: MEMORY, CANCELLED. */
+static fct_result run_chunks(lighting *l, const char *phase, size_t count, run_chunk *run, uint64_t *rays) {
     const fct_env *env = l->s->env;
-    size_t count = l->surface->mesh.vertex_count - first, chunks = fct_chunk_count(count, VERTEX_GRAIN);
+    const size_t chunks = fct_chunk_count(count, VERTEX_GRAIN);
     l->chunk_rays = fct_allocate_zero(env, chunks + 1, sizeof *l->chunk_rays);
     if (!l->chunk_rays) return fct_fail_memory(env, "the output");
     fct_result result = fct_parallel_for_progress(env, phase, count, VERTEX_GRAIN, run, l);
     for (size_t c = 0; c < chunks; ++c) *rays += l->chunk_rays[c];
     fct_release(env, l->chunk_rays);
     return result;
+}
+
+/* Runs the function for vertices [first, vertex_count), less `first`. Errors: MEMORY, CANCELLED. */
+static fct_result run_vertices(lighting *l, const char *phase, uint32_t first, run_chunk *run,
+                               uint64_t *rays) {
+    return run_chunks(l, phase, l->surface->mesh.vertex_count - first, run, rays);
 }
 
 /* Makes room for the light of all vertices. The new ones are covered or not, and made by a cut or not. */
@@ -261,32 +290,83 @@ static fct_result light_vertices(lighting *l, uint64_t *rays) {
     return result;
 }
 
-/* On an edge from an uncovered to a covered vertex: just before the point where the cover begins. */
-static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
-    lighting *l = user;
+/* True if the edge goes from an uncovered to a covered vertex. An edge of old vertices has been looked at in
+ * an earlier round, and one that ends at a cut is behind the border. */
+static bool crosses_cover(const lighting *l, uint32_t a, uint32_t b) {
+    const uint32_t to = l->covered[a] ? a : b;
+    if (l->covered[a] == l->covered[b] || l->cut[to] || (a < l->first && b < l->first)) return false;
+    return fct_surface_is_solid(l->surface, a) && fct_surface_is_solid(l->surface, b);
+}
+
+/* An edge, and how far above it rays start. */
+typedef struct edge_ends {
+    v3 positions[2], normals[2];
+    float offset;
+} edge_ends;
+
+static edge_ends load_ends(const lighting *l, uint32_t from, uint32_t to) {
     const fct_surface *f = l->surface;
-    const uint32_t from = l->covered[a] ? b : a, to = l->covered[a] ? a : b;
-    if (l->covered[a] == l->covered[b] || l->cut[to]) return 0; /* the border is beside a covered cut */
-    if (a < l->first && b < l->first) return 0;                 /* an earlier round looked at this edge */
-    if (!fct_surface_is_solid(l->surface, a) || !fct_surface_is_solid(l->surface, b)) return 0;
-    const v3 p = v3_load(f->mesh.positions + 3 * (size_t)from);
-    const v3 way = v3_sub(v3_load(f->mesh.positions + 3 * (size_t)to), p);
-    const float offset = fmaxf(f->offsets[a], f->offsets[b]);
-    const uint64_t seed = fct_hash3(l->s->def.seed + 4, l->instance, from);
-    float normals[2][3], normal[3], point[3];
-    double bare = 0, covered = 1;
-    fct_surface_normal(l->surface, from, l->back, normals[0]);
-    fct_surface_normal(l->surface, to, l->back, normals[1]);
-    while (covered - bare > CUT_WIDTH) {
-        const double middle = .5 * (bare + covered);
-        const v3 first = v3_scale(v3_load(normals[0]), 1 - middle);
-        v3_store(normal, v3_unit(v3_mad(first, middle, v3_load(normals[1]))));
-        v3_store(point, v3_mad(p, middle, way));
-        bool hidden = fct_point_is_covered(l->s->scene, point, normal, offset, seed, NULL, l->rays);
-        *(hidden ? &covered : &bare) = middle;
+    edge_ends e = {.offset = fmaxf(f->offsets[from], f->offsets[to])};
+    for (int k = 0; k < 2; ++k) {
+        float normal[3];
+        fct_surface_normal(f, k ? to : from, l->back, normal);
+        e.normals[k] = v3_load(normal);
+        e.positions[k] = v3_load(f->mesh.positions + 3 * (size_t)(k ? to : from));
     }
-    if (bare < CUT_WIDTH) return 0; /* the border is at `from` */
-    return from == a ? bare : 1 - bare;
+    return e;
+}
+
+/* The share of the way along the edge at which a ray just above it meets something; NAN if nothing is there.
+ */
+static double find_wall(const fct_scene *scene, const edge_ends *e, uint64_t *rays) {
+    const v3 origin = v3_mad(e->positions[0], e->offset, e->normals[0]);
+    const v3 goal = v3_mad(e->positions[1], e->offset, e->normals[1]);
+    fct_ray ray = {.t_min = 0, .t_max = 1};
+    fct_scene_hit hit;
+    v3_store(ray.origin, origin);
+    v3_store(ray.direction, v3_sub(goal, origin));
+    ++*rays;
+    return fct_scene_closest_hit(scene, &ray, &hit, NULL) ? (double)hit.t : (double)NAN;
+}
+
+static bool edge_is_covered(const lighting *l, const edge_ends *e, double share, uint64_t seed,
+                            uint64_t *rays) {
+    float point[3], normal[3];
+    v3_store(normal, v3_unit(v3_mad(v3_scale(e->normals[0], 1 - share), share, e->normals[1])));
+    v3_store(point, v3_mad(e->positions[0], share, v3_sub(e->positions[1], e->positions[0])));
+    return fct_point_is_covered(l->s->scene, point, normal, e->offset, seed, NULL, rays);
+}
+
+/* On an edge from an uncovered vertex to a covered one: the share of the way to a point just before that
+ * where the cover begins, which is mostly at a wall; 0 if this is at the start. */
+static double find_cover(const lighting *l, uint32_t from, uint32_t to, uint64_t *rays) {
+    const uint64_t seed = fct_hash3(l->s->def.seed + 4, l->instance, from);
+    const edge_ends e = load_ends(l, from, to);
+    const double wall = find_wall(l->s->scene, &e, rays);
+    double bare = 0, covered = 1;
+    for (int k = 0; covered - bare > CUT_WIDTH; ++k) {
+        double share = wall + (k == 0 ? WALL_WIDTH : -WALL_WIDTH);
+        if (k > 1 || !(share > bare && share < covered)) share = .5 * (bare + covered);
+        *(edge_is_covered(l, &e, share, seed, rays) ? &covered : &bare) = share;
+    }
+    return bare < CUT_WIDTH ? 0 : bare;
+}
+
+static void border_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    lighting *l = user;
+    (void)thread;
+    for (size_t i = begin; i < end; ++i) {
+        const uint32_t a = l->borders[i].ends[0], b = l->borders[i].ends[1];
+        const bool turned = l->covered[a];
+        const double share = find_cover(l, turned ? b : a, turned ? a : b, &l->chunk_rays[chunk]);
+        l->borders[i].share = turned && share > 0 ? 1 - share : share;
+    }
+}
+
+static double cut_before_cover(void *user, uint32_t a, uint32_t b) {
+    const lighting *l = user;
+    const uint32_t *place = crosses_cover(l, a, b) ? fct_edge_table_find(&l->edges, a, b) : NULL;
+    return place ? l->borders[*place].share : 0;
 }
 
 /* On the rest of such an edge: just behind it. */
@@ -299,13 +379,40 @@ static double cut_behind_cover(void *user, uint32_t a, uint32_t b) {
     return wide ? 1 - 2 * CUT_WIDTH : 0;
 }
 
+/* Lists the edges that cross the border of a cover, and finds it on each. */
+static fct_result find_borders(lighting *l, uint64_t *rays) {
+    const fct_mesh *m = &l->surface->mesh;
+    const size_t corners = 3 * (size_t)m->face_count;
+    size_t most = 0, count = 0;
+    for (size_t c = 0; c < corners; ++c)
+        most += crosses_cover(l, m->triangles[c], m->triangles[c % 3 == 2 ? c - 2 : c + 1]);
+    if (most == 0) return FCT_OK;
+    fct_result result = fct_edge_table_init(l->s->env, most, &l->edges);
+    if (result != FCT_OK) return result;
+    l->borders = fct_allocate(l->s->env, most, sizeof *l->borders);
+    if (!l->borders) return fct_fail_memory(l->s->env, "the output");
+    for (size_t c = 0; c < corners; ++c) {
+        const uint32_t a = m->triangles[c], b = m->triangles[c % 3 == 2 ? c - 2 : c + 1];
+        bool fresh = false;
+        if (!crosses_cover(l, a, b)) continue;
+        uint32_t *place = fct_edge_table_insert(&l->edges, a, b, &fresh);
+        if (!fresh) continue;
+        *place = (uint32_t)count;
+        l->borders[count++] = (cover_border){.ends = {a < b ? a : b, a < b ? b : a}};
+    }
+    return run_chunks(l, "covers", count, border_chunk, rays);
+}
+
 /* Cuts surfaces along the border of their cover: first a row of vertices before the border, then one
  * behind it. So neither light nor darkness shows beyond the border. */
 static fct_result cut_covers(lighting *l, uint64_t *rays) {
     uint32_t added = 0;
-    l->rays = rays;
     l->cut_first = l->surface->mesh.vertex_count;
-    fct_result result = fct_surface_refine(l->s->env, l->surface, cut_before_cover, l, &added);
+    fct_result result = find_borders(l, rays);
+    if (result == FCT_OK && l->borders)
+        result = fct_surface_refine(l->s->env, l->surface, cut_before_cover, l, &added);
+    fct_release(l->s->env, l->borders), l->borders = NULL;
+    fct_edge_table_release(l->s->env, &l->edges);
     if (result == FCT_OK && added > 0) result = grow_light(l, false, true);
     if (result == FCT_OK && added > 0)
         result = fct_surface_refine(l->s->env, l->surface, cut_behind_cover, l, &added);
@@ -431,6 +538,8 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     fct_result result = fct_output_surface(s, instance, back, &surface);
     if (result != FCT_OK) return result;
     lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
+    for (size_t v = 0; v < surface.mesh.vertex_count; ++v)
+        l.usual_area += (double)surface.areas[v] / surface.mesh.vertex_count;
     result = cover_vertices(&l, rays);
     if (result == FCT_OK && !kept) result = cut_covers(&l, rays);
     if (result == FCT_OK && gathers) result = add_anchors(&l, &anchors);

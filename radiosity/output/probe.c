@@ -95,8 +95,8 @@ typedef struct probing {
 static void gather_at_site(const fct_solution *s, const fct_site *site, const float normal[3], uint64_t seed,
                            double irradiance[3], uint64_t *rays) {
     uint32_t gather_rays = (uint32_t)(GATHER_RAYS * fct_max(s->fineness, 1));
-    fct_solution_direct(s, site->point, normal, site->offset, seed, fct_solution_lamp_rays(s, LAMP_RAYS), 0,
-                        NULL, irradiance, rays);
+    fct_solution_direct(s, site->point, normal, site->offset, seed, fct_solution_lamp_rays(s, LAMP_RAYS),
+                        NULL, NULL, irradiance, rays);
     fct_anchor a = {.offset = site->offset};
     memcpy(a.position, site->point, sizeof a.position);
     memcpy(a.normal, normal, sizeof a.normal);

@@ -7,13 +7,14 @@ uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least) {
 }
 
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
-                         uint64_t seed, uint32_t rays_each, uint32_t doubt, fct_sight *sight,
+                         uint64_t seed, uint32_t rays_each, const fct_lamp_goal *goal, fct_sight *sight,
                          double irradiance[3], uint64_t *rays) {
-    if (!doubt) irradiance[0] = irradiance[1] = irradiance[2] = 0;
-    if (sight && !doubt) *sight = (fct_sight){0};
+    const bool first = !goal || !goal->doubt;
+    if (first) irradiance[0] = irradiance[1] = irradiance[2] = 0;
+    if (sight && first) *sight = (fct_sight){0};
     if (s->def.indirect_only) return;
     double p[3] = {point[0], point[1], point[2]}, n[3] = {normal[0], normal[1], normal[2]};
-    fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, doubt, sight, irradiance, rays);
+    fct_lamps_direct(s->lamps, s->scene, p, n, offset, seed, rays_each, goal, sight, irradiance, rays);
 }
 
 fct_shading fct_solution_shading(const fct_solution *s, uint32_t instance, bool back) {

@@ -31,10 +31,10 @@ typedef struct fct_solution {
 /* Rays per lamp: `least` at the default error and above, more for smaller errors, at most 64. */
 uint32_t fct_solution_lamp_rays(const fct_solution *s, uint32_t least);
 
-/* Direct irradiance (RGB) at a point with a unit normal; 0 for def.indirect_only. doubt, *sight (may be
- * NULL): as in fct_lamps_direct. *rays grows. */
+/* Direct irradiance (RGB) at a point with a unit normal; 0 for def.indirect_only. goal, sight (may be NULL):
+ * as in fct_lamps_direct. *rays grows. */
 void fct_solution_direct(const fct_solution *s, const float point[3], const float normal[3], float offset,
-                         uint64_t seed, uint32_t rays_each, uint32_t doubt, fct_sight *sight,
+                         uint64_t seed, uint32_t rays_each, const fct_lamp_goal *goal, fct_sight *sight,
                          double irradiance[3], uint64_t *rays);
 
 /* The shading of an instance by the rule of the def. */

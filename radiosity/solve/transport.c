@@ -78,7 +78,7 @@ static void sample_direct(const gathering *g, uint32_t id, uint64_t fresh, doubl
         double x[3], n[3];
         for (int c = 0; c < 3; ++c) x[c] = p.position[c], n[c] = p.normal[c];
         fct_lamps_direct(g->lamps, g->set->scene, x, n, p.offset, fct_hash3(g->seed + fresh, id, (uint64_t)k),
-                         DIRECT_RAYS | FCT_LAMPS_FIXED, 0, NULL, irradiance[k], rays);
+                         DIRECT_RAYS | FCT_LAMPS_FIXED, NULL, NULL, irradiance[k], rays);
     }
 }
 

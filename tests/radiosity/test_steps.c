@@ -129,6 +129,9 @@ typedef struct side {
     uint8_t *covered, *made; /* made: by a cut */
     uint32_t *doubt;         /* per vertex: lamps of which it and its neighbours see different parts */
     fct_sight *sights;       /* per vertex */
+    uint64_t *crossed;       /* edges that the current cut has looked at, as pairs */
+    size_t crossed_count;
+    double usual_area; /* mean over the vertices before any cut */
     uint32_t known, cut,
         lit; /* lower vertices have these; are older than the cuts before covers; have light */
     uint64_t rays;
@@ -199,25 +202,48 @@ static void cover_by_steps(side *x) {
     }
 }
 
-/* Halves the edge until the border of the cover is known to a 256th of it. */
+/* Above the edge: the share of the way to the first surface, or 2. */
+static double meet_wall(side *x, v3 p, v3 q, v3 normal, v3 end_normal, float offset) {
+    const v3 from = v3_mad(p, offset, normal);
+    fct_ray ray = {.t_max = 1};
+    fct_scene_hit hit;
+    v3_store(ray.origin, from), v3_store(ray.direction, v3_sub(v3_mad(q, offset, end_normal), from));
+    ++x->rays;
+    return fct_scene_closest_hit(x->s->scene, &ray, &hit, NULL) ? hit.t : 2;
+}
+
+/* Looks behind and before the first surface, and then halves the edge until the border of the cover is known
+ * to a 256th of it. The rays of an edge count once, for its first face. */
 static double find_border(void *user, uint32_t a, uint32_t b) {
     side *x = user;
     const uint32_t from = x->covered[a] ? b : a, to = x->covered[a] ? a : b;
     if (x->covered[a] == x->covered[b] || x->made[to] || (a < x->lit && b < x->lit)) return 0;
+    const uint64_t rays = x->rays, edge = (uint64_t)a << 32 | b;
+    bool again = false;
+    for (size_t i = 0; i < x->crossed_count && !again; ++i) again = x->crossed[i] == edge;
+    if (!again) {
+        x->crossed = realloc(x->crossed, 8 * (x->crossed_count + 1));
+        x->crossed[x->crossed_count++] = edge;
+    }
     const float *p = x->f.mesh.positions + 3 * (size_t)from, *q = x->f.mesh.positions + 3 * (size_t)to;
+    const float offset = fmaxf(x->f.offsets[a], x->f.offsets[b]);
+    const double wall =
+        meet_wall(x, v3_load(p), v3_load(q), find_normal(x, from), find_normal(x, to), offset);
     double low = 0, high = 1;
-    while (high - low > 1 / 256.) {
-        double w = (low + high) / 2;
+    for (int k = 0; high - low > 1 / 256.; ++k) {
+        double w = wall + (k == 0 ? .4 : -.4) / 256;
+        if (k > 1 || w <= low || w >= high) w = (low + high) / 2;
         float point[3], n[3];
         v3_store(n, v3_unit(v3_add(v3_scale(find_normal(x, from), 1 - w), v3_scale(find_normal(x, to), w))));
         v3_store(point, v3_add(v3_load(p), v3_scale(v3_sub(v3_load(q), v3_load(p)), w)));
-        bool hidden = fct_point_is_covered(x->s->scene, point, n, fmaxf(x->f.offsets[a], x->f.offsets[b]),
+        bool hidden = fct_point_is_covered(x->s->scene, point, n, offset,
                                            fct_hash3(x->s->def.seed + 4, x->instance, from), NULL, &x->rays);
         if (hidden)
             high = w;
         else
             low = w;
     }
+    if (again) x->rays = rays;
     if (low < 1 / 256.) return 0;
     return from == a ? low : 1 - low;
 }
@@ -230,24 +256,30 @@ static double pass_border(void *user, uint32_t a, uint32_t b) {
 }
 
 static void cut_by_steps(side *x) {
-    x->cut = x->known;
+    x->cut = x->known, x->crossed_count = 0;
     assert_int_equal(fct_surface_refine(&plain, &x->f, find_border, x, NULL), FCT_OK);
     grow_side(x, false, true);
     assert_int_equal(fct_surface_refine(&plain, &x->f, pass_border, x, NULL), FCT_OK);
     grow_side(x, true, true);
 }
 
-/* Direct irradiance of a vertex from two rays per lamp or more; with lamps in doubt, more to these. */
+/* Direct irradiance of a vertex with known indirect light from two rays per lamp or more; with lamps in
+ * doubt, more to these. */
 static void light_directly(side *x, uint32_t v, uint32_t doubt, double e[3]) {
     const fct_solution *s = x->s;
     const float *point = x->f.sample_points + 3 * (size_t)v;
     const v3 n = find_normal(x, v);
     const double p[3] = {point[0], point[1], point[2]}, normal[3] = {n.x, n.y, n.z};
-    for (size_t c = 0; c < 3; ++c) e[c] = doubt ? x->direct[3 * (size_t)v + c] : 0;
+    /* Twice the error on a fourth of the usual area. */
+    fct_lamp_goal goal = {.slack = fmin(fmax(sqrt(x->usual_area / x->f.areas[v]), 1), 2), .doubt = doubt};
+    for (size_t c = 0; c < 3; ++c) {
+        e[c] = doubt ? x->direct[3 * (size_t)v + c] : 0;
+        goal.other += (double)x->indirect[3 * (size_t)v + c];
+    }
     if (s->def.indirect_only) return;
     fct_lamps_direct(s->lamps, s->scene, p, normal, x->f.offsets[v],
                      fct_hash3(s->def.seed + 1, x->instance, v), (uint32_t)fmin(fmax(2 * s->fineness, 2), 64),
-                     doubt, &x->sights[v], e, &x->rays);
+                     &goal, &x->sights[v], e, &x->rays);
 }
 
 /* Twice: a vertex takes more rays to the lamps that it has looked at with rays that agree, if those of a
@@ -298,12 +330,12 @@ static void light_by_steps(side *x, uint32_t first) {
             uint32_t leaf = find_leaf(x, x->f.places[v], v3_load(point));
             fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), indirect);
         } else if (lit) {
-            light_directly(x, v, 0, e);
             fct_anchors_irradiance(&x->anchors, &s->elements, point, normal, x->f.offsets[v], x->f.flat[v],
                                    indirect, &x->rays);
         }
-        for (size_t c = 0; c < 3; ++c)
-            x->direct[3 * (size_t)v + c] = (float)e[c], x->indirect[3 * (size_t)v + c] = (float)indirect[c];
+        for (size_t c = 0; c < 3; ++c) x->indirect[3 * (size_t)v + c] = (float)indirect[c];
+        if (s->def.final != FCT_FINAL_NONE && lit) light_directly(x, v, 0, e);
+        for (size_t c = 0; c < 3; ++c) x->direct[3 * (size_t)v + c] = (float)e[c];
     }
     settle_doubts(x);
     x->lit = x->known;
@@ -348,6 +380,8 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     side x = {.s = s, .instance = instance, .back = back};
     uint32_t added = 0;
     assert_int_equal(fct_surface_build(&plain, SHADE(s->scene, instance), s->max_edge, &x.f), FCT_OK);
+    for (uint32_t v = 0; v < x.f.mesh.vertex_count; ++v)
+        x.usual_area += (double)x.f.areas[v] / x.f.mesh.vertex_count;
     cover_by_steps(&x);
     cut_by_steps(&x);
     anchor_by_steps(&x);
@@ -369,7 +403,7 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
 
 static void release_side(side *x) {
     free(x->direct), free(x->indirect), free(x->nearest), free(x->covered), free(x->made), free(x->doubt);
-    free(x->sights);
+    free(x->sights), free(x->crossed);
     fct_surface_release(&plain, &x->f);
     fct_anchors_release(&plain, &x->anchors);
 }
@@ -523,7 +557,8 @@ static void bakes_equal_their_steps(void **state) {
                 const double p[3] = {site.point[0], site.point[1], site.point[2]}, m[3] = {n[0], n[1], n[2]};
                 if (!other.indirect_only)
                     fct_lamps_direct(s.lamps, scene, p, m, site.offset, seed,
-                                     (uint32_t)fmin(fmax(16 * s.fineness, 16), 64), 0, NULL, e, &probe_rays);
+                                     (uint32_t)fmin(fmax(16 * s.fineness, 16), 64), NULL, NULL, e,
+                                     &probe_rays);
                 fct_anchor a = {.offset = site.offset};
                 memcpy(a.position, site.point, 12), memcpy(a.normal, n, 12);
                 uint32_t count = (uint32_t)(1024 * fmax(s.fineness, 1));

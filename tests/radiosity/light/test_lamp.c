@@ -45,7 +45,7 @@ static double open_light(const fixture *f, v3 p, v3 n) {
 
 static double lit(const fixture *f, v3 p, v3 n, double offset, uint64_t seed, uint64_t *rays) {
     double point[3] = {p.x, p.y, p.z}, normal[3] = {n.x, n.y, n.z}, e[3];
-    fct_lamps_direct(f->lamps, f->scene, point, normal, offset, seed, 4, 0, NULL, e, rays);
+    fct_lamps_direct(f->lamps, f->scene, point, normal, offset, seed, 4, NULL, NULL, e, rays);
     assert_true(isfinite(e[0]) && e[0] >= 0);
     return e[0];
 }
@@ -119,7 +119,7 @@ static void disk_with_blocker(void **state) {
         for (uint64_t seed = 0; seed < 400; ++seed) {
             double point[3] = {0, 0, 0}, normal[3] = {0, 0, 1}, light[3], e;
             double fraction =
-                fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 16, 0, NULL, light, NULL);
+                fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 16, NULL, NULL, light, NULL);
             e = light[0];
             assert_near(fraction, e / .2, 1e-3);
             sum += e / 400, square += e * e / 400;
@@ -327,7 +327,7 @@ static void many_lamps_share_rays(void **state) {
     uint64_t rays = 0;
     for (uint64_t seed = 0; seed < 300; ++seed) {
         double e[3];
-        fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 16, 0, NULL, e, &rays);
+        fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, 16, NULL, NULL, e, &rays);
         for (int k = 0; k < 3; ++k) sum[k] += e[k] / 300;
     }
     assert_near(sum[0], expected[0], .02);
@@ -461,7 +461,7 @@ static void fractions_are_unbiased(void **state) {
         enum { N = 600 };
         for (uint64_t seed = 0; seed < N; ++seed) {
             double e[3];
-            sum += fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, 0,
+            sum += fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, NULL,
                                     NULL, e, &rays) /
                    N;
         }
@@ -486,8 +486,8 @@ static void points_below_the_horizon_lose_no_light(void **state) {
     for (uint32_t base = 1; base <= 4; base *= 2)
         for (uint64_t seed = 0; seed < 200; ++seed) {
             double e[3];
-            fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, 0, NULL, e,
-                             NULL);
+            fct_lamps_direct(f.lamps, f.scene, point, normal, 1e-5, seed, base | FCT_LAMPS_FIXED, NULL, NULL,
+                             e, NULL);
             assert_near(e[0], open, 1e-9);
         }
     end(&f);

@@ -106,16 +106,17 @@ typedef struct eye {
     const hall *h;
     v3 origin;
     uint64_t seed, rays;
+    double other, slack;     /* of the goal */
     uint32_t doubt, counted; /* rays to lamps outside these slots do not count */
     fct_sight sight;
 } eye;
 
-/* Rays for a standard error of 3.2 % / base of the light from a lamp of this share: .6 sqrt(f (1 - f)) /
- * n^(3/4) with one more ray that is half visible, in steps of 8 up to 64. */
-static uint32_t count_rays(uint32_t base, double visible, uint32_t sent, double share) {
+/* Rays for a standard error of 1.6 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
+ * f)) / n^(3/4) with one more ray that is half visible, in steps of 4 up to 64. */
+static uint32_t count_rays(const eye *q, uint32_t base, double visible, uint32_t sent, double share) {
     const double f = (visible * sent + .5) / (sent + 1), error = .6 * sqrt(f * (1 - f)) * share;
-    uint32_t n = 8;
-    while (n < 64 && error / pow(n, .75) > .032 / base) n += 8;
+    uint32_t n = 4;
+    while (n < 64 && error / pow(n, .75) > .016 / base * q->slack) n += 4;
     return n;
 }
 
@@ -140,7 +141,8 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
                        uint32_t base, bool fixed, double power, double total, double scale) {
     double all = 0, seen = 0;
     uint32_t sent = 0, goal = !fixed && power > .2 * total ? 2 * base : base;
-    const uint32_t slot = (uint32_t)(lamp - q->h->own) % 31, doubted = count_rays(base, .5, 1, power / scale);
+    const uint32_t slot = (uint32_t)(lamp - q->h->own) % 31,
+                   doubted = count_rays(q, base, .5, 1, power / scale);
     const uint32_t known = q->doubt >> slot & 1 ? goal : 0;
     if (q->doubt >> slot & 1 && goal < 32) goal = doubted > 32 ? 32 : doubted > goal ? doubted : goal;
     while (sent < goal) {
@@ -155,7 +157,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
             continue;
         }
         if (fixed || (all > 0 && (seen == 0 || seen == all))) break;
-        goal = count_rays(base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
+        goal = count_rays(q, base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
     }
     return all > 0 ? seen / all : 0;
 }
@@ -195,7 +197,7 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     static fct_cut cut;
     const hall *h = q->h;
     fct_receiver recs[64];
-    double shares[64], total = 0, open = 0, minor_sum = 0, light[3] = {0, 0, 0};
+    double shares[64], total = q->other, open = 0, minor_sum = 0, light[3] = {0, 0, 0};
     bool minor[64] = {false};
     e[0] = e[1] = e[2] = 0;
     for (uint32_t i = 0; i < h->count; ++i) {
@@ -217,13 +219,15 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     }
     if (light[0] + light[1] + light[2] > 0) {
         double all[3], seen[3];
-        /* Enough for an error of 3.2 % / base of the light if each ray has a standard error of 1/2; 4 to 16.
+        /* Enough for an error of 1.6 % / base * slack of the light if each ray has a standard error of 1/2; 4
+         * to 16.
          */
-        const double enough = fmin(fmax(pow(.5 * minor_sum / scale / .032 * base, 2), 4), 16);
+        const uint32_t enough =
+            (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .016 * base / q->slack, 2), 4), 16);
         const bool doubt = q->doubt >> 31 && base < enough && !fixed;
-        bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, doubt, all, seen);
+        bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, q->doubt >> 31, all, seen);
         if ((mixed || doubt || all[0] + all[1] + all[2] == 0) && base < enough && !fixed)
-            see_minor_lamps(q, recs, shares, minor, minor_sum, (uint32_t)enough, false, all, seen);
+            see_minor_lamps(q, recs, shares, minor, minor_sum, enough, false, all, seen);
         double grey = all[0] + all[1] + all[2];
         grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
         for (int c = 0; c < 3; ++c) e[c] += light[c] * (all[c] > 0 ? seen[c] / all[c] : grey);
@@ -248,19 +252,22 @@ static void halls_are_lit_by_the_rules(void **state) {
             double e[3], expected[3], open[3], expected_open[3];
             uint64_t rays = 3;
             fct_sight sight;
-            eye q = {.h = &h, .seed = i, .rays = 3, .counted = UINT32_MAX};
+            eye q = {.h = &h, .seed = i, .rays = 3, .slack = 1, .counted = UINT32_MAX};
+            if (i % 4) q.other = .1 * pick(seed, i, 47), q.slack = 1 + 3 * pick(seed, i, 48);
+            fct_lamp_goal goal = {.other = q.other, .slack = q.slack};
             q.origin = v3_mad(v3_make(point[0], point[1], point[2]), offset, n);
             double all = light_hall(&q, point, normal, base, fixed, expected);
             double fraction = fct_lamps_direct(h.lamps, h.scene, point, normal, offset, i,
-                                               base | (fixed ? FCT_LAMPS_FIXED : 0), 0, &sight, e, &rays);
+                                               base | (fixed ? FCT_LAMPS_FIXED : 0), i % 4 ? &goal : NULL,
+                                               &sight, e, &rays);
             /* Some of the lamps whose rays agree are in doubt: the light is that of a call that knew it. */
             const uint32_t agree = (sight.open | sight.blocked) & ~fct_sight_mixed(sight);
             const uint32_t doubt = i % 5 < 3 && !fixed ? agree & (uint32_t)fct_hash2(seed, i) : 0;
             if (doubt) {
                 ++doubts;
-                q.doubt = q.counted = doubt;
+                goal.doubt = q.doubt = q.counted = doubt;
                 all = light_hall(&q, point, normal, base, fixed, expected);
-                fraction = fct_lamps_direct(h.lamps, h.scene, point, normal, offset, i, base, doubt, &sight,
+                fraction = fct_lamps_direct(h.lamps, h.scene, point, normal, offset, i, base, &goal, &sight,
                                             e, &rays);
             }
             assert_int_equal(rays, q.rays);
@@ -269,6 +276,7 @@ static void halls_are_lit_by_the_rules(void **state) {
             for (int c = 0; c < 3; ++c) assert_near(e[c], expected[c], 1e-9 + 1e-6 * expected[c]);
             assert_near(fraction, all > 0 ? (e[0] + e[1] + e[2]) / all : 0, 1e-6);
             fct_lamps_unoccluded(h.lamps, point, normal, open);
+            q.other = 0;
             light_hall(&q, point, normal, 0, false, expected_open);
             for (int c = 0; c < 3; ++c)
                 assert_near(open[c], expected_open[c], 1e-9 + 1e-6 * expected_open[c]);
@@ -299,7 +307,7 @@ static void rays_end_before_the_lamp(void **state) {
         assert_int_equal(fct_scene_commit(scene), FCT_OK);
         assert_int_equal(fct_lamps_create(&plain, scene, &lamps), FCT_OK);
         const double point[3] = {0, 0, 0}, normal[3] = {0, 0, 1};
-        double e[3], fraction = fct_lamps_direct(lamps, scene, point, normal, 0, 1, 4, 0, NULL, e, NULL);
+        double e[3], fraction = fct_lamps_direct(lamps, scene, point, normal, 0, 1, 4, NULL, NULL, e, NULL);
         assert_near(fraction, k < 2 ? 1 : 0, 0);
         fct_lamps_destroy(lamps);
         fct_scene_destroy(scene);

@@ -114,7 +114,7 @@ static void light_point(const fct_elements *set, const fct_lamps *lamps, uint64_
     const double x[3] = {p->position[0], p->position[1], p->position[2]},
                  n[3] = {p->normal[0], p->normal[1], p->normal[2]};
     fct_lamps_direct(lamps, set->scene, x, n, p->offset, fct_hash3(seed + fresh, id, k), 2 | FCT_LAMPS_FIXED,
-                     0, NULL, e, rays);
+                     NULL, NULL, e, rays);
 }
 
 /* sum over channels of rho (max E - min E) A, 16 times that where a point is dark and another is not. */
