@@ -17,8 +17,6 @@
 #include "bvh/pair/leaves.h"
 
 #define APART_ERROR 0x1p-20
-/* Floats below would vanish in products. */
-#define LEAST_LENGTH2 1e-30f
 
 #define W3_LANES f8
 #include "base/math/w3.h"
@@ -32,7 +30,7 @@ typedef struct lane_triangles {
 static inline void find_edges(lane_triangles *t) {
     for (int i = 0; i < 3; ++i) {
         t->edge[i] = w3_sub(t->p[(i + 1) % 3], t->p[i]);
-        t->edge2[i] = f8_max(w3_dot(t->edge[i], t->edge[i]), f8_set(LEAST_LENGTH2));
+        t->edge2[i] = w3_dot(t->edge[i], t->edge[i]);
         t->over_edge2[i] = f8_div(f8_set(1), t->edge2[i]);
     }
 }
@@ -63,6 +61,7 @@ static inline lane_triangles gather_triangles(const leaf_corners *corners, const
     return t;
 }
 
+/* 1 for the NaN of edges and faces without extent. */
 static inline f8 clamp_to_unit(f8 x) {
     return f8_max(f8_min(x, f8_set(1)), f8_set(0));
 }
@@ -97,7 +96,7 @@ static inline void try_edges(const lane_triangles *a, int i, const lane_triangle
 static inline void try_face(const lane_triangles *face, const lane_triangles *from, float sign,
                             lane_gaps *gaps) {
     w3 e = face->edge[0], f = w3_sub(face->p[2], face->p[0]), n = w3_cross(e, f);
-    f8 over_n2 = f8_div(f8_set(1), f8_max(w3_dot(n, n), f8_set(LEAST_LENGTH2)));
+    f8 over_n2 = f8_div(f8_set(1), w3_dot(n, n));
     w3 along_u = w3_scale(w3_cross(f, n), over_n2), along_v = w3_scale(w3_cross(n, e), over_n2);
     for (int c = 0; c < 3; ++c) {
         w3 r = w3_sub(face->p[0], from->p[c]);

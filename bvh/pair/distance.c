@@ -21,6 +21,7 @@
 #include "bvh/pair/boxes.h"
 #include "bvh/pair/far.h"
 #include "bvh/pair/leaves.h"
+#include "bvh/pair/place.h"
 #include "bvh/pair/triangles.h"
 
 /* Beyond this distance of the centres (sum of coordinates, scaled), double arithmetic bounds the distance. */
@@ -49,7 +50,6 @@ typedef struct distance_search {
     double reach;      /* a pair must have a lower bound of at most this, scaled */
     float limit2;      /* its square, rounded up */
     bool done;         /* the rest cannot matter */
-    float ratio2;      /* squared lengths in b's unit, times this, are in a's unit */
     double to_limit_b; /* squared distances in b's unit, times this, are lower bounds in a's unit */
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
     uint32_t waiting;
@@ -204,16 +204,11 @@ static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     if (l.listed && !s->done) measure_listed(s, &l);
 }
 
-static bool is_leaf(const fct_bvh *bvh, uint32_t box) {
-    return fct_box_child(bvh, box) & FCT_REF_LEAF;
-}
-
 /* Opens the node of the larger box. Writes its near boxes with the other box; the last one seems to be the
  * nearest. Returns their number. */
 static uint32_t open_node(distance_search *s, near_boxes pair, near_boxes out[8]) {
     const fct_bvh *a = s->map->a, *b = s->map->b;
-    bool opens_a = is_leaf(b, pair.b) ||
-                   (!is_leaf(a, pair.a) && fct_box_size2(a, pair.a) >= s->ratio2 * fct_box_size2(b, pair.b));
+    bool opens_a = fct_opens_a(s->map, pair.a, pair.b);
     const fct_bvh *own = opens_a ? a : b, *other = opens_a ? b : a;
     const fct_space_map *space = opens_a ? &s->map->to_a : &s->map->to_b;
     uint32_t number = fct_box_child(own, opens_a ? pair.a : pair.b), met = 0xff, count = 0, nearest = 0;
@@ -221,7 +216,7 @@ static uint32_t open_node(distance_search *s, near_boxes pair, near_boxes out[8]
     fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     double bound2[8], reach2 = s->reach * s->reach, to_a = opens_a ? 1 : s->to_limit_b;
     float near2[8], guess[8];
-    fct_place_box(space, other, opens_a ? pair.b : pair.a, box);
+    place_box(space, other, opens_a ? pair.b : pair.a, box);
     double far = fabs(box->exact_center[0]) + fabs(box->exact_center[1]) + fabs(box->exact_center[2]);
     if (far > FAR_CENTER) {
         fct_bound_far_boxes(box, node, space, bound2);
@@ -253,7 +248,7 @@ static void search_below(distance_search *s, near_boxes from) {
     while (height && !s->done) {
         near_boxes pair = stack[--height];
         if (pair.bound2 > s->reach * s->reach) continue;
-        if (is_leaf(s->map->a, pair.a) && is_leaf(s->map->b, pair.b))
+        if (fct_box_is_leaf(s->map->a, pair.a) && fct_box_is_leaf(s->map->b, pair.b))
             search_leaves(s, pair.a, pair.b);
         else
             height += open_node(s, pair, stack + height);
@@ -274,7 +269,7 @@ static void swap_boxes(void *queue, size_t i, size_t j) {
  * others wait in the queue. */
 static void dive(distance_search *s, near_boxes pair) {
     near_boxes below[8];
-    while (!is_leaf(s->map->a, pair.a) || !is_leaf(s->map->b, pair.b)) {
+    while (!fct_box_is_leaf(s->map->a, pair.a) || !fct_box_is_leaf(s->map->b, pair.b)) {
         if (s->queued + 7 > QUEUE) {
             search_below(s, pair);
             return;
@@ -306,7 +301,6 @@ void fct_distance_search(const fct_pair_map *map, double relative, double absolu
     distance_search s; /* not cleared, because of its size */
     s.map = map, s.relative = relative, s.absolute = absolute, s.enough = enough, s.best = *best;
     s.waiting = s.queued = 0, s.visits = (fct_visits){0, 0, 0};
-    s.ratio2 = (float)(map->to_a.factor * map->to_a.factor);
     double shrink2 = 1 - map->to_a.skew;
     s.to_limit_b = shrink2 > 0 ? map->to_a.factor * map->to_a.factor * shrink2 * (1 - 0x1p-40) : 0;
     s.placed_a.box = s.placed_b.box = FCT_NONE;
