@@ -48,6 +48,12 @@ static inline void store_corners(const fct_leaf *leaf, const placed_leaf *placed
     }
 }
 
+static inline void load_corners(const leaf_corners *corners, uint32_t first, w3 p[3]) {
+    for (int c = 0; c < 3; ++c)
+        p[c] = (w3){f8_load(corners->p[c][0] + first), f8_load(corners->p[c][1] + first),
+                    f8_load(corners->p[c][2] + first)};
+}
+
 static inline lane_triangles gather_triangles(const leaf_corners *corners, const uint32_t list[8]) {
     lane_triangles t;
     i8 index = i8_load(list);
@@ -108,15 +114,17 @@ static inline void try_face(const lane_triangles *face, const lane_triangles *fr
     }
 }
 
-static inline f8 least_along(const lane_triangles *t, w3 d) {
-    return f8_min(w3_dot(t->p[0], d), f8_min(w3_dot(t->p[1], d), w3_dot(t->p[2], d)));
+/* The least and the most of d over the corners of a triangle. */
+static inline f8 least_along(const w3 p[3], w3 d) {
+    return f8_min(w3_dot(p[0], d), f8_min(w3_dot(p[1], d), w3_dot(p[2], d)));
 }
-static inline f8 most_along(const lane_triangles *t, w3 d) {
-    return f8_max(w3_dot(t->p[0], d), f8_max(w3_dot(t->p[1], d), w3_dot(t->p[2], d)));
+static inline f8 most_along(const w3 p[3], w3 d) {
+    return f8_max(w3_dot(p[0], d), f8_max(w3_dot(p[1], d), w3_dot(p[2], d)));
 }
 
-/* Bounds of the distance of each pair. Of triangles that meet, *lower is at most 0. */
-static inline void bound_distances(const lane_triangles *a, const lane_triangles *b, f8 *lower, f8 *upper) {
+/* Bounds of the distance of each pair. Of triangles that meet, *lower is at most 0. Returns the differences
+ * whose lengths are the upper bounds. */
+static inline w3 bound_distances(const lane_triangles *a, const lane_triangles *b, f8 *lower, f8 *upper) {
     f8 zero = f8_set(0);
     lane_gaps gaps = {{zero, zero, zero}, f8_set(INFINITY)};
     for (int i = 0; i < 3; ++i)
@@ -124,8 +132,9 @@ static inline void bound_distances(const lane_triangles *a, const lane_triangles
     try_face(a, b, 1, &gaps);
     try_face(b, a, -1, &gaps);
     *upper = f8_sqrt(gaps.d2);
-    f8 along = f8_sub(least_along(a, gaps.d), most_along(b, gaps.d));
+    f8 along = f8_sub(least_along(a->p, gaps.d), most_along(b->p, gaps.d));
     *lower = f8_div(along, f8_max(*upper, f8_set(1e-18f)));
+    return gaps.d;
 }
 
 #endif

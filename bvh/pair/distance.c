@@ -3,7 +3,8 @@
  * The search goes on with the pair of boxes with the least lower bound, and ends when this bound exceeds the
  * best distance so far. From each pair it dives to a pair of leaves, so that a near pair of faces is known
  * early. Bounds are squared, in the scaled unit of a. A pair of leaves compares the boxes of single triangles
- * in the coordinates of one leaf, and bounds the distances of the near ones in float. Only pairs whose bounds
+ * in the coordinates of one leaf, and bounds the distances of the near ones in float. Most are excluded by
+ * the direction between the nearest triangles so far, which separates others too. Only pairs whose bounds
  * leave a doubt are measured in double.
  *
  * The queue holds QUEUE pairs. If it is full, a pair is searched depth first.
@@ -52,6 +53,7 @@ typedef struct distance_search {
     bool done;         /* the rest cannot matter */
     double to_limit_b; /* squared distances in b's unit, times this, are lower bounds in a's unit */
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
+    float way[3];                      /* from a to b between the nearest triangles so far, see set_way */
     uint32_t waiting;
     candidate candidates[CANDIDATES];
     uint32_t queued;
@@ -121,22 +123,58 @@ typedef struct leaf_pair {
     uint32_t listed, list_a[16], list_b[16];
 } leaf_pair;
 
+/* The way from a to b along -d[.][lane], in the coordinates of model a, at most of length 1. */
+static void set_way(distance_search *s, const fct_leaf_maps *maps, w3 d, uint32_t lane) {
+    float rows[3][8], length2 = 0;
+    f8_store(rows[0], d.x), f8_store(rows[1], d.y), f8_store(rows[2], d.z);
+    for (int k = 0; k < 3; ++k) {
+        s->way[k] = 0;
+        for (int r = 0; r < 3; ++r) s->way[k] -= maps->of_a.turn[r][k] * rows[r][lane];
+        length2 += s->way[k] * s->way[k];
+    }
+    float scale = length2 > 1e-30f ? (1 - 0x1p-20f) / sqrtf(length2) : 0;
+    for (int k = 0; k < 3; ++k) s->way[k] *= scale;
+}
+
 /* Bounds the distances of the first eight pairs of the lists, and removes them. */
 static void measure_listed(distance_search *s, leaf_pair *l) {
-    uint32_t used = l->listed < 8 ? l->listed : 8;
+    uint32_t used = l->listed < 8 ? l->listed : 8, nearest = 0;
     for (uint32_t i = used; i < 8; ++i) l->list_a[i] = l->list_b[i] = 0;
     lane_triangles a = gather_triangles(&l->corners_a, l->list_a),
                    b = gather_triangles(&l->corners_b, l->list_b);
     f8 lower_lanes, upper_lanes;
     float lower[8], upper[8];
-    bound_distances(&a, &b, &lower_lanes, &upper_lanes);
+    w3 d = bound_distances(&a, &b, &lower_lanes, &upper_lanes);
     f8_store(lower, lower_lanes), f8_store(upper, upper_lanes);
     double error = APART_ERROR * (double)l->maps.size + 2 * (double)l->maps.slack;
+    for (uint32_t i = 1; i < used; ++i)
+        if (upper[i] < upper[nearest]) nearest = i;
+    if ((double)upper[nearest] + error < s->upper) set_way(s, &l->maps, d, nearest);
     for (uint32_t i = 0; i < used && !s->done; ++i)
         add_candidate(s, fct_max((double)lower[i] - error, 0), (double)upper[i] + error,
                       l->a->first + l->list_a[i], l->b->first + l->list_b[i]);
     l->listed -= used;
     for (uint32_t i = 0; i < l->listed; ++i) l->list_a[i] = l->list_a[i + 8], l->list_b[i] = l->list_b[i + 8];
+}
+
+/* How far the triangles reach along the way: those of a up to top, those of b down to bottom. Rounding
+ * included. */
+static void extend_along_way(const distance_search *s, const leaf_pair *l, float top[16], float bottom[16]) {
+    const float *way = s->way;
+    f8 along[3], slack = f8_set(2 * l->maps.slack);
+    w3 p[3];
+    for (int r = 0; r < 3; ++r) {
+        const float *turn = l->maps.of_a.turn[r];
+        along[r] = f8_set(turn[0] * way[0] + turn[1] * way[1] + turn[2] * way[2]);
+    }
+    for (uint32_t first = 0; first < l->a->count; first += 8) {
+        load_corners(&l->corners_a, first, p);
+        f8_store(top + first, f8_add(most_along(p, w3_load(along)), slack));
+    }
+    for (uint32_t first = 0; first < l->b->count; first += 8) {
+        load_corners(&l->corners_b, first, p);
+        f8_store(bottom + first, f8_sub(least_along(p, w3_load(along)), slack));
+    }
 }
 
 /* Leaves that are far apart. The pair with the least bound comes first. */
@@ -173,6 +211,7 @@ static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     const fct_pair_map *map = s->map;
     triangle_boxes boxes_a, boxes_b;
     leaf_pair l;
+    float top[16], bottom[16];
     l.a = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a));
     l.b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
     l.listed = 0;
@@ -189,13 +228,15 @@ static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     placed = place_leaf(l.a, &l.maps.of_a);
     find_triangle_boxes(l.a, &placed, &boxes_a);
     store_corners(l.a, &placed, &l.corners_a);
+    extend_along_way(s, &l, top, bottom);
     for (; open_b && !s->done; open_b &= open_b - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(open_b);
-        float low[3], high[3];
+        float low[3], high[3], least_top = bottom[i] - (float)(s->reach * (1 + 0x1p-20));
         for (int k = 0; k < 3; ++k) low[k] = boxes_b.low[k][i], high[k] = boxes_b.high[k][i];
         for (uint32_t first = 0; first < l.a->count; first += 8) {
             uint32_t left = l.a->count - first, open_a = left < 8 ? (1u << left) - 1 : 0xffu;
             open_a &= f8_le(bound_triangles(&boxes_a, first, low, high, l.maps.slack), f8_set(s->limit2));
+            open_a &= f8_le(f8_set(least_top), f8_load(top + first));
             for (; open_a; open_a &= open_a - 1, ++l.listed)
                 l.list_a[l.listed] = first + (uint32_t)__builtin_ctz(open_a), l.list_b[l.listed] = i;
             if (l.listed >= 8) measure_listed(s, &l);
@@ -303,6 +344,7 @@ void fct_distance_search(const fct_pair_map *map, double relative, double absolu
     s.waiting = s.queued = 0, s.visits = (fct_visits){0, 0, 0};
     double shrink2 = 1 - map->to_a.skew;
     s.to_limit_b = shrink2 > 0 ? map->to_a.factor * map->to_a.factor * shrink2 * (1 - 0x1p-40) : 0;
+    s.way[0] = s.way[1] = s.way[2] = 0;
     s.placed_a.box = s.placed_b.box = FCT_NONE;
     s.maximum = sqrt(best->distance2) * map->a->scale;
     s.upper = best->place_a != FCT_NONE ? s.maximum : INFINITY;
