@@ -231,7 +231,7 @@ static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     extend_along_way(s, &l, top, bottom);
     for (; open_b && !s->done; open_b &= open_b - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(open_b);
-        float low[3], high[3], least_top = bottom[i] - (float)(s->reach * (1 + 0x1p-20));
+        float low[3], high[3], least_top = bottom[i] - (float)fct_min(s->reach * (1 + 0x1p-20), 1e30);
         for (int k = 0; k < 3; ++k) low[k] = boxes_b.low[k][i], high[k] = boxes_b.high[k][i];
         for (uint32_t first = 0; first < l.a->count; first += 8) {
             uint32_t left = l.a->count - first, open_a = left < 8 ? (1u << left) - 1 : 0xffu;
