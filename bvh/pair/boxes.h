@@ -86,9 +86,12 @@ static inline uint32_t meet_boxes(const fct_placed_box *b, const fct_pair_node *
 }
 
 /* A mask of the boxes of the node that may lie within sqrt(limit2) of box b. distance2[i]: a lower bound of
- * the squared distance. In the coordinates of one box, the gaps along its three axes are at right angles. */
+ * the squared distance. In the coordinates of one box, the gaps along its three axes are at right angles.
+ * guess[i]: an estimate of the distance, to sort boxes with the bound 0: the distance of the centres less
+ * half the radius of the box of the node. (Without the radius, and with all of it, a search visits 9 % more.)
+ */
 static inline uint32_t bound_boxes(const fct_placed_box *b, const fct_pair_node *n, float limit2,
-                                   float distance2[8]) {
+                                   float distance2[8], float guess[8]) {
     box_terms t;
     find_box_terms(b, n, &t);
     f8 slack = f8_set(b->slack), zero = f8_set(0), sum_a = zero, sum_b = zero;
@@ -101,6 +104,9 @@ static inline uint32_t bound_boxes(const fct_placed_box *b, const fct_pair_node 
     /* The sum of three squares rounds by less than 8 u. */
     f8 bound = f8_mul(f8_max(sum_a, sum_b), f8_set(1 - 0x1p-20f));
     f8_store(distance2, bound);
+    f8 h0 = f8_load(n->half[0]), h1 = f8_load(n->half[1]), h2 = f8_load(n->half[2]);
+    f8 away = f8_sqrt(dot3(t.d[0], t.d[1], t.d[2], t.d[0], t.d[1], t.d[2]));
+    f8_store(guess, f8_sub(away, f8_mul(f8_set(.5f), f8_sqrt(dot3(h0, h1, h2, h0, h1, h2)))));
     return f8_le(bound, f8_set(limit2));
 }
 

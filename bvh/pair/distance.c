@@ -1,9 +1,13 @@
 /* bvh/pair/distance.c: the nearest faces of two models. A kernel file.
  *
- * The search goes down both trees depth first, pairs of near boxes first, and leaves out pairs whose lower
- * bound exceeds the best distance so far. Bounds are squared, in the scaled unit of a. A pair of leaves
- * compares the boxes of single triangles in the coordinates of one leaf, then measures each pair that is left
- * in double.
+ * The search goes on with the pair of boxes with the least lower bound, and ends when this bound exceeds the
+ * best distance so far. From each pair it dives to a pair of leaves, so that a near pair of faces is known
+ * early. Bounds are squared, in the scaled unit of a. A pair of leaves compares the boxes of single triangles
+ * in the coordinates of one leaf, and bounds the distances of the near ones in float. Most are excluded by
+ * the direction between the nearest triangles so far, which separates others too. Only pairs whose bounds
+ * leave a doubt are measured in double.
+ *
+ * The queue holds QUEUE pairs. If it is full, a pair is searched depth first.
  *
  * Models that are far apart beside their size need more digits than a float has. There, the bound is the
  * separation along the line between the centres, in double.
@@ -13,22 +17,30 @@
 #include <float.h>
 
 #include "base/math/simd.h"
+#include "base/sift.h"
 #include "bvh/pair/apart.h"
 #include "bvh/pair/boxes.h"
 #include "bvh/pair/far.h"
 #include "bvh/pair/leaves.h"
+#include "bvh/pair/place.h"
 #include "bvh/pair/triangles.h"
 
 /* Beyond this distance of the centres (sum of coordinates, scaled), double arithmetic bounds the distance. */
 #define FAR_CENTER 16.0
 
-/* A pair of faces that is at least `distance` apart, scaled. */
+/* A pair of faces that is at least `lower` apart, scaled. */
 typedef struct candidate {
-    float distance;
+    double lower;
     uint32_t place_a, place_b;
 } candidate;
 
-enum { CANDIDATES = 64 };
+/* A pair of boxes, and a lower bound of their squared distance in the scaled unit of a. */
+typedef struct near_boxes {
+    uint32_t a, b;
+    double bound2;
+} near_boxes;
+
+enum { CANDIDATES = 64, QUEUE = 512 };
 
 typedef struct distance_search {
     const fct_pair_map *map;
@@ -41,8 +53,11 @@ typedef struct distance_search {
     bool done;         /* the rest cannot matter */
     double to_limit_b; /* squared distances in b's unit, times this, are lower bounds in a's unit */
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
+    float way[3];                      /* from a to b between the nearest triangles so far, see set_way */
     uint32_t waiting;
     candidate candidates[CANDIDATES];
+    uint32_t queued;
+    near_boxes queue[QUEUE]; /* a heap, the least bound on top */
     fct_visits visits;
 } distance_search;
 
@@ -78,59 +93,87 @@ static void settle_candidates(distance_search *s) {
     for (uint32_t i = 0; i < s->waiting && !is_enough(s); ++i) {
         uint32_t nearest = i;
         for (uint32_t j = i + 1; j < s->waiting; ++j)
-            if (s->candidates[j].distance < s->candidates[nearest].distance) nearest = j;
+            if (s->candidates[j].lower < s->candidates[nearest].lower) nearest = j;
         candidate c = s->candidates[nearest];
         s->candidates[nearest] = s->candidates[i];
-        if ((double)c.distance > fct_min(s->upper, s->maximum)) break;
+        if (c.lower > fct_min(s->upper, s->maximum)) break;
         measure_pair(s, c.place_a, c.place_b);
     }
     s->waiting = 0;
 }
 
-/* A pair at `distance`, which may err by `error`. */
-static void add_candidate(distance_search *s, float distance, float error, uint32_t place_a,
+/* A pair whose distance lies between the bounds, scaled. */
+static void add_candidate(distance_search *s, double lower, double upper, uint32_t place_a,
                           uint32_t place_b) {
-    if ((double)distance - (double)error > s->reach) return;
-    s->candidates[s->waiting++] = (candidate){distance - error, place_a, place_b};
-    double upper = (double)distance + (double)error;
-    s->upper = fct_min(upper, s->upper);
-    set_limit(s);
-    if (s->waiting == CANDIDATES || (double)(distance - error) <= s->enough * s->map->a->scale)
-        settle_candidates(s);
+    if (lower > s->reach) return;
+    s->candidates[s->waiting++] = (candidate){lower, place_a, place_b};
+    if (upper < s->upper) {
+        s->upper = upper;
+        set_limit(s);
+    }
+    if (s->waiting == CANDIDATES || lower <= s->enough * s->map->a->scale) settle_candidates(s);
 }
 
-/* A leaf of a in the coordinates of its box. */
-typedef struct measured_leaf {
-    const fct_leaf *leaf;
-    placed_leaf placed;
-    triangle_boxes boxes;
-} measured_leaf;
+/* Two leaves in the coordinates of a's box. The lists hold pairs of triangles that may be near enough; eight
+ * of them fill the lanes. */
+typedef struct leaf_pair {
+    const fct_leaf *a, *b;
+    fct_leaf_maps maps;
+    leaf_corners corners_a, corners_b;
+    uint32_t listed, list_a[16], list_b[16];
+} leaf_pair;
 
-/* A face of b there. */
-typedef struct measured_face {
-    lane_triangles lanes;
-    float low[3], high[3]; /* its box */
-    uint32_t place;
-} measured_face;
+/* The way from a to b along -d[.][lane], in the coordinates of model a, at most of length 1. */
+static void set_way(distance_search *s, const fct_leaf_maps *maps, w3 d, uint32_t lane) {
+    float rows[3][8], length2 = 0;
+    f8_store(rows[0], d.x), f8_store(rows[1], d.y), f8_store(rows[2], d.z);
+    for (int k = 0; k < 3; ++k) {
+        s->way[k] = 0;
+        for (int r = 0; r < 3; ++r) s->way[k] -= maps->of_a.turn[r][k] * rows[r][lane];
+        length2 += s->way[k] * s->way[k];
+    }
+    float scale = length2 > 1e-30f ? (1 - 0x1p-20f) / sqrtf(length2) : 0;
+    for (int k = 0; k < 3; ++k) s->way[k] *= scale;
+}
 
-/* The pairs of a face of b and triangles [first, first + 8) of a that may be near enough. */
-static void measure_octet(distance_search *s, const measured_leaf *a, uint32_t first, const measured_face *b,
-                          const fct_leaf_maps *maps) {
-    uint32_t left = a->leaf->count - first, used = left < 8 ? (1u << left) - 1 : 0xffu;
-    f8 bound = bound_triangles(&a->boxes, first, b->low, b->high, maps->slack);
-    uint32_t open = f8_le(bound, f8_set(s->limit2)) & used;
-    if (!open) return;
-    eight_triangles eight = pick_triangles(a->leaf, &a->placed, first / 8);
-    float distance[8];
-    f8_store(distance, f8_sqrt(f8_max(find_distances2(&eight, &b->lanes), bound)));
-    /* Triangles that meet may be far apart along their edges, but their boxes meet too. */
-    uint32_t touching = f8_le(bound, f8_set(0));
-    for (; open && !s->done; open &= open - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(open), place_a = a->leaf->first + first + i;
-        if (touching >> i & 1)
-            measure_pair(s, place_a, b->place);
-        else
-            add_candidate(s, distance[i], DISTANCE_ERROR * maps->size + maps->slack, place_a, b->place);
+/* Bounds the distances of the first eight pairs of the lists, and removes them. */
+static void measure_listed(distance_search *s, leaf_pair *l) {
+    uint32_t used = l->listed < 8 ? l->listed : 8, nearest = 0;
+    for (uint32_t i = used; i < 8; ++i) l->list_a[i] = l->list_b[i] = 0;
+    lane_triangles a = gather_triangles(&l->corners_a, l->list_a),
+                   b = gather_triangles(&l->corners_b, l->list_b);
+    f8 lower_lanes, upper_lanes;
+    float lower[8], upper[8];
+    w3 d = bound_distances(&a, &b, &lower_lanes, &upper_lanes);
+    f8_store(lower, lower_lanes), f8_store(upper, upper_lanes);
+    double error = APART_ERROR * (double)l->maps.size + 2 * (double)l->maps.slack;
+    for (uint32_t i = 1; i < used; ++i)
+        if (upper[i] < upper[nearest]) nearest = i;
+    if ((double)upper[nearest] + error < s->upper) set_way(s, &l->maps, d, nearest);
+    for (uint32_t i = 0; i < used && !s->done; ++i)
+        add_candidate(s, fct_max((double)lower[i] - error, 0), (double)upper[i] + error,
+                      l->a->first + l->list_a[i], l->b->first + l->list_b[i]);
+    l->listed -= used;
+    for (uint32_t i = 0; i < l->listed; ++i) l->list_a[i] = l->list_a[i + 8], l->list_b[i] = l->list_b[i + 8];
+}
+
+/* How far the triangles reach along the way: those of a up to top, those of b down to bottom. Rounding
+ * included. */
+static void extend_along_way(const distance_search *s, const leaf_pair *l, float top[16], float bottom[16]) {
+    const float *way = s->way;
+    f8 along[3], slack = f8_set(2 * l->maps.slack);
+    w3 p[3];
+    for (int r = 0; r < 3; ++r) {
+        const float *turn = l->maps.of_a.turn[r];
+        along[r] = f8_set(turn[0] * way[0] + turn[1] * way[1] + turn[2] * way[2]);
+    }
+    for (uint32_t first = 0; first < l->a->count; first += 8) {
+        load_corners(&l->corners_a, first, p);
+        f8_store(top + first, f8_add(most_along(p, w3_load(along)), slack));
+    }
+    for (uint32_t first = 0; first < l->b->count; first += 8) {
+        load_corners(&l->corners_b, first, p);
+        f8_store(bottom + first, f8_sub(least_along(p, w3_load(along)), slack));
     }
 }
 
@@ -166,119 +209,142 @@ static uint32_t find_near_faces(const distance_search *s, const fct_leaf *b, con
 
 static void search_leaves(distance_search *s, uint32_t box_a, uint32_t box_b) {
     const fct_pair_map *map = s->map;
-    const fct_leaf *b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
-    measured_leaf a;
-    fct_leaf_maps maps;
-    triangle_boxes boxes_b;
-    float corners[3][3][16];
-    a.leaf = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a));
-    fct_leaf_maps_set(map, box_a, box_b, &maps);
-    if ((double)maps.size > FAR_CENTER) {
-        search_far_leaves(s, a.leaf, b);
+    triangle_boxes boxes_a, boxes_b;
+    leaf_pair l;
+    float top[16], bottom[16];
+    l.a = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a));
+    l.b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
+    l.listed = 0;
+    fct_leaf_maps_set(map, box_a, box_b, &l.maps);
+    if ((double)l.maps.size > FAR_CENTER) {
+        search_far_leaves(s, l.a, l.b);
         return;
     }
-    placed_leaf placed_b = place_leaf(b, &maps.of_b);
-    find_triangle_boxes(b, &placed_b, &boxes_b);
-    uint32_t open = find_near_faces(s, b, &boxes_b, &maps);
-    if (!open) return;
-    for (uint32_t octet = 0; octet < fct_leaf_octets(b); ++octet) {
-        eight_triangles t = pick_triangles(b, &placed_b, octet);
-        for (int c = 0; c < 3; ++c)
-            for (int k = 0; k < 3; ++k) f8_store(corners[c][k] + 8 * octet, t.p[c][k]);
-    }
-    a.placed = place_leaf(a.leaf, &maps.of_a);
-    find_triangle_boxes(a.leaf, &a.placed, &a.boxes);
-    for (; open && !s->done; open &= open - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(open);
-        measured_face face;
-        float p[3][3];
-        face.place = b->first + i;
-        for (int k = 0; k < 3; ++k) {
-            face.low[k] = boxes_b.low[k][i], face.high[k] = boxes_b.high[k][i];
-            for (int c = 0; c < 3; ++c) p[c][k] = corners[c][k][i];
+    placed_leaf placed = place_leaf(l.b, &l.maps.of_b);
+    find_triangle_boxes(l.b, &placed, &boxes_b);
+    uint32_t open_b = find_near_faces(s, l.b, &boxes_b, &l.maps);
+    if (!open_b) return;
+    store_corners(l.b, &placed, &l.corners_b);
+    placed = place_leaf(l.a, &l.maps.of_a);
+    find_triangle_boxes(l.a, &placed, &boxes_a);
+    store_corners(l.a, &placed, &l.corners_a);
+    extend_along_way(s, &l, top, bottom);
+    for (; open_b && !s->done; open_b &= open_b - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(open_b);
+        float low[3], high[3], least_top = bottom[i] - (float)fct_min(s->reach * (1 + 0x1p-20), 1e30);
+        for (int k = 0; k < 3; ++k) low[k] = boxes_b.low[k][i], high[k] = boxes_b.high[k][i];
+        for (uint32_t first = 0; first < l.a->count; first += 8) {
+            uint32_t left = l.a->count - first, open_a = left < 8 ? (1u << left) - 1 : 0xffu;
+            open_a &= f8_le(bound_triangles(&boxes_a, first, low, high, l.maps.slack), f8_set(s->limit2));
+            open_a &= f8_le(f8_set(least_top), f8_load(top + first));
+            for (; open_a; open_a &= open_a - 1, ++l.listed)
+                l.list_a[l.listed] = first + (uint32_t)__builtin_ctz(open_a), l.list_b[l.listed] = i;
+            if (l.listed >= 8) measure_listed(s, &l);
         }
-        face.lanes = spread_triangle((const float(*)[3])p);
-        for (uint32_t first = 0; first < a.leaf->count && !s->done; first += 8)
-            measure_octet(s, &a, first, &face, &maps);
     }
+    if (l.listed && !s->done) measure_listed(s, &l);
 }
 
-/* Boxes with the bound 0 are many. This estimate sorts them: the distance of the centres less half the radius
- * of the child. (Without the radius, and with all of it, the search visits 9 % more; with the bound alone, 70
- * %.) */
-static float estimate_distance(const fct_bvh *own, const fct_pair_node *node, uint32_t slot, uint32_t child,
-                               const fct_placed_box *box) {
-    float x = node->center[0][slot] - box->center[0], y = node->center[1][slot] - box->center[1],
-          z = node->center[2][slot] - box->center[2];
-    return sqrtf(x * x + y * y + z * z) - .5f * sqrtf(fct_box_size2(own, child));
-}
-
-/* A pair of boxes, and a lower bound of their squared distance in the scaled unit of a. */
-typedef struct near_boxes {
-    uint32_t a, b;
-    double bound2;
-} near_boxes;
-
-static uint32_t open_node(distance_search *s, bool opens_a, uint32_t fixed, uint32_t opened,
-                          near_boxes *stack, uint32_t height) {
-    const fct_pair_map *map = s->map;
-    const fct_bvh *other = opens_a ? map->b : map->a, *own = opens_a ? map->a : map->b;
-    const fct_space_map *space = opens_a ? &map->to_a : &map->to_b;
-    uint32_t number = fct_box_child(own, opened), base = height;
+/* Opens the node of the larger box. Writes its near boxes with the other box; the last one seems to be the
+ * nearest. Returns their number. */
+static uint32_t open_node(distance_search *s, near_boxes pair, near_boxes out[8]) {
+    const fct_bvh *a = s->map->a, *b = s->map->b;
+    bool opens_a = fct_opens_a(s->map, pair.a, pair.b);
+    const fct_bvh *own = opens_a ? a : b, *other = opens_a ? b : a;
+    const fct_space_map *space = opens_a ? &s->map->to_a : &s->map->to_b;
+    uint32_t number = fct_box_child(own, opens_a ? pair.a : pair.b), met = 0xff, count = 0, nearest = 0;
     const fct_pair_node *node = &own->pairs[number];
     fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     double bound2[8], reach2 = s->reach * s->reach, to_a = opens_a ? 1 : s->to_limit_b;
-    float near2[8], keys[8];
-    uint32_t met = 0xff;
-    fct_place_box(space, other, fixed, box);
+    float near2[8], guess[8];
+    place_box(space, other, opens_a ? pair.b : pair.a, box);
     double far = fabs(box->exact_center[0]) + fabs(box->exact_center[1]) + fabs(box->exact_center[2]);
-    if (far > FAR_CENTER)
+    if (far > FAR_CENTER) {
         fct_bound_far_boxes(box, node, space, bound2);
-    else
+        for (int i = 0; i < 8; ++i) guess[i] = (float)bound2[i];
+    } else
         met = bound_boxes(box, node, to_a > 0 ? (float)fct_min(reach2 / to_a * (1 + 0x1p-20), 1e36) : 1e36f,
-                          near2);
+                          near2, guess);
     ++s->visits.nodes, s->visits.boxes += 8;
+    float least = INFINITY;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = number << 3 | i;
         double bound = (far > FAR_CENTER ? bound2[i] : (double)near2[i]) * to_a;
         if (node->child[i] == FCT_NONE || bound > reach2) continue;
-        float key = estimate_distance(own, node, i, child, box);
-        uint32_t at = height++;
-        for (; at > base && keys[at - 1 - base] < key; --at)
-            stack[at] = stack[at - 1], keys[at - base] = keys[at - 1 - base];
-        keys[at - base] = key;
-        stack[at] = opens_a ? (near_boxes){child, fixed, bound} : (near_boxes){fixed, child, bound};
+        if (guess[i] < least) least = guess[i], nearest = count;
+        out[count++] = opens_a ? (near_boxes){child, pair.b, bound} : (near_boxes){pair.a, child, bound};
     }
-    return height;
+    if (count) {
+        near_boxes last = out[count - 1];
+        out[count - 1] = out[nearest], out[nearest] = last;
+    }
+    return count;
 }
 
-static void search_nodes(distance_search *s) {
-    const fct_bvh *a = s->map->a, *b = s->map->b;
-    float ratio2 = (float)(s->map->to_a.factor * s->map->to_a.factor);
+/* Depth first. */
+static void search_below(distance_search *s, near_boxes from) {
     near_boxes stack[FCT_PAIR_STACK];
     uint32_t height = 1;
-    stack[0] = (near_boxes){0, 0, 0};
+    stack[0] = from;
     while (height && !s->done) {
         near_boxes pair = stack[--height];
         if (pair.bound2 > s->reach * s->reach) continue;
-        bool leaf_a = fct_box_child(a, pair.a) & FCT_REF_LEAF,
-             leaf_b = fct_box_child(b, pair.b) & FCT_REF_LEAF;
-        if (leaf_a && leaf_b) {
+        if (fct_box_is_leaf(s->map->a, pair.a) && fct_box_is_leaf(s->map->b, pair.b))
             search_leaves(s, pair.a, pair.b);
-            continue;
+        else
+            height += open_node(s, pair, stack + height);
+    }
+}
+
+static bool is_farther(const void *queue, size_t i, size_t j) {
+    const near_boxes *q = queue;
+    return q[i].bound2 > q[j].bound2;
+}
+
+static void swap_boxes(void *queue, size_t i, size_t j) {
+    near_boxes *q = queue, boxes = q[i];
+    q[i] = q[j], q[j] = boxes;
+}
+
+/* Goes from a pair of boxes down to a pair of leaves, each time to the pair that seems the nearest. The
+ * others wait in the queue. */
+static void dive(distance_search *s, near_boxes pair) {
+    near_boxes below[8];
+    while (!fct_box_is_leaf(s->map->a, pair.a) || !fct_box_is_leaf(s->map->b, pair.b)) {
+        if (s->queued + 7 > QUEUE) {
+            search_below(s, pair);
+            return;
         }
-        bool opens_a = leaf_b || (!leaf_a && fct_box_size2(a, pair.a) >= ratio2 * fct_box_size2(b, pair.b));
-        height = opens_a ? open_node(s, true, pair.b, pair.a, stack, height)
-                         : open_node(s, false, pair.a, pair.b, stack, height);
+        uint32_t count = open_node(s, pair, below);
+        if (!count) return;
+        pair = below[count - 1];
+        for (uint32_t i = 0; i + 1 < count; ++i) {
+            s->queue[s->queued] = below[i];
+            fct_sift_up(s->queue, s->queued++, is_farther, swap_boxes);
+        }
+    }
+    search_leaves(s, pair.a, pair.b);
+}
+
+static void search_nodes(distance_search *s) {
+    dive(s, (near_boxes){0, 0, 0});
+    while (s->queued && !s->done) {
+        near_boxes pair = s->queue[0];
+        if (pair.bound2 > s->reach * s->reach) break;
+        s->queue[0] = s->queue[--s->queued];
+        fct_sift_down(s->queue, 0, s->queued, is_farther, swap_boxes);
+        dive(s, pair);
     }
 }
 
 void fct_distance_search(const fct_pair_map *map, double relative, double absolute, double enough,
                          fct_near_pair *best, fct_visits *visits) {
-    distance_search s = {
-        .map = map, .relative = relative, .absolute = absolute, .enough = enough, .best = *best};
+    distance_search s; /* not cleared, because of its size */
+    s.map = map, s.relative = relative, s.absolute = absolute, s.enough = enough, s.best = *best;
+    s.waiting = s.queued = 0, s.visits = (fct_visits){0, 0, 0};
     double shrink2 = 1 - map->to_a.skew;
     s.to_limit_b = shrink2 > 0 ? map->to_a.factor * map->to_a.factor * shrink2 * (1 - 0x1p-40) : 0;
+    s.way[0] = s.way[1] = s.way[2] = 0;
     s.placed_a.box = s.placed_b.box = FCT_NONE;
     s.maximum = sqrt(best->distance2) * map->a->scale;
     s.upper = best->place_a != FCT_NONE ? s.maximum : INFINITY;

@@ -55,9 +55,16 @@ static void invert_map(const fct_space_map *other, fct_space_map *out) {
     out->shift[0] = shift.x, out->shift[1] = shift.y, out->shift[2] = shift.z;
 }
 
-static void round_turn(fct_space_map *map) {
+/* Sets what the placing of a box needs, from turn, factor, skew and blur. */
+static void prepare_placing(fct_space_map *map) {
     for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) map->turn_float[i][j] = (float)map->turn[i][j];
+        for (int j = 0; j < 3; ++j) {
+            map->columns[j][i] = map->turn[i][j];
+            map->columns_float[j][i] = (float)map->turn[i][j];
+        }
+    map->factor_float = (float)map->factor;
+    map->slack_per_size = FLOAT_ERROR + 4 * map->skew;
+    map->slack = map->slack_per_size * MODEL_RADIUS + 4 * map->skew * MODEL_RADIUS * map->factor + map->blur;
 }
 
 bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_map *out) {
@@ -73,10 +80,11 @@ bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, 
     if (!(far < 1e100)) return false;
     out->to_a.shift[0] = shift.x, out->to_a.shift[1] = shift.y, out->to_a.shift[2] = shift.z;
     out->to_a.factor = factor * (a->scale / b->scale);
-    round_turn(&out->to_a);
+    prepare_placing(&out->to_a);
     out->to_a.blur = (far + out->to_a.factor) * 0x1p-48;
     invert_map(&out->to_a, &out->to_b);
-    round_turn(&out->to_b);
+    prepare_placing(&out->to_b);
+    out->volume_of_b = (float)(out->to_a.factor * out->to_a.factor * out->to_a.factor);
     return out->to_a.factor > 1e-30 && out->to_a.factor < 1e30;
 }
 
@@ -96,32 +104,6 @@ void fct_pair_triangle_b(const fct_pair_map *map, uint32_t place, v3 p[3]) {
 
 static v3 box_center(const fct_pair_node *n, uint32_t slot) {
     return v3_make((double)n->center[0][slot], (double)n->center[1][slot], (double)n->center[2][slot]);
-}
-
-static float round_up(double x) {
-    return (float)(x * (1 + 0x1p-20)) + 1e-37f;
-}
-
-void fct_place_box(const fct_space_map *map, const fct_bvh *from, uint32_t box, fct_placed_box *out) {
-    if (out->box == box) return;
-    const fct_pair_node *node = &from->pairs[box >> 3];
-    uint32_t slot = box & 7;
-    v3 at = v3_scale(fct_rotate(map->turn, box_center(node, slot)), map->factor);
-    at = v3_add(at, v3_make(map->shift[0], map->shift[1], map->shift[2]));
-    out->box = box;
-    out->exact_center[0] = at.x, out->exact_center[1] = at.y, out->exact_center[2] = at.z;
-    v3_store(out->center, at);
-    float factor = (float)map->factor;
-    for (int k = 0; k < 3; ++k) {
-        float x = node->axes[k][0][slot], y = node->axes[k][1][slot], z = node->axes[k][2][slot];
-        out->half[k] = node->half[k][slot] * factor;
-        for (int j = 0; j < 3; ++j)
-            out->axes[k][j] =
-                map->turn_float[j][0] * x + map->turn_float[j][1] * y + map->turn_float[j][2] * z;
-    }
-    double size = sum_sizes(at) + (double)(out->half[0] + out->half[1] + out->half[2]) + MODEL_RADIUS;
-    out->slack =
-        round_up(FLOAT_ERROR * size + 4 * map->skew * (size + MODEL_RADIUS * map->factor) + map->blur);
 }
 
 /* Sets `from` to the centre of the box in the coordinates of its leaf, and returns it, as rounded, relative
@@ -156,6 +138,6 @@ void fct_leaf_maps_set(const fct_pair_map *map, uint32_t box_a, uint32_t box_b, 
         size += fabs(shift) + (double)na->half[r][sa] + (double)nb->half[r][sb] * to_a->factor;
     }
     double slack = FLOAT_ERROR * size + 4 * to_a->skew * size + to_a->blur;
-    out->size = round_up(size);
-    out->slack = round_up(slack);
+    out->size = fct_round_up(size);
+    out->slack = fct_round_up(slack);
 }

@@ -45,6 +45,21 @@ int fct_orient_space(v3 a, v3 b, v3 c, v3 d) {
     return orient_space_exactly(a, b, c, d);
 }
 
+void fct_orient_corners(const v3 p[3], const v3 t[3], int side[3]) {
+    v3 b = v3_sub(p[1], p[0]), c = v3_sub(p[2], p[0]);
+    double bycz = b.y * c.z, bzcy = b.z * c.y, bzcx = b.z * c.x, bxcz = b.x * c.z, bxcy = b.x * c.y,
+           bycx = b.y * c.x;
+    v3 n = v3_make(bycz - bzcy, bzcx - bxcz, bxcy - bycx);
+    v3 size = v3_make(fabs(bycz) + fabs(bzcy), fabs(bzcx) + fabs(bxcz), fabs(bxcy) + fabs(bycx));
+    for (int i = 0; i < 3; ++i) {
+        v3 d = v3_sub(t[i], p[0]);
+        double value = n.x * d.x + n.y * d.y + n.z * d.z;
+        double sum = size.x * fabs(d.x) + size.y * fabs(d.y) + size.z * fabs(d.z);
+        side[i] =
+            fabs(value) > SPACE_ERROR * sum ? find_sign(value) : orient_space_exactly(p[0], p[1], p[2], t[i]);
+    }
+}
+
 static int orient_plane_exactly(double ax, double ay, double bx, double by, double cx, double cy) {
     const double product[6][2] = {{ax, by}, {-ay, bx}, {bx, cy}, {-by, cx}, {cx, ay}, {-cy, ax}};
     fct_expansion e;

@@ -10,13 +10,14 @@
 #include "base/math/simd.h"
 #include "bvh/pair/boxes.h"
 #include "bvh/pair/leaves.h"
+#include "bvh/pair/place.h"
 #include "bvh/pair/triangles.h"
 
 typedef struct overlap_search {
     const fct_pair_map *map;
     size_t limit, capacity, count;
     fct_face_pair *pairs;
-    bool self;
+    bool self, prefetches;
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
     fct_visits visits;
 } overlap_search;
@@ -74,6 +75,15 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
     return false;
 }
 
+/* Larger models are prefetched. Two statues of a million triangles touch in 4.4 us instead of 5.2. Two scans
+ * of 70,000 take 1.06 times as long without if other work uses the caches in between, and 1.2 times as long
+ * with if the caches keep what the poses need. */
+#define PREFETCH_BYTES ((size_t)2 << 20)
+
+static size_t count_bytes(const fct_bvh *bvh) {
+    return bvh->leaf_bytes + bvh->pair_count * sizeof(fct_pair_node);
+}
+
 /* Prefetches a node, or the largest leaf. */
 static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
     const char *at =
@@ -97,13 +107,13 @@ static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint3
     const fct_pair_node *node = &own->pairs[number];
     fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     float depth[8], waiting[8];
-    fct_place_box(opens_a ? &map->to_a : &map->to_b, other, fixed, box);
+    place_box(opens_a ? &map->to_a : &map->to_b, other, fixed, box);
     uint32_t met = meet_boxes(box, node, depth), base = height;
     ++s->visits.nodes, s->visits.boxes += 8;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = number << 3 | i;
         if (node->child[i] == FCT_NONE) continue;
-        prefetch_child(own, node->child[i]);
+        if (s->prefetches) prefetch_child(own, node->child[i]);
         uint32_t at = height++;
         for (; at > base && waiting[at - 1 - base] < depth[i]; --at)
             stack[at] = stack[at - 1], waiting[at - base] = waiting[at - 1 - base];
@@ -115,21 +125,17 @@ static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint3
 
 static size_t search_below(overlap_search *s, box_pair from) {
     const fct_bvh *a = s->map->a, *b = s->map->b;
-    float ratio2 = (float)(s->map->to_a.factor * s->map->to_a.factor);
     box_pair stack[FCT_PAIR_STACK];
     uint32_t height = 1;
     stack[0] = from;
     while (height) {
         box_pair pair = stack[--height];
-        bool leaf_a = fct_box_child(a, pair.a) & FCT_REF_LEAF,
-             leaf_b = fct_box_child(b, pair.b) & FCT_REF_LEAF;
-        if (leaf_a && leaf_b) {
+        if (fct_box_is_leaf(a, pair.a) && fct_box_is_leaf(b, pair.b)) {
             if (search_leaves(s, pair.a, pair.b)) break;
             continue;
         }
-        bool opens_a = leaf_b || (!leaf_a && fct_box_size2(a, pair.a) >= ratio2 * fct_box_size2(b, pair.b));
-        height = opens_a ? open_node(s, true, pair.b, pair.a, stack, height)
-                         : open_node(s, false, pair.a, pair.b, stack, height);
+        height = fct_opens_a(s->map, pair.a, pair.b) ? open_node(s, true, pair.b, pair.a, stack, height)
+                                                     : open_node(s, false, pair.a, pair.b, stack, height);
     }
     return s->count;
 }
@@ -137,6 +143,7 @@ static size_t search_below(overlap_search *s, box_pair from) {
 static overlap_search begin_search(const fct_pair_map *map, size_t limit, size_t capacity,
                                    fct_face_pair *pairs) {
     overlap_search s = {.map = map, .limit = limit, .capacity = capacity, .pairs = pairs};
+    s.prefetches = count_bytes(map->a) + count_bytes(map->b) > PREFETCH_BYTES;
     s.placed_a.box = s.placed_b.box = FCT_NONE;
     return s;
 }
@@ -166,7 +173,7 @@ size_t fct_self_search(const fct_pair_map *map, size_t limit, size_t capacity, f
         const fct_pair_node *node = &bvh->pairs[number];
         for (uint32_t i = 0; i < 8 && node->child[i] != FCT_NONE && s.count < limit; ++i) {
             float depth[8];
-            fct_place_box(&map->to_a, bvh, number << 3 | i, &s.placed_a);
+            place_box(&map->to_a, bvh, number << 3 | i, &s.placed_a);
             uint32_t met = meet_boxes(&s.placed_a, node, depth) & ((1u << i) - 1);
             ++s.visits.nodes, s.visits.boxes += i;
             for (; met && s.count < limit; met &= met - 1)

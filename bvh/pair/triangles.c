@@ -17,7 +17,7 @@
 
 /* The signs of the corners of t over the plane of `plane`. Returns whether the plane separates them. */
 static bool find_sides(const v3 plane[3], const v3 t[3], int side[3]) {
-    for (int i = 0; i < 3; ++i) side[i] = fct_orient_space(plane[0], plane[1], plane[2], t[i]);
+    fct_orient_corners(plane, t, side);
     return (side[0] > 0 && side[1] > 0 && side[2] > 0) || (side[0] < 0 && side[1] < 0 && side[2] < 0);
 }
 

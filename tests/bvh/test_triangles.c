@@ -38,6 +38,9 @@ static void planes_are_exact(void **state) {
         assert_int_equal(fct_orient_space(a, b, c, moved), side);
         assert_int_equal(fct_orient_space(b, a, c, moved), -side);
         assert_int_equal(fct_orient_space(a, moved, b, c), side);
+        int sides[3];
+        fct_orient_corners((v3[3]){a, b, c}, (v3[3]){d, moved, offset(d, k, -up * 0x1p-29)}, sides);
+        assert_true(sides[0] == 0 && sides[1] == side && sides[2] == -side);
         /* In the plane: c against the line a b, and a step aside. */
         for (int axis = 0; axis < 3; ++axis) {
             int sign = (n[axis] > 0) - (n[axis] < 0), x = (axis + 1) % 3, y = (axis + 2) % 3;
