@@ -32,7 +32,7 @@
 #define BRIGHT_SHARE .2
 /* Wanted standard error of a lamp's light as a share of the receiver's light, times the first rays per lamp.
  */
-#define RAY_ERROR .016
+#define RAY_ERROR .018
 /* The standard error of a visible fraction f from n stratified rays is about .6 sqrt(f (1 - f)) / n^(3/4). */
 #define STRATIFIED .6
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */

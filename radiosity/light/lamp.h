@@ -48,7 +48,7 @@ typedef struct fct_lamp_goal {
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]);
 /* The same with shadows. Rays start at point + offset * normal. Each lamp receives base_rays rays (0: no
- * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 1.6 % /
+ * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 1.8 % /
  * base_rays * slack of the receiver's light. Without a goal (NULL) nothing is in doubt, slack is 1, and the
  * lamps alone are the receiver's light. Minor lamps share their rays. Equal values of item_seed give equal
  * rays. *rays (may be NULL) grows by the number of rays. Any number of threads may call. Returns the visible

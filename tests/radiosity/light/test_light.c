@@ -111,12 +111,12 @@ typedef struct eye {
     fct_sight sight;
 } eye;
 
-/* Rays for a standard error of 1.6 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
+/* Rays for a standard error of 1.8 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
  * f)) / n^(3/4) with one more ray that is half visible, in steps of 4 up to 64. */
 static uint32_t count_rays(const eye *q, uint32_t base, double visible, uint32_t sent, double share) {
     const double f = (visible * sent + .5) / (sent + 1), error = .6 * sqrt(f * (1 - f)) * share;
     uint32_t n = 4;
-    while (n < 64 && error / pow(n, .75) > .016 / base * q->slack) n += 4;
+    while (n < 64 && error / pow(n, .75) > .018 / base * q->slack) n += 4;
     return n;
 }
 
@@ -219,11 +219,11 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     }
     if (light[0] + light[1] + light[2] > 0) {
         double all[3], seen[3];
-        /* Enough for an error of 1.6 % / base * slack of the light if each ray has a standard error of 1/2; 4
+        /* Enough for an error of 1.8 % / base * slack of the light if each ray has a standard error of 1/2; 4
          * to 16.
          */
         const uint32_t enough =
-            (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .016 * base / q->slack, 2), 4), 16);
+            (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .018 * base / q->slack, 2), 4), 16);
         const bool doubt = q->doubt >> 31 && base < enough && !fixed;
         bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, q->doubt >> 31, all, seen);
         if ((mixed || doubt || all[0] + all[1] + all[2] == 0) && base < enough && !fixed)
