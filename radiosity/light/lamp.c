@@ -107,6 +107,13 @@ static uint32_t count_wanted_rays(const query *q, double visible, uint32_t sent,
     return rays;
 }
 
+/* Adds the variance of light of `power` whose visible fraction comes from rays of which some were blocked.
+ * deviation: the standard error of a fraction of 1/2, doubled. */
+static void add_variance(query *q, double power, double visible, uint32_t sent, double deviation) {
+    const double fraction = (visible * sent + .5) / (sent + 1), error = deviation * power;
+    q->sight.variance += (float)(error * error * fraction * (1 - fraction));
+}
+
 /* The visible fraction of a lamp whose light is `power` (strength included). */
 static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct_receiver *rec,
                                        const fct_cut *cut, double power) {
@@ -141,7 +148,9 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
         }
         goal = count_wanted_rays(q, all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
     }
-    return all > 0 ? seen / all : 0;
+    const double visible = all > 0 ? seen / all : 0;
+    if (seen > 0 && seen < all) add_variance(q, power, visible, sent, STRATIFIED / sqrt(sent * sqrt(sent)));
+    return visible;
 }
 
 static double estimate_lamp(const query *q, const fct_lamp *lamp) {
@@ -200,6 +209,8 @@ static void add_minor_lamps(query *q, const double light[3], double sum, double 
     grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
     const double known = known_fraction(q, 1u << MINOR_SLOT);
     for (int k = 0; k < 3; ++k) irradiance[k] += light[k] * ((all[k] > 0 ? seen[k] / all[k] : grey) - known);
+    const uint32_t sent = mixed && more ? wanted : q->base_rays;
+    if (grey > 0 && grey < 1) add_variance(q, light[0] + light[1] + light[2], grey, sent, 1 / sqrt(sent));
 }
 
 /* Adds the light of the lamps in q->slots. With q->doubt, adds only its difference from the light that the

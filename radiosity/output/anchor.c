@@ -136,23 +136,25 @@ static uint32_t find_middle_vertex(const grouping *g, const group *k) {
     return best;
 }
 
-/* True if a vertex of the group is farther from the anchor than the tolerance allows, or turned too far to
- * use it. */
+/* True if a vertex is farther from an anchor, in units of `reach`, than the tolerance allows, turned too far
+ * to use it, or if a surface in front of it is nearer, which the anchor may not see. */
+static bool anchor_is_too_far(const grouping *g, size_t vertex, double distance, double reach,
+                              double cosine) {
+    const bool hidden = g->def->nearest && g->surface->flat[vertex] && distance > g->def->nearest[vertex];
+    const bool turned = 2 - 2 * cosine > .9 * FCT_MOST_TURN2; /* the search rounds normals to floats */
+    return hidden || turned || distance / reach + sqrt(fct_max(1 - cosine, 0)) > g->def->tolerance;
+}
+
 static bool group_is_too_wide(const grouping *g, const group *k, const fct_anchor *a) {
     const fct_surface *s = g->surface;
-    v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)k->middle);
-    double worst = 0, least_cosine = 1;
-    bool hidden = false; /* a surface that the anchor may not see is in front of a vertex */
-    for (uint32_t m = k->begin; m < k->end; ++m) {
+    const v3 p = v3_load(a->position), n = v3_load(s->normals + 3 * (size_t)k->middle);
+    bool wide = false;
+    for (uint32_t m = k->begin; m < k->end && !wide; ++m) {
         const size_t w = g->vertices[m];
-        double distance = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p)), apart = distance / a->reach;
-        double cosine = v3_dot(n, v3_load(s->normals + 3 * w));
-        worst = fct_max(worst, apart + sqrt(fct_max(1 - cosine, 0)));
-        least_cosine = fct_min(cosine, least_cosine);
-        hidden |= g->def->nearest && s->flat[w] && distance > g->def->nearest[w];
+        const double distance = v3_norm(v3_sub(v3_load(s->sample_points + 3 * w), p));
+        wide = anchor_is_too_far(g, w, distance, a->reach, v3_dot(n, v3_load(s->normals + 3 * w)));
     }
-    bool turned = 2 - 2 * least_cosine > .9 * FCT_MOST_TURN2; /* the search rounds normals to floats */
-    return k->end - k->begin > 1 && (turned || hidden || worst > g->def->tolerance);
+    return wide && k->end - k->begin > 1;
 }
 
 /* Gathers at the middle vertex of a group. Returns the number of rays. */
@@ -233,7 +235,7 @@ static uint32_t halve_group(const grouping *g, const group *k) {
     return mid == k->begin || mid == k->end ? k->begin + (k->end - k->begin) / 2 : mid;
 }
 
-/* Whether some anchor is as near to a vertex as the tolerance asks for. No reach counts as more than that of
+/* Whether some anchor is near enough to a vertex. No reach counts as more than that of
  * another anchor plus the distance to it: an anchor in the open says little about a pit beside it. */
 static bool vertex_has_anchor(const grouping *g, size_t vertex) {
     const float *p = g->surface->sample_points + 3 * vertex;
@@ -249,7 +251,7 @@ static bool vertex_has_anchor(const grouping *g, size_t vertex) {
     }
     for (int i = 0; i < near.count; ++i) {
         const double cosine = v3_dot(v3_load(n), v3_load(g->known->items[near.ids[i]].normal));
-        if (apart[i] / reach + sqrt(fct_max(1 - cosine, 0)) <= g->def->tolerance) return true;
+        if (!anchor_is_too_far(g, vertex, apart[i], reach, cosine)) return true;
     }
     return false;
 }
@@ -307,9 +309,9 @@ static fct_result anchor_groups(const fct_env *env, grouping *g, uint32_t pendin
     return FCT_OK;
 }
 
-/* Adds all anchors. */
-static fct_result place_anchors(const fct_env *env, grouping *g, fct_anchors *out) {
-    uint32_t total = list_vertices(env, g), pending = total > 0 ? 1 : 0;
+/* Adds anchors for the first `total` of g->vertices. */
+static fct_result place_anchors(const fct_env *env, grouping *g, uint32_t total, fct_anchors *out) {
+    uint32_t pending = 1;
     size_t capacity = out->count;
     g->groups[0] = (group){.begin = 0, .end = total};
     while (pending > 0) {
@@ -338,30 +340,28 @@ fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, cons
     uint32_t most = surface->mesh.vertex_count;
     size_t chunks = fct_chunk_count(most, GROUP_GRAIN) + 1;
     grouping g = {.source = source, .surface = surface, .def = def, .known = out};
-    const fct_array arrays[] = {FCT_ARRAY(g.scratch, most),  FCT_ARRAY(g.next, most),
-                                FCT_ARRAY(g.vertices, most), FCT_ARRAY(g.groups, most),
-                                FCT_ARRAY(g.numbers, most),  FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
-    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "anchors");
-    if (result != FCT_OK) return result;
+    const fct_array lists[] = {FCT_ARRAY(g.scratch, most), FCT_ARRAY(g.vertices, most)};
+    const fct_array arrays[] = {FCT_ARRAY(g.next, most), FCT_ARRAY(g.groups, most),
+                                FCT_ARRAY(g.numbers, most), FCT_ARRAY_ZERO(g.chunk_rays, chunks)};
+    fct_result result = fct_allocate_all(env, lists, FCT_LENGTH(lists), "anchors");
+    uint32_t total = result == FCT_OK ? list_vertices(env, &g) : 0;
+    if (total > 0) result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "anchors");
+    if (result != FCT_OK || total == 0) goto done;
     for (uint32_t v = 0; v < most; ++v) g.numbers[v] = FCT_NONE;
     result = make_guides(env, &g);
-    if (result == FCT_OK) result = place_anchors(env, &g, out);
+    if (result == FCT_OK) result = place_anchors(env, &g, total, out);
     for (uint32_t t = 0; g.guides && t < fct_env_threads(env); ++t) fct_guide_release(env, &g.guides[t]);
     fct_release(env, g.guides);
     if (result == FCT_OK) {
         double inverse = 0;
         for (size_t c = 0; c < chunks; ++c) out->rays += g.chunk_rays[c];
         for (uint32_t i = 0; i < out->count; ++i) inverse += 1 / out->items[i].reach;
-        out->turn = inverse > 0 ? TURN_REACH * out->count / inverse : 1;
+        out->turn = TURN_REACH * out->count / inverse;
         fct_anchors_order(out);
     }
     fct_release_all(env, arrays, FCT_LENGTH(arrays));
+done:
+    fct_release_all(env, lists, FCT_LENGTH(lists));
     if (result != FCT_OK) fct_anchors_release(env, out);
     return result;
-}
-
-fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
-                              const fct_anchors_def *def, fct_anchors *out) {
-    *out = (fct_anchors){0};
-    return fct_anchors_extend(env, source, surface, def, out);
 }

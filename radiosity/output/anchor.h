@@ -1,6 +1,6 @@
 /* radiosity/output/anchor.h: gathers indirect light at a few vertices of a surface, its anchors.
  *
- * 1. All vertices form one group.
+ * 1. All vertices that have no anchor near enough form one group.
  * 2. The middle vertex of each group, its anchor, gathers stored radiosity, unless it already has.
  * 3. A group is halved if a vertex lies too far from its anchor, in units of the harmonic mean distance to
  * the hits (Ward, Rubinstein and Clear 1988), or turns too far from it. Back to 2 with the halves. So grooves
@@ -34,12 +34,9 @@ typedef struct fct_anchors_def {
     uint64_t seed;
 } fct_anchors_def;
 
-/* Errors: MEMORY, CANCELLED. */
-fct_result fct_anchors_create(const fct_env *env, const fct_source *source, const fct_surface *surface,
-                              const fct_anchors_def *def, fct_anchors *out);
-/* Adds anchors, in groups of their own, for the vertices from def->first on that have none within the
- * tolerance. No reach counts as more than that of another anchor plus the distance to it. anchors->rays
- * grows. Errors: MEMORY, CANCELLED; the anchors are then released. */
+/* Adds anchors for the vertices from def->first on that have none within the tolerance among the given ones
+ * (at first {0}). No reach of these counts as more than that of another anchor plus the distance to it.
+ * anchors->rays grows. Errors: MEMORY, CANCELLED; the anchors are then released. */
 fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, const fct_surface *surface,
                               const fct_anchors_def *def, fct_anchors *anchors);
 

@@ -7,7 +7,7 @@
  * 3. Split edges across which the light changes, cut new covers, add anchors where none is near enough to a
  * new vertex, and light the new vertices, up to BORDER_ROUNDS times. So the edges of the mesh follow shadow
  * borders.
- * 4. Smooth the indirect light on flat surfaces (smooth.h). Covered vertices show their emission alone.
+ * 4. Smooth the light on flat surfaces (smooth.h). Covered vertices show their emission alone.
  * 5. Check the result at random points (check.h), and map the error if it is an output (error_map.h).
  */
 #include "radiosity/output/output.h"
@@ -40,7 +40,9 @@ enum { BORDER_ROUNDS = 4 };
 enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
 /* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
 enum { DOUBT_ROUNDS = 2 };
-/* The largest factor on the wanted error of the direct light, of vertices with a small area. */
+/* Factors on the wanted error of the direct light: of flat vertices, and the largest one of vertices with a
+ * small area. */
+#define FLAT_SLACK 1.5
 #define MOST_SLACK 2
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
  * length of the edge that is cut. */
@@ -67,6 +69,7 @@ typedef struct lighting {
     uint32_t instance;
     bool back;
     double usual_area;        /* mean over the vertices before any split at a border */
+    uint32_t usual_count;     /* their number */
     uint32_t first;           /* lower vertices have their light */
     float *direct, *indirect; /* irradiance, per vertex x 3; `indirect` holds all of it with FCT_FINAL_NONE */
     uint8_t *covered;         /* per vertex */
@@ -91,11 +94,13 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
     fct_links_irradiance(&s->elements, &s->links, leaf, v3_load(point), v3_load(normal), irradiance);
 }
 
-/* The noise of a vertex shows over its area. So vertices that are denser than those of the surface before any
- * split at a border may have more of it. */
+/* The factor on the error of the direct light that a vertex may have. Flat vertices are smoothed. The noise
+ * of a vertex shows over its area, so vertices of splits at a border may have more of it if they are denser
+ * than those before. */
 static double find_slack(const lighting *l, size_t v) {
-    const double area = l->surface->areas[v];
-    return area > 0 ? fct_min(fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK;
+    const double area = l->surface->areas[v], slack = l->surface->flat[v] ? FLAT_SLACK : 1;
+    if (v < l->usual_count) return slack;
+    return slack * (area > 0 ? fct_min(fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK);
 }
 
 /* Once the indirect light is known. doubt, irradiance: as in fct_lamps_direct. */
@@ -424,8 +429,10 @@ static fct_result cut_covers(lighting *l, uint64_t *rays) {
 static fct_result finish_colors(const lighting *l) {
     const fct_env *env = l->s->env;
     fct_result result = FCT_OK;
-    if (l->s->def.final != FCT_FINAL_NONE)
+    if (l->s->def.final != FCT_FINAL_NONE) {
         result = fct_light_smooth(env, l->surface, l->covered, l->indirect);
+        if (result == FCT_OK) result = fct_direct_smooth(env, l->surface, l->covered, l->sights, l->direct);
+    }
     if (result == FCT_OK) color_vertices(l, true);
     return result;
 }
@@ -537,7 +544,12 @@ fct_result fct_output_side(const fct_solution *s, uint32_t instance, bool back, 
     fct_anchors anchors = {0};
     fct_result result = fct_output_surface(s, instance, back, &surface);
     if (result != FCT_OK) return result;
-    lighting l = {.s = s, .surface = &surface, .anchors = &anchors, .instance = instance, .back = back};
+    lighting l = {.s = s,
+                  .surface = &surface,
+                  .anchors = &anchors,
+                  .instance = instance,
+                  .back = back,
+                  .usual_count = surface.mesh.vertex_count};
     for (size_t v = 0; v < surface.mesh.vertex_count; ++v)
         l.usual_area += (double)surface.areas[v] / surface.mesh.vertex_count;
     result = cover_vertices(&l, rays);

@@ -5,20 +5,73 @@
 #include <string.h>
 
 #include "base/env.h"
+#include "base/math/vec.h"
+#include "radiosity/surface/split.h"
 
 /* Difference of two neighbours over the sum of their light that may be noise of the rays. Larger values blur
  * contacts, smaller ones leave the noise of anchors that are close together. */
 #define NOISE .1
 /* Passes: each reaches one edge further. */
 enum { PASSES = 2 };
+/* Vertices of other normals at one position that the search for a twin looks at. */
+enum { MOST_NORMALS = 8 };
+
+static bool can_mix(const fct_surface *f, const uint8_t *covered, uint32_t v) {
+    return f->flat[v] && !covered[v];
+}
+
+/* twins[v]: the lowest flat vertex that is not covered at the position of v and in its plane, v if there is
+ * none. Triangles of one plane that share no vertices meet there. */
+static fct_result find_twins(const fct_env *env, const fct_surface *f, const uint8_t *covered,
+                             uint32_t *twins) {
+    const uint32_t count = f->mesh.vertex_count;
+    uint32_t *first,
+        *next; /* per vertex: the lowest one at its position; the next one there that has no twin */
+    const fct_array arrays[] = {FCT_ARRAY(first, count), FCT_ARRAY(next, count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
+    if (result != FCT_OK) return result;
+    result = fct_weld(env, count, f->mesh.positions, first);
+    for (uint32_t v = 0; v < count && result == FCT_OK; ++v) {
+        twins[v] = v, next[v] = FCT_NONE;
+        uint32_t u = first[v];
+        for (int k = 0; u != v && twins[v] == v; ++k) {
+            const bool same =
+                can_mix(f, covered, u) && can_mix(f, covered, v) &&
+                fct_shading_same(v3_load(f->normals + 3 * (size_t)u), v3_load(f->normals + 3 * (size_t)v));
+            if (same) twins[v] = u;
+            if (k == MOST_NORMALS) break;
+            if (next[u] == FCT_NONE) next[u] = v;
+            u = next[u];
+        }
+    }
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    return result;
+}
+
+/* Gives each vertex without a lower twin the mean light of its twins. counts: their number. */
+static void join_twins(const uint32_t *twins, uint32_t count, uint32_t *counts, float *light) {
+    for (uint32_t v = 0; v < count; ++v) {
+        counts[v] = 1;
+        if (twins[v] == v) continue;
+        ++counts[twins[v]];
+        for (size_t c = 0; c < 3; ++c) light[3 * (size_t)twins[v] + c] += light[3 * (size_t)v + c];
+    }
+    for (uint32_t v = 0; v < count; ++v)
+        for (size_t c = 0; c < 3; ++c) light[3 * (size_t)v + c] /= (float)counts[v];
+}
+
+static void spread_twins(const uint32_t *twins, uint32_t count, float *light) {
+    for (uint32_t v = 0; v < count; ++v)
+        if (twins[v] != v) memcpy(light + 3 * (size_t)v, light + 3 * (size_t)twins[v], 3 * sizeof *light);
+}
 
 /* Adds the light of vertex b to the sum of vertex a (light and weight). */
-static void add_neighbour(const fct_surface *f, const float *light, uint32_t a, uint32_t b, float *sums) {
+static void add_neighbour(const float *light, uint32_t a, uint32_t b, float *sums) {
     const float *x = light + 3 * (size_t)a, *y = light + 3 * (size_t)b;
     double difference = 0, level = 0;
     for (int c = 0; c < 3; ++c) difference += fabs((double)x[c] - y[c]), level += (double)x[c] + y[c];
     double apart = level > 0 ? difference / (level * NOISE) : 0;
-    if (apart >= 1 || !f->flat[a] || !f->flat[b]) return;
+    if (apart >= 1) return;
     float weight = (float)((1 - apart * apart) * (1 - apart * apart));
     for (int c = 0; c < 3; ++c) sums[4 * (size_t)a + (size_t)c] += weight * y[c];
     sums[4 * (size_t)a + 3] += weight;
@@ -26,22 +79,125 @@ static void add_neighbour(const fct_surface *f, const float *light, uint32_t a, 
 
 fct_result fct_light_smooth(const fct_env *env, const fct_surface *f, const uint8_t *covered, float *light) {
     const fct_mesh *m = &f->mesh;
-    float *sums = fct_allocate(env, 4 * (size_t)m->vertex_count, sizeof *sums);
-    if (!sums) return fct_fail_memory(env, "the output");
-    for (int pass = 0; pass < PASSES; ++pass) {
+    float *sums;
+    uint32_t *twins, *counts;
+    const fct_array arrays[] = {FCT_ARRAY(sums, 4 * (size_t)m->vertex_count),
+                                FCT_ARRAY(twins, m->vertex_count), FCT_ARRAY(counts, m->vertex_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
+    if (result != FCT_OK) return result;
+    result = find_twins(env, f, covered, twins);
+    if (result == FCT_OK) join_twins(twins, m->vertex_count, counts, light);
+    for (int pass = 0; pass < PASSES && result == FCT_OK; ++pass) {
         memset(sums, 0, 4 * (size_t)m->vertex_count * sizeof *sums);
-        for (size_t i = 0; i < m->face_count; ++i)
-            for (int k = 0; k < 3; ++k) {
-                uint32_t a = m->triangles[3 * i + (size_t)k], b = m->triangles[3 * i + (size_t)(k + 1) % 3];
-                if (covered[a] || covered[b]) continue;
-                add_neighbour(f, light, a, b, sums);
-                add_neighbour(f, light, b, a, sums);
-            }
+        for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
+            const uint32_t a = twins[m->triangles[c]], b = twins[m->triangles[c % 3 == 2 ? c - 2 : c + 1]];
+            if (!can_mix(f, covered, a) || !can_mix(f, covered, b)) continue;
+            add_neighbour(light, a, b, sums);
+            add_neighbour(light, b, a, sums);
+        }
         for (size_t v = 0; v < m->vertex_count; ++v)
             for (int c = 0; c < 3; ++c)
                 light[3 * v + (size_t)c] =
                     (light[3 * v + (size_t)c] + sums[4 * v + (size_t)c]) / (1 + sums[4 * v + 3]);
     }
-    fct_release(env, sums);
-    return FCT_OK;
+    if (result == FCT_OK) spread_twins(twins, m->vertex_count, light);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    return result;
+}
+
+/* Sums of weighted least squares over a vertex and its neighbours: positions (x, y) in the plane and light,
+ * all relative to the vertex. w: weights, 1 / variance; c: light per channel; t: of all channels. */
+typedef struct fit {
+    double count, w, x, y, xx, xy, yy, t, tx, ty, tt, c[3], cx[3], cy[3];
+} fit;
+
+/* (.5 % of the light)^2: two points with the same light still differ by what rays that agree have missed. */
+#define LEAST_NOISE .005
+/* Chi-square per degree of freedom above which the light is not linear. */
+#define MOST_MISFIT 2.5
+
+static double sum_channels(const float *light) {
+    return (double)light[0] + light[1] + light[2];
+}
+
+/* Two unit vectors across the unit vector n. */
+static void span_plane(v3 n, v3 axes[2]) {
+    const v3 across = fabs(n.x) < .6 ? v3_make(1, 0, 0) : v3_make(0, 1, 0);
+    axes[0] = v3_unit(v3_cross(n, across));
+    axes[1] = v3_cross(n, axes[0]);
+}
+
+/* Adds vertex b to the sums of vertex a. */
+static void add_to_fit(const fct_surface *f, const float *variances, const float *light, uint32_t a,
+                       uint32_t b, double count, fit *to) {
+    const float *own = light + 3 * (size_t)a, *other = light + 3 * (size_t)b;
+    v3 axes[2];
+    span_plane(v3_load(f->normals + 3 * (size_t)a), axes);
+    const v3 d =
+        v3_sub(v3_load(f->mesh.positions + 3 * (size_t)b), v3_load(f->mesh.positions + 3 * (size_t)a));
+    const double least = LEAST_NOISE * fct_max(sum_channels(own), sum_channels(other));
+    const double x = v3_dot(d, axes[0]), y = v3_dot(d, axes[1]);
+    const double w = count / ((double)variances[b] + least * least);
+    const double t = sum_channels(other) - sum_channels(own);
+    to->count += count, to->w += w;
+    to->x += w * x, to->y += w * y, to->xx += w * x * x, to->xy += w * x * y, to->yy += w * y * y;
+    to->t += w * t, to->tx += w * t * x, to->ty += w * t * y, to->tt += w * t * t;
+    for (int k = 0; k < 3; ++k) {
+        const double c = w * ((double)other[k] - own[k]);
+        to->c[k] += c, to->cx[k] += c * x, to->cy[k] += c * y;
+    }
+}
+
+/* Gives the vertex the light of the plane through the sums, if it explains them. */
+static void take_fit(const fit *s, float *light) {
+    const double a = s->xx * s->yy - s->xy * s->xy, b = s->xy * s->y - s->x * s->yy,
+                 c = s->x * s->xy - s->xx * s->y, d = s->w * s->yy - s->y * s->y,
+                 e = s->x * s->y - s->w * s->xy, f = s->w * s->xx - s->x * s->x,
+                 det = s->w * a + s->x * b + s->y * c;
+    if (!(det > 1e-6 * s->w * s->xx * s->yy)) return; /* the vertices are close to one line */
+    const double explained = a * s->t * s->t + d * s->tx * s->tx + f * s->ty * s->ty +
+                             2 * (b * s->t * s->tx + c * s->t * s->ty + e * s->tx * s->ty);
+    if (!(s->tt - explained / det <= MOST_MISFIT * (s->count - 2 * 3))) return;
+    for (int k = 0; k < 3; ++k)
+        light[k] = (float)fct_max(light[k] + (a * s->c[k] + b * s->cx[k] + c * s->cy[k]) / det, 0);
+}
+
+fct_result fct_direct_smooth(const fct_env *env, const fct_surface *f, const uint8_t *covered,
+                             const fct_sight *sights, float *light) {
+    const fct_mesh *m = &f->mesh;
+    uint32_t *twins, *counts, *places, noisy = 0; /* places: of the vertices' sums */
+    float *variances;
+    fit *fits = NULL;
+    const fct_array arrays[] = {FCT_ARRAY(twins, m->vertex_count), FCT_ARRAY(counts, m->vertex_count),
+                                FCT_ARRAY(places, m->vertex_count),
+                                FCT_ARRAY_ZERO(variances, m->vertex_count)};
+    fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
+    if (result != FCT_OK) return result;
+    if ((result = find_twins(env, f, covered, twins)) != FCT_OK) goto done;
+    join_twins(twins, m->vertex_count, counts, light);
+    for (size_t v = 0; v < m->vertex_count; ++v) variances[twins[v]] += sights[v].variance;
+    for (uint32_t v = 0; v < m->vertex_count; ++v) {
+        variances[v] /= (float)counts[v] * (float)counts[v];
+        places[v] = can_mix(f, covered, v) && variances[v] > 0 ? noisy++ : FCT_NONE;
+    }
+    fits = fct_allocate_zero(env, noisy, sizeof *fits);
+    if (!fits && noisy > 0) {
+        result = fct_fail_memory(env, "the output");
+        goto done;
+    }
+    for (uint32_t v = 0; v < m->vertex_count; ++v)
+        if (places[v] != FCT_NONE) add_to_fit(f, variances, light, v, v, 2, &fits[places[v]]);
+    for (size_t c = 0; c < 3 * (size_t)m->face_count; ++c) {
+        const uint32_t a = twins[m->triangles[c]], b = twins[m->triangles[c % 3 == 2 ? c - 2 : c + 1]];
+        if (!can_mix(f, covered, a) || !can_mix(f, covered, b)) continue;
+        if (places[a] != FCT_NONE) add_to_fit(f, variances, light, a, b, 1, &fits[places[a]]);
+        if (places[b] != FCT_NONE) add_to_fit(f, variances, light, b, a, 1, &fits[places[b]]);
+    }
+    for (uint32_t v = 0; v < m->vertex_count; ++v)
+        if (places[v] != FCT_NONE) take_fit(&fits[places[v]], light + 3 * (size_t)v);
+    spread_twins(twins, m->vertex_count, light);
+done:
+    fct_release(env, fits);
+    fct_release_all(env, arrays, FCT_LENGTH(arrays));
+    return result;
 }

@@ -26,8 +26,7 @@
 /* A link is near if its centroids are closer than this multiple of the typical radii: then one sample has an
  * error above 7 % (docs/notes/radiosity.md), and 16 point pairs replace it. */
 #define NEAR_RADII 2
-/* Two triangles that meet at a concave angle below this, in radians, count as a plane. They see less than its
- * square of each other. */
+/* Two triangles that meet at a concave angle below this, in radians, count as a plane. */
 #define FLAT_EDGE 1e-5
 /* With a limit, a round splits the pairs whose error is at least this share of the largest one. Smaller
  * values need fewer rounds, and let small errors take room from the children of large ones. */
@@ -119,7 +118,7 @@ static bool pair_faces_away(const fct_element *i, const fct_element *j, const fc
  * with a common edge always reach in front of each other. */
 static bool triangle_lies_behind(const fct_elements *set, const fct_element *i, const fct_element *j) {
     const float *p = set->corners + 9 * (size_t)i->triangle, *q = set->corners + 9 * (size_t)j->triangle;
-    double largest = 0, slack = FLAT_EDGE * j->radius * i->area;
+    double largest = 0, slack = FLAT_EDGE * fct_min(i->radius, j->radius) * i->area;
     for (int k = 0; k < 9; ++k) largest = fct_max(largest, fct_max(fabs(p[k]), fabs(q[k])));
     slack += 4 * FLT_EPSILON * largest * i->area;
     for (int k = 0; k < 3; ++k)

@@ -132,6 +132,7 @@ typedef struct side {
     uint64_t *crossed;       /* edges that the current cut has looked at, as pairs */
     size_t crossed_count;
     double usual_area; /* mean over the vertices before any cut */
+    uint32_t usual_count;
     uint32_t known, cut,
         lit; /* lower vertices have these; are older than the cuts before covers; have light */
     uint64_t rays;
@@ -177,7 +178,7 @@ static void grow_side(side *x, bool covered, bool made) {
     x->sights = realloc(x->sights, count * sizeof *x->sights);
     for (size_t v = x->known; v < count; ++v) {
         x->nearest[v] = INFINITY, x->covered[v] = covered, x->made[v] = made, x->doubt[v] = 0;
-        x->sights[v] = (fct_sight){0, 0};
+        x->sights[v] = (fct_sight){0};
     }
     x->known = (uint32_t)count;
 }
@@ -271,7 +272,8 @@ static void light_directly(side *x, uint32_t v, uint32_t doubt, double e[3]) {
     const v3 n = find_normal(x, v);
     const double p[3] = {point[0], point[1], point[2]}, normal[3] = {n.x, n.y, n.z};
     /* Twice the error on a fourth of the usual area. */
-    fct_lamp_goal goal = {.slack = fmin(fmax(sqrt(x->usual_area / x->f.areas[v]), 1), 2), .doubt = doubt};
+    fct_lamp_goal goal = {.slack = x->f.flat[v] ? 1.5 : 1, .doubt = doubt};
+    if (v >= x->usual_count) goal.slack *= fmin(fmax(sqrt(x->usual_area / x->f.areas[v]), 1), 2);
     for (size_t c = 0; c < 3; ++c) {
         e[c] = doubt ? x->direct[3 * (size_t)v + c] : 0;
         goal.other += (double)x->indirect[3 * (size_t)v + c];
@@ -380,6 +382,7 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     side x = {.s = s, .instance = instance, .back = back};
     uint32_t added = 0;
     assert_int_equal(fct_surface_build(&plain, SHADE(s->scene, instance), s->max_edge, &x.f), FCT_OK);
+    x.usual_count = x.f.mesh.vertex_count;
     for (uint32_t v = 0; v < x.f.mesh.vertex_count; ++v)
         x.usual_area += (double)x.f.areas[v] / x.f.mesh.vertex_count;
     cover_by_steps(&x);
@@ -397,6 +400,8 @@ static side make_side(const fct_solution *s, uint32_t instance, bool back) {
     }
     if (s->def.final != FCT_FINAL_NONE)
         assert_int_equal(fct_light_smooth(&plain, &x.f, x.covered, x.indirect), FCT_OK);
+    if (s->def.final != FCT_FINAL_NONE)
+        assert_int_equal(fct_direct_smooth(&plain, &x.f, x.covered, x.sights, x.direct), FCT_OK);
     color_side(&x);
     return x;
 }

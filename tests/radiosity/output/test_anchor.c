@@ -337,7 +337,8 @@ static void groups_respect_the_tolerance(void **state) {
         fct_anchors_def def = {.rays = 16, .tolerance = tolerance, .side = k == 2 ? -1 : 1, .seed = 1};
         fct_anchors t;
         const fct_source source = {&s.set, NULL, s.stored, 20 * sqrt(3) / 8};
-        assert_int_equal(fct_anchors_create(&plain, &source, &f, &def, &t), FCT_OK);
+        t = (fct_anchors){0};
+        assert_int_equal(fct_anchors_extend(&plain, &source, &f, &def, &t), FCT_OK);
         assert_true(t.rays >= 16 * t.count && t.rays <= 80 * t.count);
         double inverse = 0;
         for (uint32_t i = 0; i < t.count; ++i) inverse += 1 / t.items[i].reach;

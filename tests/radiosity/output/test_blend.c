@@ -185,7 +185,8 @@ static void groups_follow_the_rules(void **state) {
             covered[v] = fct_hash(v) % 8 == 0, nearest[v] = (float)(4 * fct_uniform(fct_hash3(seed, v, 7)));
         if (seed % 2) m.def.covered = covered;
         if (seed % 3) m.def.nearest = nearest;
-        assert_int_equal(fct_anchors_create(&plain, &source, &f, &m.def, &t), FCT_OK);
+        t = (fct_anchors){0};
+        assert_int_equal(fct_anchors_extend(&plain, &source, &f, &m.def, &t), FCT_OK);
         uint32_t *vertices = malloc(f.mesh.vertex_count * sizeof *vertices), count = 0;
         for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
             if (f.places[v] != FCT_NONE && !(seed % 2 && covered[v])) vertices[count++] = v;
@@ -211,7 +212,8 @@ static void groups_follow_the_rules(void **state) {
 }
 
 /* Whether the vertex needs an anchor beside the given ones: with r the least reach + distance of the 24
- * nearest of them, none has distance / r + sqrt(1 - n.n') within the tolerance. */
+ * nearest of them, none has distance / r + sqrt(1 - n.n') within the tolerance,
+ * without a turn by more than the blend accepts and nearer than any surface in front of the vertex. */
 static bool needs_anchor(const maker *m, const fct_anchors *t, uint32_t vertex) {
     const v3 p = at(m->f->sample_points, vertex), n = v3_scale(at(m->f->normals, vertex), m->def.side);
     double far2[NEAR], reach = INFINITY, most = 8;
@@ -234,7 +236,8 @@ static bool needs_anchor(const maker *m, const fct_anchors *t, uint32_t vertex) 
     for (int i = 0; i < count; ++i) {
         const double turn = sqrt(fmax(1 - v3_dot(n, v3_load(near[i]->normal)), 0));
         const double apart = v3_norm(v3_sub(p, v3_load(near[i]->position)));
-        needs &= apart / reach + turn > m->def.tolerance;
+        const bool hidden = m->def.nearest && m->f->flat[vertex] && apart > m->def.nearest[vertex];
+        needs &= apart / reach + turn > m->def.tolerance || 2 * turn * turn > .36 || hidden;
     }
     return needs;
 }
@@ -255,7 +258,8 @@ static void extensions_follow_the_rules(void **state) {
         uint8_t *covered = calloc(all, 1);
         for (uint32_t v = 0; v < all; ++v) covered[v] = v >= first || v % 2;
         m.def.covered = covered;
-        assert_int_equal(fct_anchors_create(&plain, &source, &f, &m.def, &t), FCT_OK);
+        t = (fct_anchors){0};
+        assert_int_equal(fct_anchors_extend(&plain, &source, &f, &m.def, &t), FCT_OK);
         const uint64_t rays = t.rays;
         known = t;
         known.items = malloc(t.count * sizeof *t.items);

@@ -274,7 +274,8 @@ static void anchors_aim_from_their_side(void **state) {
     assert_int_equal(fct_surface_build(&plain, SHADE(x.r.scene, x.r.ball), 10, &f), FCT_OK);
     const fct_source source = {set, &x.guides, x.r.stored, 1};
     const fct_anchors_def def = {.rays = 24, .tolerance = .4, .side = -1, .instance = x.r.ball, .seed = 7};
-    assert_int_equal(fct_anchors_create(&plain, &source, &f, &def, &anchors), FCT_OK);
+    anchors = (fct_anchors){0};
+    assert_int_equal(fct_anchors_extend(&plain, &source, &f, &def, &anchors), FCT_OK);
     for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
         for (uint32_t i = 0; i < anchors.count; ++i) {
             const fct_anchor *a = &anchors.items[i];

@@ -93,6 +93,191 @@ static void noise_on_flat_surfaces_is_smoothed(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* The sheet of 12 x 12 squares, and the same triangles without common vertices. */
+static void make_sheets(fct_scene *scene, fct_surface *sheet, fct_surface *loose) {
+    const uint32_t grey = place_material(scene, .5, 0, false);
+    fct_mesh mesh = make_sheet(&plain, 12, v3_make(0, 0, 0), v3_make(1, .2, 0), v3_make(0, 1, .3)), apart;
+    assert_int_equal(fct_mesh_create(&plain, 3 * mesh.face_count, mesh.face_count, 0, &apart), FCT_OK);
+    for (size_t c = 0; c < 3 * (size_t)mesh.face_count; ++c) {
+        apart.triangles[c] = (uint32_t)c;
+        memcpy(apart.positions + 3 * c, mesh.positions + 3 * (size_t)mesh.triangles[c], 12);
+    }
+    place_mesh(scene, &mesh, grey, NULL);
+    place_mesh(scene, &apart, grey, NULL);
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 0), 10, sheet), FCT_OK);
+    assert_int_equal(fct_surface_build(&plain, SHADE(scene, 1), 10, loose), FCT_OK);
+    assert_int_equal(sheet->mesh.vertex_count, mesh.vertex_count);
+    assert_int_equal(loose->mesh.vertex_count, 3 * mesh.face_count);
+    fct_mesh_release(&plain, &mesh), fct_mesh_release(&plain, &apart);
+}
+
+/* The vertex of the sheet at the position of a vertex of the loose triangles. */
+static size_t find_in_sheet(const fct_surface *sheet, const fct_surface *loose, size_t v) {
+    for (size_t u = 0; u < sheet->mesh.vertex_count; ++u)
+        if (!memcmp(sheet->mesh.positions + 3 * u, loose->mesh.positions + 3 * v, 12)) return u;
+    fail();
+    return 0;
+}
+
+/* Triangles without common vertices have the light of the sheet that they form, with the mean of the vertices
+ * at each position. A vertex that is covered takes no part. */
+static void triangles_without_common_vertices_are_smoothed_alike(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    fct_surface sheet, loose;
+    make_sheets(scene, &sheet, &loose);
+    const size_t n = sheet.mesh.vertex_count, m = loose.mesh.vertex_count;
+    double *expected = calloc(3 * n, sizeof *expected);
+    float *first = calloc(3 * m, sizeof *first);
+    int *counts = calloc(n, sizeof *counts);
+    uint8_t *covered = calloc(m, 1), *bare = calloc(n, 1);
+    covered[5] = 1;
+    for (size_t v = 0; v < m; ++v) {
+        const size_t u = find_in_sheet(&sheet, &loose, v);
+        for (size_t k = 0; k < 3; ++k) {
+            first[3 * v + k] = loose.mesh.colors[3 * v + k] =
+                (float)(1 + .07 * fct_uniform(fct_hash3(v, k, 2)));
+            if (!covered[v]) expected[3 * u + k] += first[3 * v + k];
+        }
+        counts[u] += !covered[v];
+    }
+    for (size_t i = 0; i < 3 * n; ++i) expected[i] /= counts[i / 3];
+    smooth_directly(&sheet, bare, expected);
+    assert_int_equal(fct_light_smooth(&plain, &loose, covered, loose.mesh.colors), FCT_OK);
+    int compared = 0;
+    for (size_t v = 0; v < m; ++v) {
+        const size_t u = find_in_sheet(&sheet, &loose, v);
+        if (covered[v]) assert_memory_equal(loose.mesh.colors + 3 * v, first + 3 * v, 12);
+        /* The two sides of the covered vertex's triangle give no light twice to their ends. */
+        if (v3_norm(v3_sub(v3_load(loose.mesh.positions + 3 * v), v3_load(loose.mesh.positions + 15))) < .3)
+            continue;
+        for (size_t k = 0; k < 3; ++k) assert_near(loose.mesh.colors[3 * v + k], expected[3 * u + k], 1e-5);
+        ++compared;
+    }
+    assert_true(compared > 600);
+    free(expected), free(first), free(counts), free(covered), free(bare);
+    fct_surface_release(&plain, &sheet), fct_surface_release(&plain, &loose);
+    fct_scene_destroy(scene);
+}
+
+/* Solves the 3 x 3 system for several right sides by elimination. */
+static void eliminate(double a[3][3], double b[3][4]) {
+    for (int i = 0; i < 3; ++i)
+        for (int r = 0; r < 3; ++r) {
+            if (r == i) continue;
+            const double q = a[r][i] / a[i][i];
+            for (int c = 0; c < 3; ++c) a[r][c] -= q * a[i][c];
+            for (int c = 0; c < 4; ++c) b[r][c] -= q * b[i][c];
+        }
+    for (int i = 0; i < 3; ++i)
+        for (int c = 0; c < 4; ++c) b[i][c] /= a[i][i];
+}
+
+/* The light at vertex v of the sheet by least squares over it and its neighbours, once for each side of a
+ * face, in the parameters of the sheet; *taken: it explains the light. */
+static void fit_directly(const fct_surface *s, const fct_sight *sights, const float *light, size_t v,
+                         double out[3], bool *taken) {
+    double a[3][3] = {{0}}, b[3][4] = {{0}}, rows[64][8], count = 0, misfit = 0;
+    const float *own = light + 3 * v;
+    const double level = (double)own[0] + own[1] + own[2];
+    int n = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->mesh.face_count + 2; ++i) {
+        size_t other = v; /* the first two rows are the vertex itself */
+        if (i >= 2) {
+            const size_t c = i - 2, p = s->mesh.triangles[c],
+                         q = s->mesh.triangles[c % 3 == 2 ? c - 2 : c + 1];
+            if (p != v && q != v) continue;
+            other = p == v ? q : p;
+        }
+        const float *l = light + 3 * other, *x = s->mesh.positions + 3 * other;
+        const double sum = (double)l[0] + l[1] + l[2], least = .005 * fmax(sum, level);
+        const double w = 1 / ((double)sights[other].variance + least * least);
+        const double row[8] = {1, x[0], x[2], l[0], l[1], l[2], sum, w}; /* x and z span the sheet */
+        memcpy(rows[n++], row, sizeof row);
+        for (int r = 0; r < 3; ++r) {
+            for (int c = 0; c < 3; ++c) a[r][c] += w * row[r] * row[c];
+            for (int c = 0; c < 4; ++c) b[r][c] += w * row[r] * row[3 + c];
+        }
+        ++count;
+    }
+    eliminate(a, b);
+    for (int i = 0; i < n; ++i) {
+        const double r = b[0][3] + b[1][3] * rows[i][1] + b[2][3] * rows[i][2] - rows[i][6];
+        misfit += rows[i][7] * r * r;
+    }
+    for (int k = 0; k < 3; ++k)
+        out[k] = b[0][k] + b[1][k] * s->mesh.positions[3 * v] + b[2][k] * s->mesh.positions[3 * v + 2];
+    *taken = misfit <= 2.5 * (count - 6);
+}
+
+/* Light with known noise: linear, with a step along the middle, and without variance at some vertices. */
+static void noise_of_shadow_rays_is_smoothed(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    fct_surface sheet, loose;
+    make_sheets(scene, &sheet, &loose);
+    const size_t n = sheet.mesh.vertex_count, m = loose.mesh.vertex_count;
+    fct_sight *sights = calloc(n, sizeof *sights), *all = calloc(m, sizeof *all);
+    float *light = sheet.mesh.colors, *before = malloc(3 * n * sizeof *before);
+    uint8_t *covered = calloc(m, 1);
+    double noise = 0, rest = 0;
+    for (size_t v = 0; v < n; ++v) {
+        const float *p = sheet.mesh.positions + 3 * v;
+        const double level = 1 + .3 * (double)p[0] + (p[0] > .5F ? 1 : 0), deviation = .06;
+        sights[v].variance = fct_hash(v) % 7 ? (float)(deviation * deviation) : 0;
+        double error = 0; /* of about one deviation */
+        for (uint64_t k = 0; k < 12; ++k) error += fct_uniform(fct_hash3(v, k, 3)) - .5;
+        if (sights[v].variance == 0) error = 0;
+        for (size_t k = 0; k < 3; ++k)
+            light[3 * v + k] = before[3 * v + k] =
+                (float)(level * (double)(k + 1) / 6 + deviation * error / 3);
+    }
+    for (size_t v = 0; v < m; ++v) {
+        const size_t u = find_in_sheet(&sheet, &loose, v);
+        size_t twins = 0;
+        for (size_t w = 0; w < m; ++w) twins += find_in_sheet(&sheet, &loose, w) == u;
+        memcpy(loose.mesh.colors + 3 * v, light + 3 * u, 12);
+        all[v].variance = sights[u].variance * (float)twins; /* the mean has the variance of the sheet */
+    }
+    assert_int_equal(fct_direct_smooth(&plain, &sheet, covered, sights, light), FCT_OK);
+    int taken = 0, left = 0, sure = 0;
+    for (size_t v = 0; v < n; ++v) {
+        double expected[3];
+        bool fits = false;
+        if (sights[v].variance > 0) fit_directly(&sheet, sights, before, v, expected, &fits);
+        for (size_t k = 0; k < 3; ++k) {
+            if (fits)
+                assert_near(light[3 * v + k], expected[k], 2e-6);
+            else
+                assert_true(light[3 * v + k] == before[3 * v + k]);
+            const float x = sheet.mesh.positions[3 * v];
+            if (x > .1F && x < .9F && (x < .4F || x > .6F)) {
+                const double level = (1 + .3 * (double)x + (x > .5F ? 1 : 0)) * (double)(k + 1) / 6;
+                noise += pow(before[3 * v + k] - level, 2), rest += pow(light[3 * v + k] - level, 2);
+            }
+        }
+        taken += fits, left += !fits && sights[v].variance > 0, sure += sights[v].variance == 0;
+    }
+    printf("    %d fits, %d misfits, %d without noise; the noise is %.2f of that before\n", taken, left, sure,
+           sqrt(rest / noise));
+    assert_true(taken > 90 && left > 10 && sure > 10 && rest < .25 * noise);
+    assert_int_equal(fct_direct_smooth(&plain, &loose, covered, all, loose.mesh.colors), FCT_OK);
+    for (size_t v = 0; v < m; ++v)
+        for (size_t k = 0; k < 3; ++k)
+            assert_near(loose.mesh.colors[3 * v + k], light[3 * find_in_sheet(&sheet, &loose, v) + k], 2e-6);
+    /* Covered vertices, and those that are not flat, neither give nor take. */
+    memset(covered, 1, m), memcpy(light, before, 3 * n * sizeof *light);
+    assert_int_equal(fct_direct_smooth(&plain, &sheet, covered, sights, light), FCT_OK);
+    assert_memory_equal(light, before, 3 * n * sizeof *light);
+    memset(covered, 0, m), memset(sheet.flat, 0, n);
+    assert_int_equal(fct_direct_smooth(&plain, &sheet, covered, sights, light), FCT_OK);
+    assert_memory_equal(light, before, 3 * n * sizeof *light);
+    free(sights), free(all), free(before), free(covered);
+    fct_surface_release(&plain, &sheet), fct_surface_release(&plain, &loose);
+    fct_scene_destroy(scene);
+}
+
 /* Difference against 10 % of the sum plus 4 % of the scene's mean, summed over channels. */
 static void borders_are_relative_and_absolute(void **state) {
     (void)state;
@@ -363,6 +548,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(probes_beside_a_rim_know_the_side),
         cmocka_unit_test(noise_on_flat_surfaces_is_smoothed),
+        cmocka_unit_test(triangles_without_common_vertices_are_smoothed_alike),
+        cmocka_unit_test(noise_of_shadow_rays_is_smoothed),
         cmocka_unit_test(borders_are_relative_and_absolute),
         cmocka_unit_test(smaller_errors_get_more_rays),
         cmocka_unit_test(radiosity_is_emission_plus_reflection),

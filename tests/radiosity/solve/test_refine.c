@@ -87,8 +87,8 @@ static bool is_turned_away(const fct_element *e, v3 u, double sine) {
     return acos(fmin(fmax(cosine, -1), 1)) - e->cone - asin(fmin(sine, 1)) > pi / 2;
 }
 
-/* True if triangle f has no corner in front of the plane of triangle e. A hundred-thousandth of its size, and
- * roundings of float coordinates, are in the plane. */
+/* True if triangle f has no corner in front of the plane of triangle e. A hundred-thousandth of the smaller
+ * one, and roundings of float coordinates, are in the plane. */
 static bool is_hidden(const fct_elements *set, const fct_element *e, const fct_element *f) {
     double highest = -INFINITY, largest = 0;
     if (e->kind != FCT_ELEMENT_TRIANGLE || f->kind != FCT_ELEMENT_TRIANGLE) return false;
@@ -100,7 +100,7 @@ static bool is_hidden(const fct_elements *set, const fct_element *e, const fct_e
         v3 corner = v3_load(set->corners + 9 * (size_t)f->triangle + 3 * k);
         highest = fmax(highest, v3_dot(v3_unit(e->vector), v3_sub(corner, e->center)));
     }
-    return highest <= 1e-5 * f->radius + 4.8e-7 * largest;
+    return highest <= 1e-5 * fmin(e->radius, f->radius) + 4.8e-7 * largest;
 }
 
 /* Mean over point pairs [from, to) of the kernel (`clear`), and of those that see each other. */
@@ -356,7 +356,30 @@ static void links_follow_the_rules(void **state) {
     for (size_t k = 0; k < sizeof all / sizeof(int); ++k) assert_true(met[k] > 0);
 }
 
-/* Links of a scene after a first pass, solved. */
+/* A small square that faces a ground of a million times its area from close by has links to it. */
+static void small_faces_see_huge_ones(void **state) {
+    (void)state;
+    fct_scene *scene;
+    fct_elements set;
+    fct_links links;
+    plain = fct_env_default();
+    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &scene), FCT_OK);
+    place_sheet(&plain, scene, add_colour(scene, 1, 1, false), 1, v3_make(-1000, -900, 0),
+                v3_make(2000, 0, 0), v3_make(0, 2000, 0));
+    place_sheet(&plain, scene, add_colour(scene, 2, 1, false), 1, v3_make(0, 0, .005), v3_make(0, 1, 0),
+                v3_make(1, 0, 0));
+    assert_int_equal(fct_scene_commit(scene), FCT_OK);
+    assert_int_equal(fct_elements_create(&plain, scene, 1e4, &set), FCT_OK);
+    assert_int_equal(fct_links_create(&plain, &links), FCT_OK);
+    assert_int_equal(refine_links(&set, &links, 1e-15), FCT_OK);
+    int lit = 0;
+    for (size_t i = 0; i < links.count; ++i) lit += links.items[i].rays > 0;
+    assert_int_equal(lit, 8);
+    fct_links_release(&plain, &links);
+    fct_elements_release(&set);
+    fct_scene_destroy(scene);
+}
+
 /* Two squares with a common edge, at an angle in radians above the plane of one: links exist if they see each
  * other. */
 static void flat_edges_have_no_links(void **state) {
@@ -385,6 +408,7 @@ static void flat_edges_have_no_links(void **state) {
     }
 }
 
+/* Links of a scene after a first pass, solved. */
 typedef struct refined {
     fct_elements set;
     fct_links links;
@@ -575,6 +599,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(links_follow_the_rules),
         cmocka_unit_test(flat_edges_have_no_links),
+        cmocka_unit_test(small_faces_see_huge_ones),
         cmocka_unit_test(a_limit_leaves_small_errors),
         cmocka_unit_test(the_largest_error_is_split_first),
         cmocka_unit_test(truncated_elements_can_be_split_again),
