@@ -1,6 +1,7 @@
 /* radiosity/light/lamp.c: see lamp.h.
  *
- * 1. fct_lamp_estimate gives a rough light of every lamp; their sum is `total`.
+ * 1. fct_lamp_estimate gives a rough light of every lamp; their sum, and the receiver's light from
+ * elsewhere, is `total`.
  * 2. A major lamp, whose estimate exceeds MAJOR_SHARE of the total, gets its exact light without blockers
  * times a visible fraction from its own rays.
  * 3. The minor lamps bring their exact light too, but they share one set of rays and one visible fraction per

@@ -32,9 +32,12 @@ enum { BORDER_ROUNDS = 4 };
 /* Edges below max_edge over this are not split again. */
 #define SHORT_EDGES 24
 /* Least differences across a border: of the two vertices' sum, and of the scene's mean radiosity. Smaller
- * values split edges because of noise. */
+ * values split edges because of noise. Long edges (above max_edge / LONG_EDGES) count LONG_SHARE of that: the
+ * end of a penumbra on one of them shows as a dark tongue in the light. */
 #define BORDER_SHARE .1
 #define BORDER_LEVEL .04
+#define LONG_EDGES   5
+#define LONG_SHARE   .6
 /* Rays per anchor, and first rays per lamp, at the default error. Two rays that agree often miss a penumbra,
  * but those of a vertex and its neighbours together seldom do. */
 enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
@@ -103,7 +106,7 @@ static double find_slack(const lighting *l, size_t v) {
     return slack * (area > 0 ? fct_min(fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK);
 }
 
-/* Once the indirect light is known. doubt, irradiance: as in fct_lamps_direct. */
+/* Once the indirect light is known. doubt: as in fct_lamp_goal; irradiance: as in fct_lamps_direct. */
 static void gather_lamps(const lighting *l, size_t v, const float normal[3], uint32_t doubt,
                          double irradiance[3], uint64_t *rays) {
     const fct_solution *s = l->s;
@@ -461,14 +464,14 @@ static fct_result check_light(lighting *l, fct_check *check, uint64_t *rays) {
     return result;
 }
 
-bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity) {
+bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity, bool is_long) {
     double difference = 0, level = 0;
     for (int c = 0; c < 3; ++c) {
         double x = a[c], y = b[c];
         difference += fabs(x - y);
         level += x + y;
     }
-    return difference > BORDER_SHARE * level + BORDER_LEVEL * mean_radiosity;
+    return difference > (is_long ? LONG_SHARE : 1) * (BORDER_SHARE * level + BORDER_LEVEL * mean_radiosity);
 }
 
 static double cut_at_border(void *user, uint32_t a, uint32_t b) {
@@ -477,8 +480,9 @@ static double cut_at_border(void *user, uint32_t a, uint32_t b) {
     const size_t i = 3 * (size_t)a, j = 3 * (size_t)b;
     if (l->covered[a] || l->covered[b]) return 0;
     double length = v3_norm(v3_sub(v3_load(m->positions + i), v3_load(m->positions + j)));
+    const bool is_long = length > l->s->max_edge / LONG_EDGES;
     bool crosses = length >= l->s->max_edge / SHORT_EDGES &&
-                   fct_output_crosses_border(m->colors + i, m->colors + j, l->s->mean_radiosity);
+                   fct_output_crosses_border(m->colors + i, m->colors + j, l->s->mean_radiosity, is_long);
     return crosses ? .5 : 0;
 }
 

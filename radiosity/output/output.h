@@ -31,7 +31,8 @@ void fct_output_take(const fct_solution *s, fct_surface *surface, bool back, fct
 uint32_t fct_output_sides(const fct_solution *s, uint32_t instance, bool back[2]);
 
 /* True if the radiosities of two neighbouring vertices differ so much that the edge must be split: by more
- * than 10 % of their sum plus 4 % of the scene's mean radiosity, summed over channels. */
-bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity);
+ * than 10 % of their sum plus 4 % of the scene's mean radiosity, summed over channels; .6 times that on an
+ * edge above a fifth of max_edge. */
+bool fct_output_crosses_border(const float a[3], const float b[3], double mean_radiosity, bool is_long);
 
 #endif

@@ -352,9 +352,10 @@ static double has_border(void *user, uint32_t a, uint32_t b) {
     const float *y = x->f.mesh.colors + 3 * (size_t)a, *z = x->f.mesh.colors + 3 * (size_t)b;
     double difference = 0, sum = 0;
     for (int c = 0; c < 3; ++c) difference += fabs((double)y[c] - z[c]), sum += (double)y[c] + z[c];
-    bool result = difference > .1 * sum + .04 * x->s->mean_radiosity &&
-                  v3_norm(v3_sub(v3_load(p), v3_load(q))) >= x->s->max_edge / 24 && !x->covered[a] &&
-                  !x->covered[b];
+    const double length = v3_norm(v3_sub(v3_load(p), v3_load(q)));
+    const double least = .1 * sum + .04 * x->s->mean_radiosity;
+    bool result = difference > (length > x->s->max_edge / 5 ? .6 : 1) * least &&
+                  length >= x->s->max_edge / 24 && !x->covered[a] && !x->covered[b];
     x->borders += result;
     return result ? .5 : 0;
 }

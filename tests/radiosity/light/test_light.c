@@ -109,7 +109,15 @@ typedef struct eye {
     double other, slack;     /* of the goal */
     uint32_t doubt, counted; /* rays to lamps outside these slots do not count */
     fct_sight sight;
+    double variance; /* of the light */
 } eye;
+
+/* Adds the variance of light whose visible fraction has `square` f (1 - f), with one more ray that is half
+ * visible. */
+static void add_variance(eye *q, double power, double visible, uint32_t sent, double square) {
+    const double f = (visible * sent + .5) / (sent + 1);
+    q->variance += power * power * square * f * (1 - f);
+}
 
 /* Rays for a standard error of 1.8 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
  * f)) / n^(3/4) with one more ray that is half visible, in steps of 4 up to 64. */
@@ -159,6 +167,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
         if (fixed || (all > 0 && (seen == 0 || seen == all))) break;
         goal = count_rays(q, base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
     }
+    if (seen > 0 && seen < all) add_variance(q, power, seen / all, sent, .36 / pow(sent, 1.5));
     return all > 0 ? seen / all : 0;
 }
 
@@ -199,7 +208,7 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     fct_receiver recs[64];
     double shares[64], total = q->other, open = 0, minor_sum = 0, light[3] = {0, 0, 0};
     bool minor[64] = {false};
-    e[0] = e[1] = e[2] = 0;
+    e[0] = e[1] = e[2] = q->variance = 0;
     for (uint32_t i = 0; i < h->count; ++i) {
         recs[i] = fct_lamp_receiver(&h->own[i], point, normal);
         total += shares[i] = fct_lamp_estimate(&h->own[i], &recs[i]) * h->own[i].strength;
@@ -226,11 +235,13 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
             (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .018 * base / q->slack, 2), 4), 16);
         const bool doubt = q->doubt >> 31 && base < enough && !fixed;
         bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, q->doubt >> 31, all, seen);
+        uint32_t sent = base;
         if ((mixed || doubt || all[0] + all[1] + all[2] == 0) && base < enough && !fixed)
-            see_minor_lamps(q, recs, shares, minor, minor_sum, enough, false, all, seen);
+            see_minor_lamps(q, recs, shares, minor, minor_sum, sent = enough, false, all, seen);
         double grey = all[0] + all[1] + all[2];
         grey = grey > 0 ? (seen[0] + seen[1] + seen[2]) / grey : 1;
         for (int c = 0; c < 3; ++c) e[c] += light[c] * (all[c] > 0 ? seen[c] / all[c] : grey);
+        if (grey > 0 && grey < 1) add_variance(q, light[0] + light[1] + light[2], grey, sent, 1. / sent);
     }
     return open;
 }
@@ -272,6 +283,7 @@ static void halls_are_lit_by_the_rules(void **state) {
             }
             assert_int_equal(rays, q.rays);
             assert_int_equal(sight.open, q.sight.open), assert_int_equal(sight.blocked, q.sight.blocked);
+            assert_near((double)sight.variance, q.variance, 1e-12 + 1e-5 * q.variance);
             partly += (sight.open & sight.blocked) != 0, minors += (sight.open & sight.blocked) >> 31;
             for (int c = 0; c < 3; ++c) assert_near(e[c], expected[c], 1e-9 + 1e-6 * expected[c]);
             assert_near(fraction, all > 0 ? (e[0] + e[1] + e[2]) / all : 0, 1e-6);

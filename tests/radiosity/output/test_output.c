@@ -284,13 +284,16 @@ static void borders_are_relative_and_absolute(void **state) {
     const float a[3] = {1, 1, 1}, near[3] = {1, 1, .413F}, far[3] = {1, 1, .375F}, dark[3] = {0, 0, 0},
                 dim[3] = {.03F, 0, 0};
     /* 3 + 2 + x: |1 - x| = .1 (5 + x) + .04 at x = .41818 */
-    assert_false(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 1));
-    assert_true(fct_output_crosses_border(a, near, 1));
+    assert_false(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 1, false));
+    assert_true(fct_output_crosses_border(a, near, 1, false));
     /* without the scene's level at x = .4545 */
-    assert_true(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 0));
-    assert_true(fct_output_crosses_border(far, a, 1));
-    assert_false(fct_output_crosses_border(dark, dim, 1)),
-        assert_true(fct_output_crosses_border(dark, dim, .5));
+    assert_true(fct_output_crosses_border(a, (const float[3]){1, 1, .44F}, 0, false));
+    assert_true(fct_output_crosses_border(far, a, 1, false));
+    /* .6 times that: |1 - x| = .06 (5 + x) + .024 at x = .6377 */
+    assert_true(fct_output_crosses_border(a, (const float[3]){1, 1, .636F}, 1, true));
+    assert_false(fct_output_crosses_border(a, (const float[3]){1, 1, .64F}, 1, true));
+    assert_false(fct_output_crosses_border(dark, dim, 1, false)),
+        assert_true(fct_output_crosses_border(dark, dim, .5, false));
 }
 
 static void smaller_errors_get_more_rays(void **state) {
