@@ -2,7 +2,8 @@
  *
  * Input: the cluster tree. Output: leaves in order of place; each face is in one leaf. A leaf is the largest
  * cluster of at most 16 faces and 16 vertices. It stores each vertex once and its corners as bytes: at most
- * 256 bytes, about 22 bytes per triangle on a scan. O(F), in parallel but for the walk to the clusters.
+ * 256 bytes, about 22 bytes per triangle on a scan. O(F): the leaves are chosen and packed in parallel, but
+ * one thread lists the clusters, adds up their surfaces and numbers the leaves.
  *
  * A line through a scan meets the boxes of one or two leaves. Where a model fills its volume, as stacked
  * blocks do, boxes overlap and a line meets dozens. Then leaves of few faces save more than they cost.
@@ -65,7 +66,9 @@ static uint32_t list_candidates(const fct_tree *tree, uint32_t most, uint32_t *s
 #define DENSE 16
 enum { DENSE_FACES = 6 };
 
-/* A line that meets the bounds meets a box inside with the probability of their ratio of surfaces. */
+/* A line that meets the bounds meets a box inside with the probability of their ratio of surfaces. Bounds
+ * without surface are not dense. Many copies of one triangle are dense: small leaves gain nothing there, and
+ * lose nothing but memory. */
 static bool is_dense(const fct_bvh *bvh, const uint32_t *candidates, uint32_t count) {
     const fct_bounds *b = &bvh->bounds;
     double side[3], sum = 0;
@@ -76,7 +79,8 @@ static bool is_dense(const fct_bvh *bvh, const uint32_t *candidates, uint32_t co
         double x = (double)half[0], y = (double)half[1], z = (double)half[2];
         sum += 4 * (x * y + y * z + z * x);
     }
-    return sum > DENSE * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]);
+    double surface = side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
+    return surface > 0 && sum > DENSE * surface;
 }
 
 /* Per place: the cluster whose leaf starts there, or FCT_NONE, and the size of that leaf. */

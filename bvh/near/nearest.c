@@ -18,7 +18,7 @@
 enum { WAITING_MAX = 32 };
 
 /* Searches of a batch that go on in turns. While one waits for memory, the others compute. With four, a point
- * near a torso of a million triangles takes 1.13 times as long, with sixteen as long. */
+ * near a torso of a million triangles takes 1.13 times as long, with sixteen the same time. */
 enum { LANES = 8 };
 
 typedef struct waiting_triangle {

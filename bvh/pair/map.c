@@ -10,6 +10,9 @@
 #define FLOAT_ERROR 0x1p-18
 /* No vertex of a model is farther from its centre. */
 #define MODEL_RADIUS 1.75
+/* Lengths of the pose and of one model beside the other model are at most this, so that floats can hold them.
+ */
+#define MAX_RATIO 1e30
 
 fct_pose fct_pose_identity(void) {
     return (fct_pose){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
@@ -55,7 +58,7 @@ static void invert_map(const fct_space_map *other, fct_space_map *out) {
     out->shift[0] = shift.x, out->shift[1] = shift.y, out->shift[2] = shift.z;
 }
 
-/* Sets what the placing of a box needs, from turn, factor, skew and blur. */
+/* Sets what the placing of a box needs, from turn, factor, skew and blur, which are set already. */
 static void prepare_placing(fct_space_map *map) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
@@ -77,15 +80,16 @@ bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, 
     v3 translation = v3_make(pose->translation[0], pose->translation[1], pose->translation[2]);
     v3 center = find_center(a), shift = v3_scale(v3_sub(v3_add(moved, translation), center), a->scale);
     double far = (sum_sizes(moved) + sum_sizes(translation) + sum_sizes(center)) * a->scale;
-    if (!(far < 1e100)) return false;
+    factor *= a->scale / b->scale;
+    if (!(factor > 1 / MAX_RATIO && factor < MAX_RATIO && far < MAX_RATIO * fct_min(factor, 1))) return false;
     out->to_a.shift[0] = shift.x, out->to_a.shift[1] = shift.y, out->to_a.shift[2] = shift.z;
-    out->to_a.factor = factor * (a->scale / b->scale);
-    prepare_placing(&out->to_a);
-    out->to_a.blur = (far + out->to_a.factor) * 0x1p-48;
+    out->to_a.factor = factor;
+    out->to_a.blur = (far + factor) * 0x1p-48;
     invert_map(&out->to_a, &out->to_b);
+    prepare_placing(&out->to_a);
     prepare_placing(&out->to_b);
-    out->volume_of_b = (float)(out->to_a.factor * out->to_a.factor * out->to_a.factor);
-    return out->to_a.factor > 1e-30 && out->to_a.factor < 1e30;
+    out->volume_of_b = (float)fct_min(factor * factor * factor, 1e38);
+    return true;
 }
 
 void fct_pair_triangle_a(const fct_pair_map *map, uint32_t place, v3 p[3]) {

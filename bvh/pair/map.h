@@ -30,8 +30,8 @@ typedef struct fct_pair_map {
     float volume_of_b;        /* volumes in b's scaled unit, times this, are in a's */
 } fct_pair_map;
 
-/* Returns false if a query cannot be answered: no FCT_BVH_PAIRS, or a pose that is not finite, or too large
- * or too small for double arithmetic. */
+/* Returns false if a query cannot be answered: no FCT_BVH_PAIRS, or a pose that is not finite, or ratios of
+ * lengths above 1e30. */
 bool fct_pair_map_set(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_map *out);
 
 /* The corners of a face of a, and of a face of b in the coordinates of a: collide.h says how they are
@@ -42,7 +42,7 @@ void fct_pair_triangle_b(const fct_pair_map *map, uint32_t place, v3 p[3]);
 /* A box of one model in the space of the other. */
 typedef struct fct_placed_box {
     uint32_t box;                         /* its name; FCT_NONE before the first use */
-    float center[4], half[3], axes[3][8]; /* three of each count */
+    float center[4], half[3], axes[3][8]; /* the first three of each row are used */
     float slack;
     double exact_center[4];
 } fct_placed_box;

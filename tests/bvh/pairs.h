@@ -51,6 +51,29 @@ static inline void posed_corners(const fct_mesh *mesh, const fct_pose *pose, uin
     for (int c = 0; c < 3; ++c) p[c] = pose_point(pose, p[c]);
 }
 
+/* A grid over [-1, 1]^2 in the plane x = 1e12, and a pose that puts its lowest corner near a point of the
+ * grid z = 0. Double arithmetic in this pose errs by about 1e-4. */
+#define FAR_SHEET_X 0x1.d1a94ap39
+static inline fct_mesh make_far_sheet(const fct_env *env, uint32_t n) {
+    fct_mesh mesh = make_grid(env, n);
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+        float *p = mesh.positions + 3 * v;
+        p[2] = 2 * p[1] - 1, p[1] = 2 * p[0] - 1, p[0] = (float)FAR_SHEET_X;
+    }
+    return mesh;
+}
+static inline fct_pose place_far_sheet(uint64_t *seed) {
+    fct_pose pose = random_pose(seed, 0);
+    const double *low = pose.rotation[2];
+    double y = low[1] > 0 ? -1 : 1, z = low[2] > 0 ? -1 : 1;
+    for (int k = 0; k < 3; ++k) {
+        const double *r = pose.rotation[k];
+        double at = k < 2 ? .2 + .6 * random_unit(seed) : 4e-4 * random_unit(seed) - 2e-4;
+        pose.translation[k] = at - (r[0] * FAR_SHEET_X + r[1] * y + r[2] * z);
+    }
+    return pose;
+}
+
 /* The inverse of a rigid pose. */
 static inline fct_pose invert_pose(const fct_pose *pose) {
     fct_pose out;

@@ -190,32 +190,50 @@ static void equal_faces_go_to_the_lower_id(void **state) {
     model_release(&env, &m);
 }
 
-/* A batch on a large model takes turns. Every point gets the answer that it gets alone; bad points get none.
- */
+/* A batch on a large model takes turns, but not for points that are close to the one before. Every point gets
+ * the answer that it gets alone; bad points get none. */
 static void points_in_turns_find_the_same(void **state) {
     (void)state;
     enum { COUNT = 603 };
     fct_env env = fct_env_default();
+    fct_bvh_def def = fct_bvh_def_default();
     model m = model_make(&env, make_pebble(&env, 24, 5), FCT_BACKEND_OBB);
-    m.bvh->leaf_bytes += 64 << 20; /* for the choice only */
+    fct_bvh *plain = m.bvh, *with_sign;
+    def.parts = FCT_BVH_SIGN;
+    assert_int_equal(fct_bvh_build(&env, m.tree, &def, &with_sign), FCT_OK);
+    plain->leaf_bytes += 64 << 20, with_sign->leaf_bytes += 64 << 20; /* for the choice only */
     uint64_t seed = 6;
-    float points[3 * COUNT];
-    fct_closest many[COUNT];
-    size_t found = 0;
-    for (size_t i = 0; i < COUNT; ++i)
-        v3_store(points + 3 * i, v3_scale(random_direction(&seed), 3 * random_unit(&seed)));
-    points[3 * 7] = NAN, points[3 * 602] = INFINITY;
+    float spread[3 * COUNT], grid[3 * COUNT];
+    fct_closest many[COUNT], one;
+    for (size_t i = 0; i < COUNT; ++i) {
+        v3_store(spread + 3 * i, v3_scale(random_direction(&seed), 3 * random_unit(&seed)));
+        v3_store(grid + 3 * i, v3_make(.03 * (double)(i % 67), .2 * (double)(i / 67), .1));
+    }
+    spread[3 * 7] = NAN, spread[3 * 602] = INFINITY;
     const size_t counts[] = {1, 201, COUNT};
-    for (size_t c = 0; c < 3; ++c) {
-        const size_t count = counts[c];
-        fct_bvh_closest_points(m.bvh, count, points, 1, many);
+    const float reaches[] = {1, -1};
+    size_t found = 0, inside = 0;
+    for (size_t c = 0; c < 12; ++c) {
+        const size_t count = counts[c % 3];
+        const float *points = c / 3 % 2 ? grid : spread, reach = reaches[c / 6];
+        fct_bvh_closest_points(plain, count, points, reach, many);
         for (size_t i = 0; i < count; ++i) {
-            fct_closest one;
-            found += fct_bvh_closest_point(m.bvh, points + 3 * i, 1, &one, NULL);
+            found += fct_bvh_closest_point(plain, points + 3 * i, reach, &one, NULL);
             assert_memory_equal(&many[i], &one, sizeof one);
         }
+        fct_bvh_signed_distances(with_sign, count, points, reach, many);
+        for (size_t i = 0; i < count; ++i) {
+            fct_bvh_signed_distance(with_sign, points + 3 * i, reach, &one, NULL);
+            assert_memory_equal(&many[i], &one, sizeof one);
+            inside += one.distance < 0;
+        }
+        /* Without FCT_BVH_SIGN, no point gets an answer. */
+        fct_bvh_signed_distances(plain, count, points, reach, many);
+        for (size_t i = 0; i < count; ++i) assert_int_equal(many[i].face, FCT_NONE);
     }
-    assert_true(found > 400 && found < 700);
+    assert_in_range(found, 1000, 1500);
+    assert_in_range(inside, 200, 700);
+    fct_bvh_destroy(with_sign);
     model_release(&env, &m);
 }
 

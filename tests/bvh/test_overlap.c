@@ -172,6 +172,23 @@ static void sizes_and_places(void **state) {
     assert_true(met > total / 4);
 }
 
+/* Corners of b that arithmetic moves by more than float arithmetic moves boxes. */
+static void a_far_sheet(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    model a = pair_model_make(&env, make_grid(&env, 8)), b = pair_model_make(&env, make_far_sheet(&env, 8));
+    uint64_t seed = 80;
+    size_t met = 0;
+    const int count = SANITIZED ? 20 : 150;
+    for (int i = 0; i < count; ++i) {
+        fct_pose pose = place_far_sheet(&seed);
+        met += check_pose(&a, &b, &pose) > 0;
+    }
+    assert_in_range(met, count / 5, count - 1);
+    model_release(&env, &a);
+    model_release(&env, &b);
+}
+
 static void self_pairs(void **state) {
     (void)state;
     fct_env env = fct_env_default();
@@ -265,6 +282,19 @@ static void calls_without_answers(void **state) {
         }
     }
     assert_int_equal(fct_bvh_pairs(m.bvh, m.bvh, NULL, 0, 0, NULL, NULL), 0);
+    /* Ratios up to 1e30 have answers: of the shift beside a, of the shift beside b, and of the models. */
+    for (int k = 0; k < 3; ++k)
+        for (int beyond = 0; beyond < 2; ++beyond) {
+            fct_pose large = fct_pose_identity();
+            fct_distance distance;
+            double ratio = beyond ? 1e31 : 1e29;
+            for (int r = 0; r < 3; ++r)
+                if (k) large.rotation[r][r] = k == 1 ? 1e-5 : ratio;
+            if (k < 2) large.translation[1] = k ? ratio * 1e-5 : ratio;
+            assert_int_equal(fct_bvh_distance(m.bvh, m.bvh, &large, NULL, NULL, &distance, NULL), !beyond);
+            if (k < 2 && !beyond) assert_true(fabs(distance.distance / large.translation[1] - 1) < 1e-12);
+            assert_false(k < 2 && fct_bvh_overlap(m.bvh, m.bvh, &large, NULL, NULL));
+        }
     /* A stale hint is not believed. */
     fct_face_pair hint = {5, 5, 1000000, 3};
     pose.translation[0] = 9;
@@ -344,6 +374,7 @@ int main(void) {
         cmocka_unit_test(any_matrix),
         cmocka_unit_test(coincident_models),
         cmocka_unit_test(sizes_and_places),
+        cmocka_unit_test(a_far_sheet),
         cmocka_unit_test(self_pairs),
         cmocka_unit_test(searches_visit_few),
         cmocka_unit_test(contacts_of_flat_faces),

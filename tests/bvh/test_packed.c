@@ -456,6 +456,20 @@ static void leaves_of_a_dense_model_are_small(void **state) {
     model_release(&env, &many);
 }
 
+/* A model on a line has no surface to compare. */
+static void leaves_of_a_line_are_large(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh mesh = make_grid(&env, 16);
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+        float *p = mesh.positions + 3 * (size_t)v;
+        p[0] += .37f * p[1], p[1] = .3f, p[2] = .7f;
+    }
+    model line = model_make(&env, mesh, FCT_BACKEND_OBB);
+    assert_true(largest_leaf(line.bvh) > 6);
+    model_release(&env, &line);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(boxes_hold_their_vertices_with_the_documented_padding),
@@ -464,6 +478,7 @@ int main(void) {
         cmocka_unit_test(spans_name_the_clusters_around_their_leaves),
         cmocka_unit_test(the_collapse_has_the_least_cost),
         cmocka_unit_test(leaves_of_a_dense_model_are_small),
+        cmocka_unit_test(leaves_of_a_line_are_large),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
