@@ -180,8 +180,8 @@ fct_result fct_direct_smooth(const fct_env *env, const fct_surface *f, const uin
         variances[v] /= (float)counts[v] * (float)counts[v];
         places[v] = can_mix(f, covered, v) && variances[v] > 0 ? noisy++ : FCT_NONE;
     }
-    fits = fct_allocate_zero(env, noisy, sizeof *fits);
-    if (!fits && noisy > 0) {
+    if (noisy > 0) fits = fct_allocate_zero(env, noisy, sizeof *fits);
+    if (noisy > 0 && !fits) {
         result = fct_fail_memory(env, "the output");
         goto done;
     }

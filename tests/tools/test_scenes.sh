@@ -66,8 +66,8 @@ check "the method is named" test "$(value method)" = reference
 
 # A target for the error: bakes until the estimate is there, with more rays each time.
 expect 0 make cornell -o cornell --triangles 100 --quiet
-expect 0 bake cornell/scene.json -o lit.ply --max-edge .15 --error 4% --json
-holds "$(value error_estimate) > 0 && $(value error_estimate) <= .04"
+expect 0 bake cornell/scene.json -o lit.ply --max-edge .15 --error 3% --json
+holds "$(value error_estimate) > 0 && $(value error_estimate) <= .03"
 holds "$(value error) < 2e-5 && $(value check_rays) > 1000"
 check "objects have errors" grep -q '"object": "tall_block"' out
 expect 64 bake cornell/scene.json --probe probes.txt --error 2%
