@@ -11,22 +11,41 @@
 /* Difference of two neighbours over the sum of their light that may be noise of the rays. Larger values blur
  * contacts, smaller ones leave the noise of anchors that are close together. */
 #define NOISE .1
+/* Least standard error of direct light, as a share of it: rays that agree may have missed something. */
+#define LEAST_NOISE .005
+/* Chi-square per degree of freedom above which the light is not linear. */
+#define MOST_MISFIT 2.5
 /* Passes: each reaches one edge further. */
 enum { PASSES = 2 };
-/* Vertices of other normals at one position that the search for a twin looks at. */
-enum { MOST_NORMALS = 8 };
+/* Vertices at one position, without twins, that the search for a twin looks at. */
+enum { MOST_OTHERS = 8 };
 
 static bool can_mix(const fct_surface *f, const uint8_t *covered, uint32_t v) {
     return f->flat[v] && !covered[v];
 }
 
-/* twins[v]: the lowest flat vertex that is not covered at the position of v and in its plane, v if there is
- * none. Triangles of one plane that share no vertices meet there. */
+/* Difference of the light of two vertices over the largest that may be noise. */
+static double compare_light(const float *light, uint32_t a, uint32_t b) {
+    const float *x = light + 3 * (size_t)a, *y = light + 3 * (size_t)b;
+    double difference = 0, level = 0;
+    for (int c = 0; c < 3; ++c) difference += fabs((double)x[c] - y[c]), level += (double)x[c] + y[c];
+    return level > 0 ? difference / (level * NOISE) : 0;
+}
+
+/* Two vertices at one position count as one if both can mix, they are in one plane, and their light is alike:
+ * a wall may stand between them. */
+static bool are_twins(const fct_surface *f, const uint8_t *covered, const float *light, uint32_t a,
+                      uint32_t b) {
+    return can_mix(f, covered, a) && can_mix(f, covered, b) && compare_light(light, a, b) < 1 &&
+           fct_shading_same(v3_load(f->normals + 3 * (size_t)a), v3_load(f->normals + 3 * (size_t)b));
+}
+
+/* twins[v]: the lowest twin of v, or v. Triangles of one plane that share no vertices have them. */
 static fct_result find_twins(const fct_env *env, const fct_surface *f, const uint8_t *covered,
-                             uint32_t *twins) {
+                             const float *light, uint32_t *twins) {
     const uint32_t count = f->mesh.vertex_count;
-    uint32_t *first,
-        *next; /* per vertex: the lowest one at its position; the next one there that has no twin */
+    uint32_t *first; /* per vertex: the lowest one at its position */
+    uint32_t *next;  /* per vertex: the next one there that has no lower twin */
     const fct_array arrays[] = {FCT_ARRAY(first, count), FCT_ARRAY(next, count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
     if (result != FCT_OK) return result;
@@ -35,12 +54,9 @@ static fct_result find_twins(const fct_env *env, const fct_surface *f, const uin
         twins[v] = v, next[v] = FCT_NONE;
         uint32_t u = first[v];
         for (int k = 0; u != v && twins[v] == v; ++k) {
-            const bool same =
-                can_mix(f, covered, u) && can_mix(f, covered, v) &&
-                fct_shading_same(v3_load(f->normals + 3 * (size_t)u), v3_load(f->normals + 3 * (size_t)v));
-            if (same) twins[v] = u;
-            if (k == MOST_NORMALS) break;
-            if (next[u] == FCT_NONE) next[u] = v;
+            if (are_twins(f, covered, light, u, v)) twins[v] = u;
+            if (k == MOST_OTHERS) break;
+            if (twins[v] == v && next[u] == FCT_NONE) next[u] = v;
             u = next[u];
         }
     }
@@ -67,10 +83,8 @@ static void spread_twins(const uint32_t *twins, uint32_t count, float *light) {
 
 /* Adds the light of vertex b to the sum of vertex a (light and weight). */
 static void add_neighbour(const float *light, uint32_t a, uint32_t b, float *sums) {
-    const float *x = light + 3 * (size_t)a, *y = light + 3 * (size_t)b;
-    double difference = 0, level = 0;
-    for (int c = 0; c < 3; ++c) difference += fabs((double)x[c] - y[c]), level += (double)x[c] + y[c];
-    double apart = level > 0 ? difference / (level * NOISE) : 0;
+    const float *y = light + 3 * (size_t)b;
+    const double apart = compare_light(light, a, b);
     if (apart >= 1) return;
     float weight = (float)((1 - apart * apart) * (1 - apart * apart));
     for (int c = 0; c < 3; ++c) sums[4 * (size_t)a + (size_t)c] += weight * y[c];
@@ -85,7 +99,7 @@ fct_result fct_light_smooth(const fct_env *env, const fct_surface *f, const uint
                                 FCT_ARRAY(twins, m->vertex_count), FCT_ARRAY(counts, m->vertex_count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
     if (result != FCT_OK) return result;
-    result = find_twins(env, f, covered, twins);
+    result = find_twins(env, f, covered, light, twins);
     if (result == FCT_OK) join_twins(twins, m->vertex_count, counts, light);
     for (int pass = 0; pass < PASSES && result == FCT_OK; ++pass) {
         memset(sums, 0, 4 * (size_t)m->vertex_count * sizeof *sums);
@@ -110,11 +124,6 @@ fct_result fct_light_smooth(const fct_env *env, const fct_surface *f, const uint
 typedef struct fit {
     double count, w, x, y, xx, xy, yy, t, tx, ty, tt, c[3], cx[3], cy[3];
 } fit;
-
-/* (.5 % of the light)^2: two points with the same light still differ by what rays that agree have missed. */
-#define LEAST_NOISE .005
-/* Chi-square per degree of freedom above which the light is not linear. */
-#define MOST_MISFIT 2.5
 
 static double sum_channels(const float *light) {
     return (double)light[0] + light[1] + light[2];
@@ -173,7 +182,7 @@ fct_result fct_direct_smooth(const fct_env *env, const fct_surface *f, const uin
                                 FCT_ARRAY_ZERO(variances, m->vertex_count)};
     fct_result result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the output");
     if (result != FCT_OK) return result;
-    if ((result = find_twins(env, f, covered, twins)) != FCT_OK) goto done;
+    if ((result = find_twins(env, f, covered, light, twins)) != FCT_OK) goto done;
     join_twins(twins, m->vertex_count, counts, light);
     for (size_t v = 0; v < m->vertex_count; ++v) variances[twins[v]] += sights[v].variance;
     for (uint32_t v = 0; v < m->vertex_count; ++v) {

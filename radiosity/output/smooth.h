@@ -1,4 +1,9 @@
-/* radiosity/output/smooth.h: reduces the noise of light on flat surfaces. */
+/* radiosity/output/smooth.h: reduces the noise of light on flat surfaces.
+ *
+ * Flat vertices at one position in one plane, such as those of triangles without common vertices, count as
+ * one with their mean light, unless their light differs by 10 % of the sum or more: a wall may stand between
+ * them.
+ */
 #ifndef FCT_RADIOSITY_SMOOTH_H
 #define FCT_RADIOSITY_SMOOTH_H
 
@@ -18,7 +23,7 @@ fct_result fct_light_smooth(const fct_env *env, const fct_surface *surface, cons
  * If a linear function over the plane explains the light within these, by chi-square per degree of freedom
  * of at most 2.5, the vertex receives its value, by weighted least squares. So a change of light that is
  * larger than the noise stays as it is. An edge of two faces counts twice, and so does the vertex itself.
- * Vertices without variance keep their light (per vertex x 3). Errors: MEMORY. */
+ * Light is per vertex x 3; a vertex without variance keeps it. Errors: MEMORY. */
 fct_result fct_direct_smooth(const fct_env *env, const fct_surface *surface, const uint8_t *covered,
                              const fct_sight *sights, float *light);
 

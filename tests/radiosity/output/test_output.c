@@ -161,6 +161,36 @@ static void triangles_without_common_vertices_are_smoothed_alike(void **state) {
     fct_scene_destroy(scene);
 }
 
+/* A wall above the seam of triangles keeps its two sides apart: light of 1 on the left, of 1.3 on the right.
+ */
+static void light_does_not_pass_walls_above_seams(void **state) {
+    (void)state;
+    fct_scene *scene = begin();
+    fct_surface sheet, loose;
+    make_sheets(scene, &sheet, &loose);
+    const size_t m = loose.mesh.vertex_count;
+    fct_sight *sights = calloc(m, sizeof *sights);
+    uint8_t *covered = calloc(m, 1);
+    float *light = malloc(3 * m * sizeof *light);
+    int seam = 0;
+    for (size_t v = 0; v < m; ++v) {
+        const float *p = loose.mesh.positions + 9 * (v / 3); /* triangle k has the vertices 3 k to 3 k + 2 */
+        const bool right = p[0] + p[3] + p[6] > 1.5F;
+        for (size_t k = 0; k < 3; ++k) light[3 * v + k] = right ? 1.3F : 1;
+        sights[v].variance = 1e-3F;
+        seam += right && fabsf(loose.mesh.positions[3 * v] - .5F) < 1e-4F;
+    }
+    assert_true(seam > 12);
+    memcpy(loose.mesh.colors, light, 3 * m * sizeof *light);
+    assert_int_equal(fct_light_smooth(&plain, &loose, covered, loose.mesh.colors), FCT_OK);
+    for (size_t i = 0; i < 3 * m; ++i) assert_near(loose.mesh.colors[i], light[i], 1e-5);
+    assert_int_equal(fct_direct_smooth(&plain, &loose, covered, sights, loose.mesh.colors), FCT_OK);
+    for (size_t i = 0; i < 3 * m; ++i) assert_near(loose.mesh.colors[i], light[i], 1e-5);
+    free(sights), free(covered), free(light);
+    fct_surface_release(&plain, &sheet), fct_surface_release(&plain, &loose);
+    fct_scene_destroy(scene);
+}
+
 /* Solves the 3 x 3 system for several right sides by elimination. */
 static void eliminate(double a[3][3], double b[3][4]) {
     for (int i = 0; i < 3; ++i)
@@ -552,6 +582,7 @@ int main(void) {
         cmocka_unit_test(probes_beside_a_rim_know_the_side),
         cmocka_unit_test(noise_on_flat_surfaces_is_smoothed),
         cmocka_unit_test(triangles_without_common_vertices_are_smoothed_alike),
+        cmocka_unit_test(light_does_not_pass_walls_above_seams),
         cmocka_unit_test(noise_of_shadow_rays_is_smoothed),
         cmocka_unit_test(borders_are_relative_and_absolute),
         cmocka_unit_test(smaller_errors_get_more_rays),
