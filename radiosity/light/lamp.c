@@ -108,8 +108,8 @@ static uint32_t count_wanted_rays(const query *q, double visible, uint32_t sent,
     return rays;
 }
 
-/* Adds the variance of light of `power` whose visible fraction comes from rays of which some were blocked.
- * deviation: the standard error of a fraction of 1/2, doubled. */
+/* Adds the variance of light of `power` whose visible fraction f comes from rays of which some were blocked.
+ * deviation: the standard error of f over sqrt(f (1 - f)). */
 static void add_variance(query *q, double power, double visible, uint32_t sent, double deviation) {
     const double fraction = (visible * sent + .5) / (sent + 1), error = deviation * power;
     q->sight.variance += (float)(error * error * fraction * (1 - fraction));

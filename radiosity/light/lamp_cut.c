@@ -237,8 +237,8 @@ static bool append_leaf(const fct_lamp *lamp, const fct_receiver *rec, uint32_t 
     return fits;
 }
 
-/* Adds the cut of the tree below `node` whose nodes have errors below `share`. *coarse: it has clusters.
- * False: the cut became too large. */
+/* Adds the cut of the tree below `node` whose nodes have errors below `share`. Sets *coarse if clusters are
+ * among them. False: the cut became too large. */
 static bool cut_tree(const fct_lamp *lamp, const fct_receiver *rec, uint32_t node, double share,
                      double reference, fct_cut *cut, bool *coarse) {
     uint32_t stack[STACK_SIZE], depth = 1;
@@ -322,8 +322,8 @@ void fct_lamp_cut(const fct_lamp *lamp, const fct_receiver *rec, fct_cut *cut) {
         if (light > 0) append_item(cut, view->roots[0], 1, light);
         return;
     }
-    /* The estimate is the first reference; a cut of clusters that finds much less light repeats
-     * with a smaller one. */
+    /* The estimate is the first reference. A cut with clusters that finds much less light repeats with a
+     * smaller one. */
     for (int round = 0; round < 8 && reference > 0; ++round) {
         bool fits = true, coarse = false;
         cut->count = 0, cut->light = 0;

@@ -235,8 +235,8 @@ static uint32_t halve_group(const grouping *g, const group *k) {
     return mid == k->begin || mid == k->end ? k->begin + (k->end - k->begin) / 2 : mid;
 }
 
-/* Whether some anchor is near enough to a vertex. No reach counts as more than that of
- * another anchor plus the distance to it: an anchor in the open says little about a pit beside it. */
+/* Whether some anchor is near enough to a vertex. No reach counts as more than that of another anchor plus
+ * the distance to it: an anchor in the open says little about a pit beside it. */
 static bool vertex_has_anchor(const grouping *g, size_t vertex) {
     const float *p = g->surface->sample_points + 3 * vertex;
     double apart[FCT_NEAREST_ANCHORS], reach = HUGE_VAL;

@@ -43,8 +43,8 @@ enum { BORDER_ROUNDS = 4 };
 enum { ANCHOR_RAYS = 20, LAMP_RAYS = 2 };
 /* Rounds of more rays to the lamps of which neighbours see different parts: each reaches one edge further. */
 enum { DOUBT_ROUNDS = 2 };
-/* Factors on the wanted error of the direct light: of flat vertices, and the largest one of vertices with a
- * small area. */
+/* Factors on the wanted error of the direct light: of flat vertices, and the largest one. With a larger one,
+ * flecks show at the ends of penumbrae. */
 #define FLAT_SLACK 1.5
 #define MOST_SLACK 2
 /* The accuracy of the border of a cover, and half the distance from before the border to behind it, over the
@@ -103,7 +103,7 @@ static void gather_links(const lighting *l, size_t v, const float normal[3], dou
 static double find_slack(const lighting *l, size_t v) {
     const double area = l->surface->areas[v], slack = l->surface->flat[v] ? FLAT_SLACK : 1;
     if (v < l->usual_count) return slack;
-    return slack * (area > 0 ? fct_min(fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK);
+    return area > 0 ? fct_min(slack * fct_max(sqrt(l->usual_area / area), 1), MOST_SLACK) : MOST_SLACK;
 }
 
 /* Once the indirect light is known. doubt: as in fct_lamp_goal; irradiance: as in fct_lamps_direct. */

@@ -273,7 +273,7 @@ static void light_directly(side *x, uint32_t v, uint32_t doubt, double e[3]) {
     const double p[3] = {point[0], point[1], point[2]}, normal[3] = {n.x, n.y, n.z};
     /* Twice the error on a fourth of the usual area. */
     fct_lamp_goal goal = {.slack = x->f.flat[v] ? 1.5 : 1, .doubt = doubt};
-    if (v >= x->usual_count) goal.slack *= fmin(fmax(sqrt(x->usual_area / x->f.areas[v]), 1), 2);
+    if (v >= x->usual_count) goal.slack = fmin(goal.slack * fmax(sqrt(x->usual_area / x->f.areas[v]), 1), 2);
     for (size_t c = 0; c < 3; ++c) {
         e[c] = doubt ? x->direct[3 * (size_t)v + c] : 0;
         goal.other += (double)x->indirect[3 * (size_t)v + c];
