@@ -1,6 +1,7 @@
 /* simplify/contract.c: see contract.h.
  *
- * 1. Compute the cost of every edge (in parallel) and queue the edges by it.
+ * 1. Compute the cost of every edge (in parallel). Contract most edges in sweeps over blocks (sweep.c), and
+ *    queue the others by their cost.
  * 2. Pop the cheapest edge and compute its cost again. Quadrics only grow, so the queued cost is a lower
  *    bound: an edge whose cost has grown returns to the queue.
  * 3. Refuse edges that fail a check or cost more than max_error. They return when a contraction changes their
@@ -14,6 +15,7 @@
 #include "base/parallel.h"
 #include "simplify/collapse.h"
 #include "simplify/cost/loss.h"
+#include "simplify/sweep.h"
 #include "simplify/topology/link.h"
 #include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
@@ -35,7 +37,7 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
     if (edge->state != EDGE_REFUSED && edge->state != EDGE_OVER_BOUND) return;
     edge->state = EDGE_QUEUED;
     edge->ends_only = false;
-    queue_push(&s->queue, e, s->queue.current);
+    queue_push(s->queue, e, s->queue->current);
 }
 
 static double *find_first_quadric(const fct_simplifier *s, uint32_t point) {
@@ -70,8 +72,8 @@ static bool check_contraction(fct_simplifier *s, const fct_move *move, bool *bod
 static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
                          const fct_candidate *candidate) {
     uint32_t bucket = queue_bucket(candidate->key);
-    if (bucket > s->queue.current) {
-        queue_push(&s->queue, e, bucket);
+    if (bucket > s->queue->current) {
+        queue_push(s->queue, e, bucket);
         return false;
     }
     double bound = s->def->max_error / s->extent;
@@ -79,6 +81,15 @@ static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
         refuse_edge(s, e, ends, EDGE_OVER_BOUND);
         return false;
     }
+    return true;
+}
+
+/* Whether all points of a ring belong to the block of this sweep. */
+static bool is_in_block(const fct_simplifier *s, const uint32_t *ring, uint32_t count) {
+    for (uint32_t i = 0; i < count; ++i)
+        if (s->blocks[s->triangles[corner_next(ring[i])]] != s->block ||
+            s->blocks[s->triangles[corner_previous(ring[i])]] != s->block)
+            return false;
     return true;
 }
 
@@ -95,19 +106,21 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     }
     uint32_t count_a = hub ? 0 : fct_simplify_gather(s, a, s->ring_a);
     uint32_t count_b = fct_simplify_gather(s, b, s->ring_b);
+    if (s->blocks && (hub || !is_in_block(s, s->ring_a, count_a) || !is_in_block(s, s->ring_b, count_b)))
+        return false;
     const fct_move move = {a, b, count_a, count_b, candidate->at};
     if (!check_contraction(s, &move, &body)) {
         if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
             refuse_edge(s, e, ends, EDGE_REFUSED);
         else {
             edge->ends_only = true;
-            queue_push(&s->queue, e, s->queue.current);
+            queue_push(s->queue, e, s->queue->current);
         }
         return false;
     }
     fct_loss loss;
     double cost = body  ? fct_loss_measure_body(s, b, count_b, candidate, &loss)
-                  : hub ? 0
+                  : hub || fct_simplify_is_level(s) ? 0
                         : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
     if (cost > 0) {
         candidate->error += cost, candidate->key += cost;
@@ -155,6 +168,12 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
     }
 }
 
+/* The loop of a block in a sweep. */
+static void contract_block(fct_simplifier *s) {
+    for (uint32_t e; (e = queue_pop(s->queue)) != FCT_NONE;)
+        if (s->edges[e].state == EDGE_QUEUED) process_edge(s, e);
+}
+
 fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     uint32_t before = s->live_faces, contractions = 0;
     *stop = FCT_STOP_FACES;
@@ -162,10 +181,13 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     fct_result result =
         fct_parallel_for_progress(s->env, "costs", s->edge_count, EDGE_CHUNK, find_first_buckets, s);
     if (result != FCT_OK) return result;
-    queue_clear(&s->queue, s->edges);
-    for (uint32_t e = s->edge_count; e-- > 0;) queue_push(&s->queue, e, s->edges[e].bucket);
+    result = fct_simplify_sweep(s, contract_block);
+    if (result != FCT_OK) return result;
+    queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);
+    for (uint32_t e = s->edge_count; e-- > 0;)
+        if (s->edges[e].state == EDGE_QUEUED) queue_push(s->queue, e, s->edges[e].bucket);
     while (s->live_faces > s->def->target_faces) {
-        uint32_t e = queue_pop(&s->queue);
+        uint32_t e = queue_pop(s->queue);
         if (e == FCT_NONE) break;
         if (s->edges[e].state != EDGE_QUEUED) continue;
         if (!process_edge(s, e) || ++contractions % PROGRESS_PERIOD) continue;

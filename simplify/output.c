@@ -66,23 +66,26 @@ static void write_face(const fct_mesh *mesh, fct_mesh *out, uint32_t f, uint32_t
 }
 
 /* numbers: key -> output vertex, in the order of first use. Returns the number of vertices. */
-static uint32_t number_vertices(fct_simplifier *s, uint32_t *numbers, uint32_t key_count) {
-    uint32_t vertices = 0, corners = 3 * s->mesh->face_count;
+static uint32_t number_vertices(fct_simplifier *s, const uint32_t *places, uint32_t *numbers,
+                                uint32_t key_count) {
+    uint32_t vertices = 0;
     memset(numbers, 0xff, key_count * sizeof *numbers);
-    for (uint32_t c = 0; c < corners; ++c) {
-        if (corner_dead(s, c)) continue;
-        uint32_t key = find_vertex_key(s, c);
-        if (numbers[key] == FCT_NONE) numbers[key] = vertices++;
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
+        uint32_t first = 3 * places[f];
+        for (uint32_t c = first; c < first + 3 && !corner_dead(s, first); ++c) {
+            uint32_t key = find_vertex_key(s, c);
+            if (numbers[key] == FCT_NONE) numbers[key] = vertices++;
+        }
     }
     return vertices;
 }
 
-fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out) {
+fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_mesh *out) {
     const fct_mesh *mesh = s->mesh;
     uint32_t key_count = s->wedge_classes ? s->class_count : s->point_count;
     uint32_t *numbers = fct_allocate(s->env, key_count, sizeof *numbers);
     if (!numbers) return fct_fail_memory(s->env, "output vertices");
-    uint32_t vertices = number_vertices(s, numbers, key_count);
+    uint32_t vertices = number_vertices(s, places, numbers, key_count);
     unsigned arrays =
         (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
         (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
@@ -91,7 +94,8 @@ fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out) {
     if (result == FCT_OK) memcpy(out->origin, mesh->origin, sizeof out->origin);
     if (result == FCT_OK) result = copy_names(s->env, mesh, out);
     uint32_t to = 0;
-    for (uint32_t f = 0; f < mesh->face_count && result == FCT_OK; ++f) {
+    for (uint32_t i = 0; i < mesh->face_count && result == FCT_OK; ++i) {
+        uint32_t f = places[i];
         if (corner_dead(s, 3 * f)) continue;
         for (uint32_t k = 0; k < 3; ++k) {
             uint32_t c = 3 * f + k, v = numbers[find_vertex_key(s, c)];

@@ -4,8 +4,9 @@
 
 #include "simplify/state.h"
 
-/* Writes the live faces in the order of the input, with the same arrays as the input. Vertices are numbered
- * in the order in which faces first use them. Errors: MEMORY; *out is then partly filled: release it. */
-fct_result fct_simplify_output(fct_simplifier *s, fct_mesh *out);
+/* Writes the live faces in the order of the input, with the same arrays as the input. places: per face of the
+ * input its number in s->mesh. Vertices are numbered in the order in which faces first use them. Errors:
+ * MEMORY; *out is then partly filled: release it. */
+fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_mesh *out);
 
 #endif

@@ -1,6 +1,6 @@
 /* simplify/queue.h: a priority queue of edges, in buckets by the leading 12 bits of a float cost.
  *
- * Invariant: no bucket below `current` holds an edge.
+ * Invariants: no bucket below `current` holds an edge, and none above `limit`.
  * Order: 8 buckets per octave, so a popped edge costs at most 1/8 more than the cheapest edge. Inside a
  * bucket the last pushed edge leaves first. The order depends only on the sequence of calls.
  * Cost: push and pop take constant time, plus one pass over empty buckets.
@@ -28,7 +28,7 @@ typedef struct fct_edge {
 typedef struct fct_queue {
     fct_edge *edges;
     uint32_t first[QUEUE_BUCKETS];
-    uint32_t current;
+    uint32_t current, limit;
 } fct_queue;
 
 /* The bucket of a cost. Costs that are not positive go to bucket 0. */
@@ -36,26 +36,30 @@ static inline uint32_t queue_bucket(double cost) {
     return cost > 0 ? fct_float_bits((float)cost) >> QUEUE_BUCKET_SHIFT : 0;
 }
 
+/* An edge above the limit only gets its bucket. */
 static inline void queue_push(fct_queue *q, uint32_t edge, uint32_t bucket) {
+    q->edges[edge].bucket = (uint16_t)bucket;
+    if (bucket > q->limit) return;
     q->edges[edge].next = q->first[bucket];
     q->first[bucket] = edge;
-    q->edges[edge].bucket = (uint16_t)bucket;
     if (bucket < q->current) q->current = bucket;
 }
 
 /* Removes an edge of the lowest bucket; FCT_NONE if the queue is empty. */
 static inline uint32_t queue_pop(fct_queue *q) {
-    while (q->current < QUEUE_BUCKETS && q->first[q->current] == FCT_NONE) ++q->current;
-    if (q->current == QUEUE_BUCKETS) return FCT_NONE;
+    while (q->current <= q->limit && q->first[q->current] == FCT_NONE) ++q->current;
+    if (q->current > q->limit) return FCT_NONE;
     uint32_t edge = q->first[q->current];
     q->first[q->current] = q->edges[edge].next;
     return edge;
 }
 
-static inline void queue_clear(fct_queue *q, fct_edge *edges) {
+/* An empty queue of edges up to the bucket `limit`. */
+static inline void queue_clear(fct_queue *q, fct_edge *edges, uint32_t limit) {
     q->edges = edges;
-    for (uint32_t i = 0; i < QUEUE_BUCKETS; ++i) q->first[i] = FCT_NONE;
+    for (uint32_t i = 0; i <= limit; ++i) q->first[i] = FCT_NONE;
     q->current = QUEUE_BUCKETS;
+    q->limit = limit;
 }
 
 #endif

@@ -14,6 +14,9 @@ static fct_result fill_simplifier(fct_simplifier *s) {
     s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
     s->side_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->side_marks);
     if (!s->refused || !s->side_marks) return fct_fail_memory(s->env, "marks of points");
+    s->scratches = fct_allocate(s->env, fct_env_threads(s->env), sizeof *s->scratches);
+    if (!s->scratches) return fct_fail_memory(s->env, "scratch of threads");
+    use_scratch(s, s->scratches);
     if (!s->def->keep_topology) return FCT_OK;
     s->link_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->link_marks);
     return s->link_marks ? FCT_OK : fct_fail_memory(s->env, "marks of points");
@@ -25,7 +28,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->last_corners,  s->valences,      s->first_wedges, s->triangles,     s->next_corners,
                       s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,    s->quadrics,
                       s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,    s->wedge_classes,
-                      s->class_parents, s->link_marks,    s->side_marks,   s->refused};
+                      s->class_parents, s->link_marks,    s->side_marks,   s->refused,       s->scratches};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_release(s->env, s);
 }

@@ -1,14 +1,16 @@
 /* simplify/simplify.c: the public function: checks the input and runs the phases.
  *
- * 1. Create: points, wedges, edges and quadrics (simplifier.c).
- * 2. Contract edges until a stop (contract.c).
- * 3. Refit the remaining points (refit.c).
- * 4. Write the output mesh (output.c).
+ * 1. Sort the input along a curve (topology/curve.c).
+ * 2. Create points, wedges, edges and quadrics (simplifier.c).
+ * 3. Contract edges until a stop (contract.c, sweep.c).
+ * 4. Refit the remaining points (refit.c).
+ * 5. Write the output mesh (output.c).
  */
 #include "simplify/contract.h"
 #include "simplify/output.h"
 #include "simplify/refit.h"
 #include "simplify/simplifier.h"
+#include "simplify/topology/curve.h"
 
 fct_simplify_def fct_simplify_def_default(void) {
     return (fct_simplify_def){
@@ -58,32 +60,43 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
     return fct_mesh_validate(env, mesh);
 }
 
+/* Contracts, refits and writes a sorted mesh. */
+static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out,
+                                 fct_simplify_stats *stats) {
+    double start = fct_seconds();
+    fct_result result = fct_simplify_contract(s, &stats->stopped_because);
+    double contracted = fct_seconds();
+    stats->seconds_contract = contracted - start;
+    /* Subset placement promises vertices of the input, so nothing may move. */
+    bool refit =
+        s->live_faces < s->face_count && s->def->placement != FCT_PLACE_SUBSET && s->def->refit_passes > 0;
+    if (result == FCT_OK && refit) result = fct_simplify_refit(s);
+    if (result == FCT_OK) result = fct_simplify_output(s, places, out);
+    if (result != FCT_OK) fct_mesh_release(s->env, out);
+    stats->seconds_refit = fct_seconds() - contracted;
+    stats->faces_after = out->face_count;
+    stats->max_cost = sqrt(s->max_error2) * s->extent;
+    return result;
+}
+
 fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def, fct_mesh *out,
                         fct_simplify_stats *stats) {
     *out = (fct_mesh){0};
     fct_result result = check_input(env, mesh, def);
     if (result != FCT_OK) return result;
     double start = fct_seconds();
-    fct_simplifier *s;
-    result = fct_simplifier_create(env, mesh, def, &s);
+    fct_simplify_stats found = {.faces_before = mesh->face_count};
+    fct_mesh sorted;
+    uint32_t *places;
+    result = fct_simplify_sort(env, mesh, &sorted, &places);
     if (result != FCT_OK) return result;
-    double ready = fct_seconds();
-    fct_stop stop;
-    result = fct_simplify_contract(s, &stop);
-    double contracted = fct_seconds();
-    /* Subset placement promises vertices of the input, so nothing may move. */
-    bool refit = s->live_faces < s->face_count && def->placement != FCT_PLACE_SUBSET && def->refit_passes > 0;
-    if (result == FCT_OK && refit) result = fct_simplify_refit(s);
-    if (result == FCT_OK) result = fct_simplify_output(s, out);
-    if (result != FCT_OK) fct_mesh_release(env, out);
-    if (result == FCT_OK && stats)
-        *stats = (fct_simplify_stats){.faces_before = mesh->face_count,
-                                      .faces_after = out->face_count,
-                                      .stopped_because = stop,
-                                      .max_cost = sqrt(s->max_error2) * s->extent,
-                                      .seconds_init = ready - start,
-                                      .seconds_contract = contracted - ready,
-                                      .seconds_refit = fct_seconds() - contracted};
+    fct_simplifier *s;
+    result = fct_simplifier_create(env, &sorted, def, &s);
+    found.seconds_init = fct_seconds() - start;
+    if (result == FCT_OK) result = run_simplifier(s, places, out, &found);
     fct_simplifier_destroy(s);
+    fct_simplify_release_sorted(env, &sorted);
+    fct_release(env, places);
+    if (result == FCT_OK && stats) *stats = found;
     return result;
 }

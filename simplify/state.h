@@ -52,6 +52,13 @@ typedef struct fct_side_mark {
     uint32_t first; /* the only face so far, as an index of `remaining`; FCT_NONE after the second */
 } fct_side_mark;
 
+/* What one thread needs for the contraction of an edge. */
+typedef struct fct_scratch {
+    fct_queue queue;
+    uint32_t ring_a[SIMPLIFY_HUB], ring_b[SIMPLIFY_HUB]; /* corners around the ends of the current edge */
+    fct_remaining remaining[2 * SIMPLIFY_HUB];           /* the faces after the current move */
+} fct_scratch;
+
 typedef struct fct_simplifier {
     const fct_env *env;
     const fct_mesh *mesh;
@@ -90,10 +97,16 @@ typedef struct fct_simplifier {
     uint32_t *class_parents;
     uint32_t class_count;
 
-    fct_queue queue;
-    uint32_t ring_a[SIMPLIFY_HUB], ring_b[SIMPLIFY_HUB]; /* corners around the ends of the current edge */
-    fct_remaining remaining[2 * SIMPLIFY_HUB];           /* the faces after the current move */
-    uint32_t remaining_count;
+    fct_scratch *scratches; /* one per thread */
+    /* The scratch in use. */
+    fct_queue *queue;
+    uint32_t *ring_a, *ring_b;
+    fct_remaining *remaining;
+    uint32_t remaining_count, open_sides; /* of the last move: faces, and edges with one face */
+    bool level;                           /* no face turned by more than 25 degrees */
+    /* In a sweep (sweep.h), a copy of the simplifier works on one block of points. */
+    const uint32_t *blocks; /* per point: its block; NULL outside of sweeps */
+    uint32_t block;
     double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
     uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
     uint32_t *link_marks; /* per point; only with keep_topology */
@@ -103,6 +116,11 @@ typedef struct fct_simplifier {
     double max_error2; /* largest squared error of a contraction that was made */
 } fct_simplifier;
 
+static inline void use_scratch(fct_simplifier *s, fct_scratch *scratch) {
+    s->queue = &scratch->queue;
+    s->ring_a = scratch->ring_a, s->ring_b = scratch->ring_b;
+    s->remaining = scratch->remaining;
+}
 static inline uint32_t edge_root(fct_edge *edges, uint32_t e) {
     while (edges[e].parent != e) {
         edges[e].parent = edges[edges[e].parent].parent;

@@ -18,11 +18,14 @@
 #define SMALL_TURN .995
 /* Two faces at an edge are folded if the cosine between their normals is below -.9. */
 #define FOLD_COSINE .9
+/* The faces of a level fan are at most 25 degrees from the mean, before and after. */
+#define LEVEL_COSINE .9
 /* No squared side in the unit cube is longer, apart from rounding and moves out of it. */
 #define LONGEST2 4
 
 void fct_simplify_begin_move(fct_simplifier *s) {
     s->remaining_count = 0;
+    s->level = true;
 }
 
 /* The area of a face, times 2 and squared, after its corners became floats. */
@@ -56,6 +59,7 @@ bool fct_simplify_folds_over(fct_simplifier *s, const uint32_t *ring, uint32_t c
     bool strict = s->def->check_foldover;
     double small2 = LONGEST2 * s->least_height * s->least_height;
     fct_remaining *out = s->remaining + s->remaining_count;
+    bool level = s->level;
     for (uint32_t i = 0; i < count; ++i) {
         uint32_t x = s->triangles[corner_next(ring[i])], y = s->triangles[corner_previous(ring[i])];
         if (x == other || y == other) continue;
@@ -66,6 +70,7 @@ bool fct_simplify_folds_over(fct_simplifier *s, const uint32_t *ring, uint32_t c
         if (strict && !(dot > 0 && dot2 > MIN_TURN_COSINE * MIN_TURN_COSINE * product2) && before2 > 0)
             return true;
         *out = (fct_remaining){ring[i], x, y, dot2 < SMALL_TURN * product2, after, after2};
+        level &= dot2 > LEVEL_COSINE * LEVEL_COSINE * product2;
         if (after2 < small2 && is_thin(s, at, px, py, after2)) {
             if (strict && before2 > 0 && loses_area(s, from, at, px, py, before2)) return true;
             out->normal = (v3){0, 0, 0}, out->norm2 = 0;
@@ -73,6 +78,7 @@ bool fct_simplify_folds_over(fct_simplifier *s, const uint32_t *ring, uint32_t c
         ++out;
     }
     s->remaining_count = (uint32_t)(out - s->remaining);
+    s->level = level;
     return false;
 }
 
@@ -195,11 +201,13 @@ static bool check_moved_sides(fct_simplifier *s, const fct_move *move, uint32_t 
         fct_side_mark *mark = &s->side_marks[x];
         if (mark->epoch != s->side_epoch) {
             *mark = (fct_side_mark){s->side_epoch, i};
+            ++s->open_sides;
             continue;
         }
         if (mark->first == FCT_NONE ? !may_crowd_edge(s, move, x, face)
                                     : !may_share_edge(s, move, x, &s->remaining[mark->first], face))
             return false;
+        s->open_sides -= mark->first != FCT_NONE;
         mark->first = FCT_NONE;
     }
     return true;
@@ -215,9 +223,22 @@ bool fct_simplify_remains_good(fct_simplifier *s, const fct_move *move) {
     if (!s->def->check_foldover) return true;
     if (move->count_a == 0 && !list_hub_faces(s, move)) return false;
     ++s->side_epoch;
+    s->open_sides = 0;
     for (uint32_t i = 0; i < s->remaining_count; ++i) {
         if (!check_moved_sides(s, move, i)) return false;
         if (s->remaining[i].turned && !check_fixed_side(s, move, &s->remaining[i])) return false;
+    }
+    return true;
+}
+
+bool fct_simplify_is_level(const fct_simplifier *s) {
+    if (!s->level || s->open_sides > 0) return false;
+    v3 sum = {0, 0, 0};
+    for (uint32_t i = 0; i < s->remaining_count; ++i) sum = v3_add(sum, s->remaining[i].normal);
+    double sum2 = v3_norm2(sum);
+    for (uint32_t i = 0; i < s->remaining_count; ++i) {
+        double dot = v3_dot(sum, s->remaining[i].normal);
+        if (!(dot > 0 && dot * dot > LEVEL_COSINE * LEVEL_COSINE * sum2 * s->remaining[i].norm2)) return false;
     }
     return true;
 }

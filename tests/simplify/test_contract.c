@@ -15,7 +15,7 @@ static void the_queue_pops_within_an_eighth(void **state) {
     fct_edge *edges = calloc(COUNT, sizeof *edges);
     double *costs = calloc(COUNT, sizeof *costs);
     uint64_t seed = 61;
-    queue_clear(&queue, edges);
+    queue_clear(&queue, edges, QUEUE_BUCKETS - 1);
     assert_true(queue_pop(&queue) == FCT_NONE);
     for (uint32_t i = 0; i < COUNT; ++i) {
         costs[i] = i % 50 == 0 ? 0 : i % 51 == 0 ? -1 : exp(between(&seed, -60, 60));

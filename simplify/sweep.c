@@ -1,0 +1,152 @@
+/* simplify/sweep.c: see sweep.h. Each sweep:
+ *
+ * 1. Count the queued edges per bucket. Take the cheapest: a third as many as faces have to go, and an edge
+ *    takes two of them. So no sweep goes beyond the cost that the last contraction will have.
+ * 2. Cut the points that are left into blocks of equal size, and give each block the edges inside it.
+ * 3. Contract in all blocks.
+ * Cost of a sweep: linear in points and edges, plus the contractions. Source of the idea: Garland 1999,
+ * section 9.2 (many contractions per round).
+ */
+#include "simplify/sweep.h"
+
+#include "base/parallel.h"
+
+enum {
+    BLOCK_POINTS = 4096,
+    LEAST_EDGES = 4 * BLOCK_POINTS, /* of a sweep */
+    LEAST_SHARE = 8,                /* sweeps go on while they contract this part of their edges */
+};
+
+typedef struct sweep {
+    fct_simplifier *s;
+    fct_block_body *body;
+    uint32_t limit; /* the highest bucket */
+    uint32_t block_count;
+    uint32_t *edges, edge_count; /* the edges that are not dead yet */
+    uint32_t *blocks;            /* per point that is left: its block */
+    uint32_t *chosen, *owners;   /* edges of the sweep, and their blocks */
+    uint32_t *starts, *ordered;  /* the edges of block b are ordered[starts[b]] to ordered[starts[b + 1] - 1] */
+    fct_simplifier *results;     /* per block: the copy that worked on it */
+} sweep;
+
+/* Drops dead edges from the list, and returns the highest bucket up to which at most `most` edges are queued;
+ * *count is their number. FCT_NONE if there is no such bucket. */
+static uint32_t find_limit(sweep *w, uint32_t most, uint32_t *count) {
+    const fct_edge *edges = w->s->edges;
+    uint32_t counts[QUEUE_BUCKETS] = {0}, kept = 0;
+    for (uint32_t i = 0; i < w->edge_count; ++i) {
+        const fct_edge *e = &edges[w->edges[i]];
+        if (e->state == EDGE_DEAD) continue;
+        w->edges[kept++] = w->edges[i];
+        counts[e->bucket] += e->state == EDGE_QUEUED;
+    }
+    w->edge_count = kept;
+    uint32_t sum = 0, bucket = 0;
+    while (bucket < QUEUE_BUCKETS && sum + counts[bucket] <= most) sum += counts[bucket++];
+    *count = sum;
+    return bucket - 1;
+}
+
+/* Blocks of equal numbers of points. The first one has `first` points. */
+static void cut_blocks(sweep *w, uint32_t first) {
+    const fct_simplifier *s = w->s;
+    uint32_t block = 0, room = first;
+    for (uint32_t p = 0; p < s->point_count; ++p) {
+        if (s->point_parents[p] != p) continue;
+        if (room-- == 0) ++block, room = BLOCK_POINTS - 1;
+        w->blocks[p] = block;
+    }
+    w->block_count = block + 1;
+}
+
+/* Lists the queued edges up to the limit by their blocks. Edges between blocks are left out. */
+static uint32_t choose_edges(sweep *w) {
+    fct_simplifier *s = w->s;
+    uint32_t count = 0;
+    memset(w->starts, 0, ((size_t)w->block_count + 1) * sizeof *w->starts);
+    for (uint32_t i = 0; i < w->edge_count; ++i) {
+        fct_edge *e = &s->edges[w->edges[i]];
+        if (e->state != EDGE_QUEUED || e->bucket > w->limit) continue;
+        for (int k = 0; k < 2; ++k) e->ends[k] = fct_sets_find(s->point_parents, e->ends[k]);
+        uint32_t block = w->blocks[e->ends[0]];
+        if (block != w->blocks[e->ends[1]]) continue;
+        w->chosen[count] = w->edges[i], w->owners[count++] = block;
+        ++w->starts[block + 1];
+    }
+    for (uint32_t b = 0; b < w->block_count; ++b) w->starts[b + 1] += w->starts[b];
+    for (uint32_t i = 0; i < count; ++i) w->ordered[w->starts[w->owners[i]]++] = w->chosen[i];
+    for (uint32_t b = w->block_count; b > 0; --b) w->starts[b] = w->starts[b - 1];
+    w->starts[0] = 0;
+    return count;
+}
+
+static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk;
+    sweep *w = user;
+    for (size_t b = begin; b < end; ++b) {
+        fct_simplifier *s = &w->results[b];
+        *s = *w->s;
+        use_scratch(s, w->s->scratches + thread);
+        s->blocks = w->blocks, s->block = (uint32_t)b;
+        queue_clear(s->queue, s->edges, w->limit);
+        for (uint32_t i = w->starts[b + 1]; i-- > w->starts[b];)
+            queue_push(s->queue, w->ordered[i], s->edges[w->ordered[i]].bucket);
+        w->body(s);
+    }
+}
+
+/* Runs one sweep, with blocks that begin at another point than those of the sweep before. *contracted: the
+ * number of edges that took two faces. */
+static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
+    fct_simplifier *s = w->s;
+    cut_blocks(w, number % 2 ? BLOCK_POINTS / 2 : BLOCK_POINTS);
+    choose_edges(w);
+    w->results = fct_allocate(s->env, w->block_count, sizeof *w->results);
+    if (!w->results) return fct_fail_memory(s->env, "blocks of points");
+    fct_parallel_for(s->env, w->block_count, 1, run_blocks, w);
+    uint32_t before = s->live_faces;
+    fct_simplifier all = *s;
+    for (uint32_t b = 0; b < w->block_count; ++b) {
+        const fct_simplifier *r = &w->results[b];
+        s->live_faces -= before - r->live_faces;
+        if (r->max_error2 > s->max_error2) s->max_error2 = r->max_error2;
+        if (r->side_epoch > all.side_epoch) all.side_epoch = r->side_epoch;
+        if (r->link_epoch > all.link_epoch) all.link_epoch = r->link_epoch;
+    }
+    s->side_epoch = all.side_epoch, s->link_epoch = all.link_epoch;
+    fct_release(s->env, w->results);
+    *contracted = (before - s->live_faces) / 2;
+    return FCT_OK;
+}
+
+static fct_result run_sweeps(sweep *w) {
+    fct_simplifier *s = w->s;
+    uint32_t before = s->live_faces, target = s->def->target_faces;
+    for (uint32_t e = 0; e < s->edge_count; ++e) w->edges[e] = e;
+    w->edge_count = s->edge_count;
+    for (uint32_t number = 0;; ++number) {
+        uint32_t most = (s->live_faces - target) / 3, count, contracted = 0;
+        if (most < LEAST_EDGES) return FCT_OK;
+        w->limit = find_limit(w, most, &count);
+        if (count < LEAST_EDGES) return FCT_OK;
+        fct_result result = run_sweep(w, number, &contracted);
+        if (result == FCT_OK)
+            result = fct_progress(s->env, "contract", (double)(before - s->live_faces) / (before - target));
+        if (result != FCT_OK || contracted < count / LEAST_SHARE) return result;
+    }
+}
+
+fct_result fct_simplify_sweep(fct_simplifier *s, fct_block_body *body) {
+    sweep w = {.s = s, .body = body};
+    size_t most = s->edge_count;
+    const fct_array arrays[] = {FCT_ARRAY(w.edges, most),        FCT_ARRAY(w.blocks, s->point_count),
+                                FCT_ARRAY(w.chosen, most),       FCT_ARRAY(w.owners, most),
+                                FCT_ARRAY(w.ordered, most),
+                                FCT_ARRAY(w.starts, s->point_count / BLOCK_POINTS + 3)};
+    if (s->live_faces < s->def->target_faces + 3 * LEAST_EDGES) return FCT_OK;
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the blocks of a sweep");
+    if (result != FCT_OK) return result;
+    result = run_sweeps(&w);
+    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
+    return result;
+}
