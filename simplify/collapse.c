@@ -18,8 +18,8 @@ static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
     if (keep == FCT_NONE) return;
     while (*link != wedge) link = &s->next_wedges[*link];
     *link = s->next_wedges[wedge];
-    const double *q = s->quadrics + (size_t)s->quadric_size * wedge;
-    double *to = s->quadrics + (size_t)s->quadric_size * keep;
+    const double *q = wedge_quadric(s, wedge);
+    double *to = wedge_quadric(s, keep);
     fct_elimination e;
     fct_quadric_eliminate(q, s->steering, s->attributes + (size_t)s->channel_count * wedge,
                           RETIRED_RIDGE * quadric_trace(q), &e);
@@ -27,7 +27,7 @@ static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
 }
 
 static void count_corner_out(fct_simplifier *s, uint32_t c) {
-    --s->valences[s->triangles[c]];
+    --point_at(s, s->triangles[c])->valence;
     if (s->corner_wedges) --s->wedge_uses[corner_wedge(s, c)];
 }
 
@@ -78,8 +78,8 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
                 keep = w;
                 continue;
             }
-            double *to = s->quadrics + (size_t)s->quadric_size * keep;
-            const double *from = s->quadrics + (size_t)s->quadric_size * w;
+            double *to = wedge_quadric(s, keep);
+            const double *from = wedge_quadric(s, w);
             for (uint32_t j = 0; j < s->quadric_size; ++j) to[j] += from[j];
             s->wedge_parents[w] = keep;
             s->wedge_uses[keep] += s->wedge_uses[w];
@@ -111,22 +111,22 @@ static void move_corners(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t cou
         else
             s->next_corners[last] = c;
         last = c;
-        ++s->valences[a];
-        --s->valences[b];
+        ++point_at(s, a)->valence;
+        --point_at(s, b)->valence;
     }
-    s->first_corners[b] = s->last_corners[b] = FCT_NONE;
+    point_at(s, b)->first_corner = point_at(s, b)->last_corner = FCT_NONE;
     s->point_parents[b] = a;
     if (first == FCT_NONE) return;
     s->next_corners[last] = FCT_NONE;
-    if (s->first_corners[a] == FCT_NONE)
-        s->first_corners[a] = first;
+    if (point_at(s, a)->first_corner == FCT_NONE)
+        point_at(s, a)->first_corner = first;
     else
-        s->next_corners[s->last_corners[a]] = first;
-    s->last_corners[a] = last;
+        s->next_corners[point_at(s, a)->last_corner] = first;
+    point_at(s, a)->last_corner = last;
 }
 
 void fct_simplify_remove_faces(fct_simplifier *s, uint32_t point) {
-    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
+    for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         if (corner_dead(s, c)) continue;
         for (uint32_t k = 0; k < 3; ++k) count_corner_out(s, c - c % 3 + k);
         s->triangles[c - c % 3] = FCT_NONE;
@@ -140,16 +140,15 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     fct_groups g;
     v3 first = point_position(s, ends[0]), second = point_position(s, ends[1]);
     if (s->corner_wedges) fct_groups_find(s, ends[0], ends[1], &g);
-    uint32_t source = candidate->end < 2 ? s->sources[ends[candidate->end]] : FCT_NONE;
+    uint32_t source = candidate->end < 2 ? point_at(s, ends[candidate->end])->source : FCT_NONE;
     move_corners(s, a, b, count_b);
-    s->sources[a] = source;
+    point_at(s, a)->source = source;
     if (s->corner_wedges)
         merge_wedges(s, &g, candidate, a, first, second);
     else {
-        double *to = s->quadrics + (size_t)POSITION_QUADRIC * a;
-        const double *from = s->quadrics + (size_t)POSITION_QUADRIC * b;
+        double *to = wedge_quadric(s, a);
+        const double *from = wedge_quadric(s, b);
         for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
     }
-    double *at = s->positions + 3 * (size_t)a;
-    at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
+    point_at(s, a)->at = candidate->at;
 }

@@ -42,7 +42,7 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
 
 static double *find_first_quadric(const fct_simplifier *s, uint32_t point) {
     uint32_t w = s->first_wedges ? s->first_wedges[point] : point;
-    return s->quadrics + (size_t)s->quadric_size * w;
+    return wedge_quadric(s, w);
 }
 
 /* Returns the refused edges of the faces of a ring to the queue. `refused` marks the points that may have
@@ -97,10 +97,10 @@ static bool is_in_block(const fct_simplifier *s, const uint32_t *ring, uint32_t 
  * if the larger one is a hub. An edge of two hubs is dropped, and so is one without faces. */
 static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
     fct_edge *edge = &s->edges[e];
-    uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
+    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
     uint32_t a = ends[keep], b = ends[1 - keep];
-    bool hub = s->valences[a] > SIMPLIFY_HUB, two_hubs = s->valences[b] > SIMPLIFY_HUB, body;
-    if (two_hubs || fct_simplify_find_side(s, s->first_corners[b], a) == FCT_NONE) {
+    bool hub = point_at(s, a)->valence > SIMPLIFY_HUB, two_hubs = point_at(s, b)->valence > SIMPLIFY_HUB, body;
+    if (two_hubs || fct_simplify_find_side(s, point_at(s, b)->first_corner, a) == FCT_NONE) {
         fct_simplify_drop_edge(s, e);
         return false;
     }
@@ -170,7 +170,7 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
 
 /* The loop of a block in a sweep. */
 static void contract_block(fct_simplifier *s) {
-    for (uint32_t e; (e = queue_pop(s->queue)) != FCT_NONE;)
+    for (uint32_t e; s->live_faces > s->least_faces && (e = queue_pop(s->queue)) != FCT_NONE;)
         if (s->edges[e].state == EDGE_QUEUED) process_edge(s, e);
 }
 

@@ -9,8 +9,8 @@ static uint32_t find_vertex_key(fct_simplifier *s, uint32_t c) {
 
 /* A point that never moved keeps the bits of its input vertex. */
 static void write_position(const fct_simplifier *s, uint32_t point, float *out) {
-    if (s->sources[point] != FCT_NONE) {
-        memcpy(out, s->mesh->positions + 3 * (size_t)s->sources[point], 3 * sizeof *out);
+    if (point_at(s, point)->source != FCT_NONE) {
+        memcpy(out, s->mesh->positions + 3 * (size_t)point_at(s, point)->source, 3 * sizeof *out);
         return;
     }
     store_written(s, point_position(s, point), out);

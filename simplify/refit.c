@@ -67,9 +67,9 @@ typedef struct refit {
  * over nearer faces on another side. Hubs are skipped. */
 static void search_ring(const refit *r, uint32_t point, uint32_t wedge, v3 p, foot *best, landing *out) {
     const fct_simplifier *s = r->s;
-    if (s->valences[point] > SIMPLIFY_HUB) return;
+    if (point_at(s, point)->valence > SIMPLIFY_HUB) return;
     uint32_t end = r->ring_ends[point];
-    for (uint32_t i = end - s->valences[point]; i < end; ++i) {
+    for (uint32_t i = end - point_at(s, point)->valence; i < end; ++i) {
         const target *t = &r->targets[r->rings[i].target];
         bool same_side = s->corner_wedges && s->wedge_parents[s->corner_wedges[r->rings[i].corner]] == wedge;
         if (out->attributes && !same_side) continue;
@@ -251,7 +251,7 @@ static v3 solve_damped(const double q[9]) {
 static void move_points(refit *r) {
     fct_simplifier *s = r->s;
     for (uint32_t p = 0; p < s->point_count; ++p) {
-        if (s->valences[p] == 0 || s->valences[p] > SIMPLIFY_HUB) continue;
+        if (point_at(s, p)->valence == 0 || point_at(s, p)->valence > SIMPLIFY_HUB) continue;
         v3 step = v3_scale(solve_damped(r->systems[p]), STEP);
         double length2 = v3_norm2(step), shortest2 = INFINITY;
         if (!(length2 > NOISE * NOISE)) continue;
@@ -268,9 +268,8 @@ static void move_points(refit *r) {
         v3 at = v3_add(from, step);
         const fct_move move = {.a = p, .b = FCT_NONE, .count_a = count, .at = at};
         if (!fct_simplify_remains_good(s, &move)) continue;
-        double *position = s->positions + 3 * (size_t)p;
-        position[0] = at.x, position[1] = at.y, position[2] = at.z;
-        s->sources[p] = FCT_NONE;
+        point_at(s, p)->at = at;
+        point_at(s, p)->source = FCT_NONE;
     }
 }
 
@@ -294,7 +293,7 @@ static void number_targets(refit *r) {
     uint32_t end = 0, live = 0;
     for (uint32_t p = 0; p < s->point_count; ++p) {
         r->ring_ends[p] = end;
-        end += s->valences[p];
+        end += point_at(s, p)->valence;
     }
     for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
         if (corner_dead(s, 3 * f)) continue;

@@ -52,6 +52,14 @@ typedef struct fct_side_mark {
     uint32_t first; /* the only face so far, as an index of `remaining`; FCT_NONE after the second */
 } fct_side_mark;
 
+/* A point: two lines of the cache without attributes. */
+typedef struct fct_point {
+    v3 at;
+    uint32_t source; /* input vertex with exactly this position; FCT_NONE after a move */
+    uint32_t valence, first_corner, last_corner;
+    double quadric[POSITION_QUADRIC]; /* only without attributes */
+} fct_point;
+
 /* What one thread needs for the contraction of an edge. */
 typedef struct fct_scratch {
     fct_queue queue;
@@ -71,10 +79,9 @@ typedef struct fct_simplifier {
     uint32_t *point_of;              /* vertex -> point; FCT_NONE if no face uses the vertex */
 
     /* Per point. */
-    double *positions;       /* x 3 */
-    uint32_t *sources;       /* input vertex with exactly this position; FCT_NONE after a move */
+    char *points; /* fct_point, point_stride bytes apart */
+    size_t point_stride;
     uint32_t *point_parents; /* the point that this one was contracted to; itself while alive */
-    uint32_t *first_corners, *last_corners, *valences;
     uint32_t *first_wedges; /* NULL without attributes */
 
     /* Per corner. */
@@ -90,7 +97,7 @@ typedef struct fct_simplifier {
      */
     uint32_t steering, channel_count, quadric_size;
     fct_channel channels[SIMPLIFY_MAX_CHANNELS];
-    double *quadrics;   /* x quadric_size */
+    double *quadrics;   /* x quadric_size; NULL without attributes: the quadrics of the points */
     double *attributes; /* x channel_count; NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
     uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
@@ -106,7 +113,7 @@ typedef struct fct_simplifier {
     bool level;                           /* no face turned by more than 25 degrees */
     /* In a sweep (sweep.h), a copy of the simplifier works on one block of points. */
     const uint32_t *blocks; /* per point: its block; NULL outside of sweeps */
-    uint32_t block;
+    uint32_t block, least_faces; /* the block, and live_faces at which it stops */
     double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
     uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
     uint32_t *link_marks; /* per point; only with keep_topology */
@@ -137,9 +144,14 @@ static inline uint32_t corner_previous(uint32_t c) {
 static inline bool corner_dead(const fct_simplifier *s, uint32_t c) {
     return s->triangles[c - c % 3] == FCT_NONE;
 }
+static inline fct_point *point_at(const fct_simplifier *s, uint32_t p) {
+    return (fct_point *)(void *)(s->points + s->point_stride * p);
+}
 static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
-    return (v3){s->positions[3 * (size_t)p], s->positions[3 * (size_t)p + 1],
-                s->positions[3 * (size_t)p + 2]};
+    return point_at(s, p)->at;
+}
+static inline double *wedge_quadric(const fct_simplifier *s, uint32_t w) {
+    return s->quadrics ? s->quadrics + (size_t)s->quadric_size * w : point_at(s, w)->quadric;
 }
 /* The floats of a position. Those of a point outside of the range end at its limit. */
 static inline void store_written(const fct_simplifier *s, v3 at, float out[3]) {

@@ -10,9 +10,8 @@
  */
 #include "simplify/cost/fundamental.h"
 
-static double *wedge_quadric(const fct_simplifier *s, uint32_t c) {
-    uint32_t w = s->corner_wedges ? s->corner_wedges[c] : s->triangles[c];
-    return s->quadrics + (size_t)s->quadric_size * w;
+static double *corner_quadric(const fct_simplifier *s, uint32_t c) {
+    return wedge_quadric(s, s->corner_wedges ? s->corner_wedges[c] : s->triangles[c]);
 }
 
 /* Adds the face's quadric to the wedges of its corners. A corner gets a third of the area (3.4.1). */
@@ -33,7 +32,7 @@ static void add_face_quadric(fct_simplifier *s, uint32_t f, v3 normal, double ar
         fct_quadric_of_plane(q, m, x);
     }
     for (uint32_t k = 0; k < 3; ++k) {
-        double *to = wedge_quadric(s, 3 * f + k);
+        double *to = corner_quadric(s, 3 * f + k);
         for (uint32_t i = 0; i < s->quadric_size; ++i) to[i] += area / 3 * q[i];
     }
 }
@@ -83,18 +82,19 @@ static void add_constraint_planes(fct_simplifier *s, uint32_t f, v3 normal, cons
         v3 side = v3_sub(point_position(s, s->triangles[corner_next(c)]), p);
         double weight = s->def->boundary_weight * held * v3_norm2(side);
         v3 across = v3_unit(v3_cross(normal, side));
-        quadric_add_plane(wedge_quadric(s, c), across, p, weight);
-        quadric_add_plane(wedge_quadric(s, corner_next(c)), across, p, weight);
+        quadric_add_plane(corner_quadric(s, c), across, p, weight);
+        quadric_add_plane(corner_quadric(s, corner_next(c)), across, p, weight);
     }
 }
 
 fct_result fct_simplify_quadrics(fct_simplifier *s) {
     s->quadric_size = quadric_size(s->steering);
-    s->quadrics = fct_allocate_zero(s->env, s->wedge_count, s->quadric_size * sizeof *s->quadrics);
+    if (s->channel_count)
+        s->quadrics = fct_allocate_zero(s->env, s->wedge_count, s->quadric_size * sizeof *s->quadrics);
     float *strength = fct_allocate(s->env, s->edge_count, sizeof *strength);
     uint32_t *first_sides = fct_allocate(s->env, s->corner_wedges ? s->edge_count : 0, sizeof *first_sides);
     fct_result result = FCT_OK;
-    if (!s->quadrics || !strength || !first_sides)
+    if ((s->channel_count && !s->quadrics) || !strength || !first_sides)
         result = fct_fail_memory(s->env, "quadrics");
     else {
         find_strengths(s, strength, first_sides);

@@ -36,8 +36,8 @@ bool fct_groups_find(fct_simplifier *s, uint32_t a, uint32_t b, fct_groups *g) {
         g->group_count = 1;
         return true;
     }
-    uint32_t from = s->valences[a] <= s->valences[b] ? a : b, to = from == a ? b : a;
-    for (uint32_t c = s->first_corners[from]; c != FCT_NONE; c = s->next_corners[c]) {
+    uint32_t from = point_at(s, a)->valence <= point_at(s, b)->valence ? a : b, to = from == a ? b : a;
+    for (uint32_t c = point_at(s, from)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         if (corner_dead(s, c)) continue;
         uint32_t other = s->triangles[corner_next(c)] == to ? corner_next(c) : corner_previous(c);
         if (s->triangles[other] == to)
@@ -60,7 +60,7 @@ void fct_groups_sum(const fct_simplifier *s, const fct_groups *g, uint32_t group
     for (uint32_t i = 0; i < g->wedge_count; ++i) {
         if (g->group_of[i] != group) continue;
         ++members;
-        const double *q = s->quadrics + (size_t)s->quadric_size * g->wedges[i];
+        const double *q = wedge_quadric(s, g->wedges[i]);
         const double *a = s->attributes + (size_t)s->channel_count * g->wedges[i];
         for (uint32_t k = 0; k < s->quadric_size; ++k) sum[k] += q[k];
         for (uint32_t k = 0; k < s->channel_count; ++k) mean[k] += a[k];

@@ -13,10 +13,10 @@
 
 /* The area that the quadrics of a point have summed. */
 static double sum_area(const fct_simplifier *s, uint32_t point) {
-    if (!s->corner_wedges) return s->quadrics[(size_t)POSITION_QUADRIC * point + 10];
+    if (!s->corner_wedges) return wedge_quadric(s, point)[10];
     double area = 0;
     for (uint32_t w = s->first_wedges[point]; w != FCT_NONE; w = s->next_wedges[w])
-        area += s->quadrics[(size_t)s->quadric_size * w + 10];
+        area += wedge_quadric(s, w)[10];
     return area;
 }
 
@@ -55,7 +55,7 @@ static void add_apexes(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t
             continue;
         v3 p = point_position(s, apex), pa = point_position(s, a), pb = point_position(s, b);
         for (uint32_t k = 0; k < count_b; ++k) faces += find_apex(s, s->ring_b[k], a) == apex;
-        if (faces < s->valences[apex]) {
+        if (faces < point_at(s, apex)->valence) {
             double area = .5 * v3_norm(v3_cross(v3_sub(pa, p), v3_sub(pb, p)));
             add_lost(loss, v3_scale(v3_add(p, at), .5), at, area / 3);
         } else

@@ -120,8 +120,8 @@ static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, doub
                                  double sums[][MAX_QUADRIC]) {
     memset(r, 0, POSITION_QUADRIC * sizeof *r);
     if (!s->corner_wedges) {
-        const double *qa = s->quadrics + (size_t)POSITION_QUADRIC * a;
-        const double *qb = s->quadrics + (size_t)POSITION_QUADRIC * b;
+        const double *qa = wedge_quadric(s, a);
+        const double *qb = wedge_quadric(s, b);
         for (int k = 0; k < POSITION_QUADRIC; ++k) r[k] = qa[k] + qb[k];
         return true;
     }
@@ -140,9 +140,9 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
     v3 pa = point_position(s, a), pb = point_position(s, b);
-    bool larger_b = s->valences[b] > s->valences[a]; /* of two hubs the larger one does not move */
-    bool hub_a = !larger_b && s->valences[a] > SIMPLIFY_HUB;
-    bool hub_b = larger_b && s->valences[b] > SIMPLIFY_HUB;
+    bool larger_b = point_at(s, b)->valence > point_at(s, a)->valence; /* of two hubs the larger one does not move */
+    bool hub_a = !larger_b && point_at(s, a)->valence > SIMPLIFY_HUB;
+    bool hub_b = larger_b && point_at(s, b)->valence > SIMPLIFY_HUB;
     if (!sum_position_quadric(s, a, b, r, &g, sums)) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};

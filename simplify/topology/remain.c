@@ -95,11 +95,11 @@ static bool is_folded(v3 n, double n2, v3 m, double m2, bool same_direction) {
 /* Whether the first two faces of the edge point-x are folded now. */
 static bool is_edge_folded(const fct_simplifier *s, uint32_t point, uint32_t x) {
     if (point == FCT_NONE) return false;
-    if (s->valences[x] < s->valences[point]) {
+    if (point_at(s, x)->valence < point_at(s, point)->valence) {
         uint32_t swap = x;
         x = point, point = swap;
     }
-    uint32_t first = fct_simplify_find_side(s, s->first_corners[point], x);
+    uint32_t first = fct_simplify_find_side(s, point_at(s, point)->first_corner, x);
     if (first == FCT_NONE) return false;
     uint32_t second = fct_simplify_find_side(s, s->next_corners[first], x);
     if (second == FCT_NONE) return false;
@@ -110,12 +110,12 @@ static bool is_edge_folded(const fct_simplifier *s, uint32_t point, uint32_t x) 
 
 /* The number of faces of the edge point-x now, at most 3. */
 static uint32_t count_faces(const fct_simplifier *s, uint32_t point, uint32_t x) {
-    if (s->valences[x] < s->valences[point]) {
+    if (point_at(s, x)->valence < point_at(s, point)->valence) {
         uint32_t swap = x;
         x = point, point = swap;
     }
     uint32_t count = 0;
-    for (uint32_t c = s->first_corners[point]; count < 3; c = s->next_corners[c], ++count) {
+    for (uint32_t c = point_at(s, point)->first_corner; count < 3; c = s->next_corners[c], ++count) {
         c = fct_simplify_find_side(s, c, x);
         if (c == FCT_NONE) break;
     }
@@ -134,8 +134,8 @@ static bool list_hub_faces(fct_simplifier *s, const fct_move *move) {
     uint32_t moved = s->remaining_count;
     for (uint32_t i = 0; i < 2 * moved; ++i) {
         uint32_t x = i % 2 ? s->remaining[i / 2].y : s->remaining[i / 2].x;
-        if (s->valences[x] > SIMPLIFY_HUB) return false;
-        for (uint32_t c = s->first_corners[x]; c != FCT_NONE; c = s->next_corners[c]) {
+        if (point_at(s, x)->valence > SIMPLIFY_HUB) return false;
+        for (uint32_t c = point_at(s, x)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
             c = fct_simplify_find_side(s, c, move->a);
             if (c == FCT_NONE) break;
             uint32_t at_a = s->triangles[corner_next(c)] == move->a ? corner_next(c) : corner_previous(c);
@@ -175,10 +175,10 @@ static bool may_crowd_edge(const fct_simplifier *s, const fct_move *move, uint32
 
 /* Whether the side x-y of face i stays unfolded, or was folded before. */
 static bool check_fixed_side(const fct_simplifier *s, const fct_move *move, const fct_remaining *i) {
-    bool from_y = s->valences[i->y] < s->valences[i->x];
+    bool from_y = point_at(s, i->y)->valence < point_at(s, i->x)->valence;
     uint32_t point = from_y ? i->y : i->x, other = from_y ? i->x : i->y;
-    if (s->valences[point] > SIMPLIFY_HUB) return true;
-    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
+    if (point_at(s, point)->valence > SIMPLIFY_HUB) return true;
+    for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         c = fct_simplify_find_side(s, c, other);
         if (c == FCT_NONE) break;
         bool next = s->triangles[corner_next(c)] == other, same = next != from_y;
@@ -254,7 +254,7 @@ bool fct_simplify_is_tetrahedron(const fct_simplifier *s, const fct_move *move) 
             if (x == move->a || x == move->b || (count > 0 && x == points[0]) ||
                 (count > 1 && x == points[1]))
                 continue;
-            if (count == 2 || s->valences[x] != 3) return false;
+            if (count == 2 || point_at(s, x)->valence != 3) return false;
             points[count++] = x;
         }
     }

@@ -3,20 +3,20 @@
 
 uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring) {
     uint32_t count = 0, last = FCT_NONE;
-    for (uint32_t c = s->first_corners[point]; c != FCT_NONE; c = s->next_corners[c]) {
+    for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         if (corner_dead(s, c)) continue;
         if (last == FCT_NONE)
-            s->first_corners[point] = c;
+            point_at(s, point)->first_corner = c;
         else
             s->next_corners[last] = c;
         last = c;
         ring[count++] = c;
     }
     if (last == FCT_NONE)
-        s->first_corners[point] = FCT_NONE;
+        point_at(s, point)->first_corner = FCT_NONE;
     else
         s->next_corners[last] = FCT_NONE;
-    s->last_corners[point] = last;
+    point_at(s, point)->last_corner = last;
     return count;
 }
 

@@ -10,6 +10,7 @@
 #include "simplify/topology/topology.h"
 
 #include <float.h>
+#include <stddef.h>
 
 #include "base/key.h"
 #include "simplify/topology/weld.h"
@@ -114,10 +115,9 @@ static fct_result make_points(fct_simplifier *s) {
     if (result != FCT_OK) return result;
 
     uint32_t count = s->point_count;
-    const fct_array arrays[] = {
-        FCT_ARRAY(s->positions, 3 * (size_t)count), FCT_ARRAY(s->sources, count),
-        FCT_ARRAY(s->point_parents, count),         FCT_ARRAY(s->first_corners, count),
-        FCT_ARRAY(s->last_corners, count),          FCT_ARRAY_ZERO(s->valences, count)};
+    s->point_stride = s->channel_count ? offsetof(fct_point, quadric) : sizeof(fct_point);
+    const fct_array arrays[] = {FCT_ARRAY_ZERO(s->points, s->point_stride * count),
+                                FCT_ARRAY(s->point_parents, count)};
     result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the points of a mesh");
     if (result != FCT_OK) return result;
     find_frame(s);
@@ -126,12 +126,10 @@ static fct_result make_points(fct_simplifier *s) {
         uint32_t p = s->point_of[v];
         if (p == FCT_NONE) continue;
         v3 at = v3_scale(v3_sub(v3_load(mesh->positions + 3 * (size_t)v), s->center), 1 / s->extent);
-        s->positions[3 * (size_t)p] = at.x, s->positions[3 * (size_t)p + 1] = at.y;
-        s->positions[3 * (size_t)p + 2] = at.z;
-        s->sources[p] = v;
+        point_at(s, p)->at = at;
+        point_at(s, p)->source = v;
     }
-    for (uint32_t p = 0; p < count; ++p) s->point_parents[p] = p;
-    memset(s->first_corners, 0xff, count * sizeof *s->first_corners);
+    for (uint32_t p = 0; p < count; ++p) s->point_parents[p] = p, point_at(s, p)->first_corner = FCT_NONE;
     return FCT_OK;
 }
 
@@ -154,13 +152,13 @@ static fct_result make_rings(fct_simplifier *s) {
         ++s->live_faces;
         for (uint32_t k = 0; k < 3; ++k) {
             uint32_t p = out[k], c = 3 * f + k;
-            if (s->first_corners[p] == FCT_NONE)
-                s->first_corners[p] = c;
+            if (point_at(s, p)->first_corner == FCT_NONE)
+                point_at(s, p)->first_corner = c;
             else
-                s->next_corners[s->last_corners[p]] = c;
-            s->last_corners[p] = c;
+                s->next_corners[point_at(s, p)->last_corner] = c;
+            point_at(s, p)->last_corner = c;
             s->next_corners[c] = FCT_NONE;
-            ++s->valences[p];
+            ++point_at(s, p)->valence;
         }
     }
     s->face_count = s->live_faces;
@@ -262,7 +260,7 @@ static fct_result make_edges(fct_simplifier *s) {
     if (result != FCT_OK) goto done;
     memset(b.marks, 0xff, s->point_count * sizeof *b.marks);
     for (uint32_t a = 0; a < s->point_count; ++a)
-        for (uint32_t c = s->first_corners[a]; c != FCT_NONE; c = s->next_corners[c]) {
+        for (uint32_t c = point_at(s, a)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
             uint32_t previous = corner_previous(c);
             uint32_t y = s->triangles[corner_next(c)], z = s->triangles[previous];
             if (y > a) add_side(s, &b, a, y, c);

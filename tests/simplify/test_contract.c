@@ -39,7 +39,7 @@ static void the_queue_pops_within_an_eighth(void **state) {
 /* --- One contraction --- */
 
 static double value_at(const fct_simplifier *s, uint32_t wedge, const double *v) {
-    return fct_quadric_value(s->quadrics + (size_t)s->quadric_size * wedge, s->steering,
+    return fct_quadric_value(wedge_quadric(s, wedge), s->steering,
                              (v3){v[0], v[1], v[2]}, v + 3);
 }
 
@@ -54,7 +54,7 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
     def.placement = e % 3 ? FCT_PLACE_OPTIMAL : FCT_PLACE_SUBSET;
     fct_simplifier *s = open_simplifier(&env, mesh, &def), *old = open_simplifier(&env, mesh, &def);
     uint32_t ends[2] = {s->edges[e].ends[swap], s->edges[e].ends[!swap]}, corners = 3 * mesh->face_count;
-    uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]], a = ends[keep], b = ends[!keep];
+    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence, a = ends[keep], b = ends[!keep];
     fct_candidate candidate;
     assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
     fct_groups groups;
@@ -65,7 +65,7 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
 
     v3 at = point_position(s, a);
     assert_true(at.x == candidate.at.x && at.y == candidate.at.y && at.z == candidate.at.z);
-    assert_int_equal(s->sources[a], candidate.end < 2 ? old->sources[ends[candidate.end]] : FCT_NONE);
+    assert_int_equal(point_at(s, a)->source, candidate.end < 2 ? point_at(old, ends[candidate.end])->source : FCT_NONE);
     assert_int_equal(s->point_parents[b], a);
     uint32_t live = 0, valences[64] = {0};
     for (uint32_t f = 0; f < mesh->face_count; ++f) {
@@ -83,7 +83,7 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
         }
     }
     assert_int_equal(s->live_faces, live);
-    for (uint32_t p = 0; p < s->point_count; ++p) assert_int_equal(s->valences[p], valences[p]);
+    for (uint32_t p = 0; p < s->point_count; ++p) assert_int_equal(point_at(s, p)->valence, valences[p]);
     uint32_t *ring = malloc(corners * sizeof *ring);
     assert_int_equal(fct_simplify_gather(s, a, ring), valences[a]);
     free(ring);
@@ -171,17 +171,17 @@ static void a_retired_wedge_leaves_its_quadric(void **state) {
     assert_true(point == s->point_of[3] && gone != kept);
     fct_elimination e;
     double before[POSITION_QUADRIC];
-    memcpy(before, s->quadrics + (size_t)s->quadric_size * kept, sizeof before);
-    fct_quadric_eliminate(s->quadrics + (size_t)s->quadric_size * gone, s->steering,
+    memcpy(before, wedge_quadric(s, kept), sizeof before);
+    fct_quadric_eliminate(wedge_quadric(s, gone), s->steering,
                           s->attributes + (size_t)s->channel_count * gone, 0, &e);
     uint32_t ends[2] = {s->point_of[1], s->point_of[2]};
-    uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
+    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
     fct_candidate candidate;
     assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
     fct_simplify_collapse(s, ends, &candidate, keep, fct_simplify_gather(s, ends[!keep], s->ring_b));
     assert_int_equal(s->first_wedges[point], kept);
     assert_int_equal(s->next_wedges[kept], FCT_NONE);
-    const double *q = s->quadrics + (size_t)s->quadric_size * kept;
+    const double *q = wedge_quadric(s, kept);
     for (int k = 0; k < POSITION_QUADRIC; ++k) assert_close(q[k], before[k] + e.position[k], 1e-9);
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
@@ -223,16 +223,16 @@ static void the_busiest_wedge_takes_a_quadric(void **state) {
         fct_elimination e;
         double before[3][POSITION_QUADRIC];
         for (int k = 0; k < 3; ++k)
-            memcpy(before[k], s->quadrics + (size_t)s->quadric_size * wedges[k], sizeof before[k]);
-        fct_quadric_eliminate(s->quadrics + (size_t)s->quadric_size * wedges[lone], s->steering,
+            memcpy(before[k], wedge_quadric(s, wedges[k]), sizeof before[k]);
+        fct_quadric_eliminate(wedge_quadric(s, wedges[lone]), s->steering,
                               s->attributes + (size_t)s->channel_count * wedges[lone], 0, &e);
         uint32_t ends[2] = {s->point_of[3 + alone], s->point_of[4 + alone]};
-        uint32_t keep = s->valences[ends[1]] > s->valences[ends[0]];
+        uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
         fct_candidate candidate;
         assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
         fct_simplify_collapse(s, ends, &candidate, keep, fct_simplify_gather(s, ends[!keep], s->ring_b));
-        const double *taken = s->quadrics + (size_t)s->quadric_size * wedges[most],
-                     *kept = s->quadrics + (size_t)s->quadric_size * wedges[few];
+        const double *taken = wedge_quadric(s, wedges[most]),
+                     *kept = wedge_quadric(s, wedges[few]);
         for (int k = 0; k < POSITION_QUADRIC; ++k) {
             assert_close(taken[k], before[most][k] + e.position[k], 1e-9);
             assert_true(kept[k] == before[few][k]);
@@ -301,7 +301,7 @@ static void quadrics_of_remaining_points_are_sums(void **state) {
     uint64_t seed = 77;
     double largest = 0;
     for (uint32_t p = 0; p < s->point_count; ++p) {
-        if (s->point_parents[p] != p || s->valences[p] == 0) continue;
+        if (s->point_parents[p] != p || point_at(s, p)->valence == 0) continue;
         v3 at = point_position(s, p), probe = random_vector(&seed);
         double sum = 0, area = 0, here = 0;
         for (uint32_t q = 0; q < s->point_count; ++q) {
@@ -309,7 +309,7 @@ static void quadrics_of_remaining_points_are_sums(void **state) {
             const double *part = old->quadrics + (size_t)POSITION_QUADRIC * q;
             sum += quadric_at(part, probe), here += quadric_at(part, at), area += part[10];
         }
-        const double *all = s->quadrics + (size_t)POSITION_QUADRIC * p;
+        const double *all = wedge_quadric(s, p);
         assert_ratio(quadric_at(all, probe), sum, .1);
         assert_true(quadric_at(all, probe) >= sum * (1 - 1e-9));
         assert_ratio(all[10], area, 1e-9);

@@ -82,7 +82,8 @@ static void check_pass(unsigned arrays, double amount, uint64_t seed) {
     static expected x;
     memset(&x, 0, sizeof x);
     assert_true(s->point_count <= 64 && s->wedge_count <= 96);
-    for (uint32_t i = 0; i < 3 * s->point_count; ++i) s->positions[i] += between(&seed, -amount, amount);
+    for (uint32_t p = 0; p < s->point_count; ++p)
+        point_at(s, p)->at = v3_mad(point_position(s, p), amount, random_vector(&seed));
     for (uint32_t i = 0; i < s->wedge_count * s->channel_count; ++i)
         s->attributes[i] += between(&seed, -.02, .02);
     for (uint32_t f = 0; f < mesh.face_count; ++f) {
@@ -136,12 +137,12 @@ static void steps_are_at_most_half_the_shortest_edge(void **state) {
     fct_simplify_def def = fct_simplify_def_default();
     def.refit_passes = 1;
     fct_simplifier *s = open_simplifier(&env, &mesh, &def);
-    for (uint32_t k = 4; k < 6; ++k) s->positions[3 * s->point_of[k] + 2] += .05;
+    for (uint32_t k = 4; k < 6; ++k) point_at(s, s->point_of[k])->at.z += .05;
     v3 from = point_position(s, s->point_of[4]);
     assert_int_equal(fct_simplify_refit(s), FCT_OK);
     double step = v3_norm(v3_sub(point_position(s, s->point_of[4]), from));
     assert_ratio(step, .5 * .02 / 2, 1e-4); /* half of .02, in the unit cube */
-    assert_int_equal(s->sources[s->point_of[4]], FCT_NONE);
+    assert_int_equal(point_at(s, s->point_of[4])->source, FCT_NONE);
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
 }
@@ -153,7 +154,7 @@ static void nothing_moves_without_a_residual(void **state) {
     fct_simplify_def def = fct_simplify_def_default();
     fct_simplifier *s = open_simplifier(&env, &mesh, &def);
     assert_int_equal(fct_simplify_refit(s), FCT_OK);
-    for (uint32_t p = 0; p < s->point_count; ++p) assert_true(s->sources[p] != FCT_NONE);
+    for (uint32_t p = 0; p < s->point_count; ++p) assert_true(point_at(s, p)->source != FCT_NONE);
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
 }

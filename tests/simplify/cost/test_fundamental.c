@@ -97,7 +97,7 @@ static void check_wedges(const fct_mesh *mesh, const fct_simplify_def *def) {
     fct_simplifier *s = open_simplifier(&env, mesh, def);
     uint64_t seed = 7;
     for (uint32_t w = 0; w < s->wedge_count; ++w) {
-        const double *q = s->quadrics + (size_t)s->quadric_size * w;
+        const double *q = wedge_quadric(s, w);
         assert_close(q[10], wedge_area(s, w), 1e-12);
         for (int k = 0; k < 3; ++k) {
             double v[3 + SIMPLIFY_MAX_CHANNELS];

@@ -60,7 +60,7 @@ static problem make_problem(const fct_simplifier *s, uint32_t a, uint32_t b) {
         double size = 0;
         for (uint32_t i = 0; i < p.count; ++i) {
             if (p.group_of[i] != g) continue;
-            const double *q = s->quadrics + (size_t)s->quadric_size * p.wedges[i];
+            const double *q = wedge_quadric(s, p).wedges[i];
             ++members;
             size += q[0] + q[3] + q[5] + q[10];
             p.area += q[10];
@@ -78,7 +78,7 @@ static double evaluate(const problem *p, const double *x) {
     uint32_t m = p->s->steering;
     double value = 0;
     for (uint32_t i = 0; i < p->count; ++i)
-        value += fct_quadric_value(p->s->quadrics + (size_t)p->s->quadric_size * p->wedges[i], m,
+        value += fct_quadric_value(wedge_quadric(p->s, p->wedges[i]), m,
                                    (v3){x[0], x[1], x[2]}, x + 3 + m * p->group_of[i]);
     for (uint32_t g = 0; g < p->groups; ++g)
         for (uint32_t k = 0; k < m; ++k) value += p->ridge[g] * pow(x[3 + m * g + k] - p->mean[g][k], 2);

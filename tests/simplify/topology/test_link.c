@@ -150,7 +150,7 @@ static void rings_drop_dead_corners(void **state) {
                 ++want;
             }
             assert_int_equal(count, want);
-            assert_int_equal(s->last_corners[p], want ? s->ring_a[want - 1] : FCT_NONE);
+            assert_int_equal(point_at(s, p)->last_corner, want ? s->ring_a[want - 1] : FCT_NONE);
         }
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
@@ -242,10 +242,7 @@ static void faces_may_not_become_thin(void **state) {
                    up = least * pow(10, between(&seed, -1, 4));
             at[k] = v3_mad(v3_mad(at[0], uniform(&seed) < .5 ? along : -along, x), up, y);
         }
-        for (int k = 0; k < 3; ++k) {
-            double *p = s->positions + 3 * (size_t)points[k];
-            p[0] = at[k].x, p[1] = at[k].y, p[2] = at[k].z;
-        }
+        for (int k = 0; k < 3; ++k) point_at(s, points[k])->at = at[k];
         double before = find_height(at[0], at[1], at[2]) / least,
                after = find_height(at[0], at[1], at[3]) / least;
         if (before < 1.001 || fabs(after - 1) < .001) continue;

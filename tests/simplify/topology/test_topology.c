@@ -199,7 +199,7 @@ static void a_large_soup_finds_its_places(void **state) {
     assert_int_equal(s->point_count, sphere.vertex_count);
     assert_same_partition(s->point_of, sphere.triangles, corners);
     for (uint32_t c = 0; c < corners; ++c) {
-        uint32_t source = s->sources[s->point_of[c]];
+        uint32_t source = point_at(s, s->point_of[c])->source;
         assert_true(source <= c && equal_floats(soup.positions + 3 * source, soup.positions + 3 * c, 3));
     }
     fct_simplifier_destroy(s);
@@ -254,12 +254,12 @@ static void check_rings(const fct_simplifier *s) {
     bool *seen = calloc(corners + 1, 1);
     for (uint32_t p = 0; p < s->point_count; ++p) {
         uint32_t count = 0, last = FCT_NONE;
-        for (uint32_t c = s->first_corners[p]; c != FCT_NONE; c = s->next_corners[c]) {
+        for (uint32_t c = point_at(s, p)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
             assert_true(s->triangles[c] == p && !seen[c]);
             seen[c] = true, last = c, ++count;
         }
-        assert_int_equal(count, s->valences[p]);
-        if (count) assert_int_equal(last, s->last_corners[p]);
+        assert_int_equal(count, point_at(s, p)->valence);
+        if (count) assert_int_equal(last, point_at(s, p)->last_corner);
         assert_int_equal(s->point_parents[p], p);
     }
     uint32_t live = 0;
