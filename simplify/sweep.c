@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 
 enum {
-    BLOCK_POINTS = 8192,
+    BLOCK_POINTS = 4096,
     LEAST_EDGES = 8192, /* of a sweep */
     LEAST_SHARE = 32,               /* sweeps go on while they contract this part of their edges */
 };

@@ -44,17 +44,15 @@ void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uin
 }
 
 /* delta = -(A + ridge I)^-1 g by an L D L^T decomposition; false if a pivot is not positive. */
-static bool solve_position(const double *r, double ridge, v3 g, v3 *delta) {
-    double d0 = r[0] + ridge;
-    if (!(d0 > 0)) return false;
-    double l1 = r[1] / d0, l2 = r[2] / d0;
-    double d1 = r[3] + ridge - l1 * r[1], k = r[4] - l1 * r[2];
-    if (!(d1 > 0)) return false;
-    double l3 = k / d1, d2 = r[5] + ridge - l2 * r[2] - l3 * k;
-    if (!(d2 > 0)) return false;
+static inline bool solve_position(const double *r, double ridge, v3 g, v3 *delta) {
+    double d0 = r[0] + ridge, i0 = 1 / d0;
+    double l1 = r[1] * i0, l2 = r[2] * i0;
+    double d1 = r[3] + ridge - l1 * r[1], i1 = 1 / d1, k = r[4] - l1 * r[2];
+    double l3 = k * i1, d2 = r[5] + ridge - l2 * r[2] - l3 * k;
+    if (!(d0 > 0 && d1 > 0 && d2 > 0)) return false;
     double y = g.y - l1 * g.x, z = (g.z - l2 * g.x - l3 * y) / d2;
-    y = y / d1 - l3 * z;
-    *delta = (v3){-(g.x / d0 - l1 * y - l2 * z), -y, -z};
+    y = y * i1 - l3 * z;
+    *delta = (v3){-(g.x * i0 - l1 * y - l2 * z), -y, -z};
     return true;
 }
 
@@ -136,7 +134,33 @@ static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, doub
     return true;
 }
 
+/* The common case: no attributes, the optimal position, no hub. With m the middle of a-b and d the way from
+ * it, (A + ridge I) d = -g, so Q(m + d) = Q(m) + g.d - ridge |d|^2. False if step 1 of 3.5 fails. */
+static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_point *b,
+                         fct_candidate *out) {
+    double r[POSITION_QUADRIC];
+    for (int k = 0; k < POSITION_QUADRIC; ++k) r[k] = a->quadric[k] + b->quadric[k];
+    v3 middle = v3_scale(v3_add(a->at, b->at), .5), g = quadric_gradient(r, middle), delta;
+    double ridge = s->def->regularization * quadric_trace(r), length2 = v3_norm2(v3_sub(b->at, a->at));
+    if (!solve_position(r, ridge, g, &delta)) return false;
+    double reach2 = v3_norm2(delta);
+    if (!(reach2 <= MAX_REACH * MAX_REACH * length2)) return false;
+    double error = v3_dot(middle, g) + r[6] * middle.x + r[7] * middle.y + r[8] * middle.z + r[9] +
+                   v3_dot(g, delta) - ridge * reach2;
+    out->at = v3_add(middle, delta);
+    out->end = 2;
+    out->error = error > 0 ? error : 0;
+    out->area = r[10];
+    memcpy(out->resistance, r, sizeof out->resistance);
+    out->key = out->error + ridge * (reach2 + .25 * length2);
+    return true;
+}
+
 bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_candidate *out) {
+    const fct_point *first = point_at(s, a), *second = point_at(s, b);
+    if (!s->channel_count && s->def->placement == FCT_PLACE_OPTIMAL && !ends_only &&
+        first->valence <= SIMPLIFY_HUB && second->valence <= SIMPLIFY_HUB && place_freely(s, first, second, out))
+        return true;
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
     v3 pa = point_position(s, a), pb = point_position(s, b);
