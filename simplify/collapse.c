@@ -2,6 +2,8 @@
  * with at most 64 wedges. */
 #include "simplify/collapse.h"
 
+#include "simplify/cost/constraint.h"
+
 /* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
 #define RETIRED_RIDGE 1e-12
 
@@ -150,6 +152,7 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
         const double *from = s->quadrics + (size_t)POSITION_QUADRIC * b;
         for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
     }
+    fct_constraint_merge(s, a, b);
     double *at = s->positions + 3 * (size_t)a;
     at[0] = candidate->at.x, at[1] = candidate->at.y, at[2] = candidate->at.z;
 }
