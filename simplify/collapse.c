@@ -2,6 +2,8 @@
  * with at most 64 wedges. */
 #include "simplify/collapse.h"
 
+#include "simplify/cost/constraint.h"
+
 /* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
 #define RETIRED_RIDGE 1e-12
 
@@ -150,5 +152,6 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
         const double *from = wedge_quadric(s, b);
         for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
     }
+    fct_constraint_merge(s, a, b);
     point_at(s, a)->at = candidate->at;
 }

@@ -77,7 +77,7 @@ static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
         return false;
     }
     double bound = s->def->max_error / s->extent;
-    if (candidate->error > 0 && candidate->error > bound * bound * candidate->area) {
+    if (candidate->error > 0 && candidate->error - candidate->excess > bound * bound * candidate->area) {
         refuse_edge(s, e, ends, EDGE_OVER_BOUND);
         return false;
     }
@@ -153,7 +153,8 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
     }
     if (!confirm_cost(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
-    if (candidate.error > 0) s->max_error2 = fct_max(s->max_error2, candidate.error / candidate.area);
+    if (candidate.error > 0)
+        s->max_error2 = fct_max(s->max_error2, (candidate.error - candidate.excess) / candidate.area);
     return true;
 }
 

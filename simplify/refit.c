@@ -10,6 +10,7 @@
 #include "simplify/refit.h"
 
 #include "base/parallel.h"
+#include "simplify/cost/constraint.h"
 #include "simplify/cost/nearest.h"
 #include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
@@ -19,6 +20,9 @@
 /* Added to the diagonal of a point's system, times its trace, so that no point slides along the surface. With
  * a far smaller value points move far away from it. */
 #define DAMPING .1
+/* The weight of the planes that hold a point, relative to their weight in a contraction. With 1, E_avg is 3 %
+ * larger at a hundredth of the faces, and boundaries are as close. */
+#define PLANES .1
 /* The longest step, in lengths of the shortest edge at the point. */
 #define MAX_STEP .5
 /* Shorter distances, in the unit cube, are rounding errors of the input's floats. */
@@ -246,13 +250,38 @@ static v3 solve_damped(const double q[9]) {
                 (c * q[6] + e * q[7] + f * q[8]) / det};
 }
 
+/* Adds the planes that hold a point. */
+static void add_planes(const fct_simplifier *s, const fct_constraint *held, v3 at, double system[9]) {
+    double weight = PLANES * constraint_weight(s, held, system[0] + system[3] + system[5]);
+    v3 g = quadric_gradient(held->planes, at);
+    for (int k = 0; k < 6; ++k) system[k] += weight * held->planes[k];
+    system[6] -= weight * g.x, system[7] -= weight * g.y, system[8] -= weight * g.z;
+}
+
+/* The step of a point, as far as its constraint allows it. */
+static v3 find_step(const refit *r, uint32_t point) {
+    const fct_simplifier *s = r->s;
+    const fct_constraint *held = constraint_at(s, point);
+    double *q = r->systems[point];
+    if (!held) return v3_scale(solve_damped(q), STEP);
+    if (held->hold == HOLD_POINT) return (v3){0, 0, 0};
+    if (held->hold == HOLD_LINE) {
+        v3 d = s->lines[held->line].direction;
+        double curvature = sym3_form(q, d, d) + DAMPING * (q[0] + q[3] + q[5]);
+        double slope = d.x * q[6] + d.y * q[7] + d.z * q[8];
+        return curvature > 0 ? v3_scale(d, STEP * slope / curvature) : (v3){0, 0, 0};
+    }
+    add_planes(s, held, point_position(s, point), q);
+    return v3_scale(solve_damped(q), STEP);
+}
+
 /* Moves each point by its step, in the order of the points. Hubs and steps that would fold a face over are
  * left out. */
 static void move_points(refit *r) {
     fct_simplifier *s = r->s;
     for (uint32_t p = 0; p < s->point_count; ++p) {
         if (point_at(s, p)->valence == 0 || point_at(s, p)->valence > SIMPLIFY_HUB) continue;
-        v3 step = v3_scale(solve_damped(r->systems[p]), STEP);
+        v3 step = find_step(r, p);
         double length2 = v3_norm2(step), shortest2 = INFINITY;
         if (!(length2 > NOISE * NOISE)) continue;
         v3 from = point_position(s, p);

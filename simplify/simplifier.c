@@ -2,6 +2,7 @@
 #include "simplify/simplifier.h"
 
 #include "simplify/cost/channels.h"
+#include "simplify/cost/constraint.h"
 #include "simplify/cost/fundamental.h"
 #include "simplify/topology/topology.h"
 
@@ -10,6 +11,7 @@ static fct_result fill_simplifier(fct_simplifier *s) {
     fct_result result = fct_simplify_topology(s);
     if (result == FCT_OK) result = fct_simplify_attributes(s);
     if (result == FCT_OK) result = fct_simplify_quadrics(s);
+    if (result == FCT_OK) result = fct_simplify_constraints(s);
     if (result != FCT_OK) return result;
     s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
     s->side_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->side_marks);
@@ -28,7 +30,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->next_corners,  s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,
                       s->quadrics,      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,
                       s->wedge_classes, s->class_parents, s->link_marks,    s->side_marks,   s->refused,
-                      s->scratches};
+                      s->constraint_of, s->constraints, s->lines,   s->scratches};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_release(s->env, s);
 }

@@ -20,7 +20,7 @@ fct_simplify_def fct_simplify_def_default(void) {
         .color_weight = .1,
         .texcoord_weight = .1,
         .normal_weight = .01,
-        .boundary_weight = 1000,
+        .boundary_weight = 3,
         .feature_threshold = .1,
         .regularization = 1e-9,
         .refit_passes = 2,

@@ -46,6 +46,20 @@ typedef struct fct_remaining {
     double norm2;          /* of `normal` */
 } fct_remaining;
 
+/* What holds a point besides its planes. */
+enum { HOLD_PLANES, HOLD_LINE, HOLD_POINT };
+
+/* What holds a point of a boundary, a border or a seam (cost/constraint.h). */
+typedef struct fct_constraint {
+    double planes[POSITION_QUADRIC]; /* of the held sides; [10] is the sum of their lengths */
+    uint32_t line;                   /* of HOLD_LINE */
+    uint8_t hold;
+} fct_constraint;
+
+typedef struct fct_line {
+    v3 origin, direction; /* of unit length */
+} fct_line;
+
 /* The faces of an edge from the moved point. */
 typedef struct fct_side_mark {
     uint32_t epoch;
@@ -91,18 +105,24 @@ typedef struct fct_simplifier {
     uint32_t *corner_wedges; /* NULL without attributes; resolve with corner_wedge */
 
     fct_edge *edges;
-    uint8_t *edge_flags; /* per edge: EDGE_BOUNDARY, EDGE_BORDER; valid until the quadrics are made */
+    uint8_t *edge_flags; /* per edge: EDGE_BOUNDARY, EDGE_BORDER; valid until the constraints are made */
 
     /* Per wedge. The first `steering` channels are dimensions of the quadrics; the others are interpolated.
      */
     uint32_t steering, channel_count, quadric_size;
     fct_channel channels[SIMPLIFY_MAX_CHANNELS];
-    double *quadrics;   /* x quadric_size; NULL without attributes: the quadrics of the points */
+    double *quadrics;   /* x quadric_size, of the faces alone; NULL without attributes: the quadrics of the points */
     double *attributes; /* x channel_count; NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
     uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
     uint32_t *class_parents;
     uint32_t class_count;
+
+    /* NULL if boundary_weight is 0. */
+    uint32_t *constraint_of; /* per point: its constraint; FCT_NONE if nothing holds it */
+    fct_constraint *constraints;
+    fct_line *lines;
+    uint32_t constraint_count, line_count;
 
     fct_scratch *scratches; /* one per thread */
     /* The scratch in use. */

@@ -49,7 +49,10 @@ static const struct argp_option simplify_options_table[] = {
      "(either end)",
      0},
     {"boundary", KEY_BOUNDARY, "W", 0,
-     "Weight of the planes that keep boundaries and borders in place (default 1000)", 0},
+     "How many times the squared distance of boundaries and borders from their place counts, relative to "
+     "that of "
+     "the surface; 0: nothing holds them (default 3)",
+     0},
     {"feature-threshold", KEY_FEATURE, "T", 0,
      "Two faces whose colours differ by more than T in |dr| + |dg| + |db| make a border (default .1; inf: "
      "none)",

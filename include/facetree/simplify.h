@@ -36,17 +36,19 @@ typedef enum fct_stop {
 typedef struct fct_simplify_def {
     uint32_t size;
     uint32_t target_faces; /* stop at this count or below; default 0 */
-    /* Make no contraction whose error is larger; in the mesh's unit; default infinity. The error is sqrt(Q /
-     * area), where Q is the quadric at the new point and area the area of the faces in Q. Q includes
-     * attributes and constraint planes, so the error is a distance (root mean square) only if both are
-     * absent. */
+    /* Make no contraction whose error is larger; in the mesh's unit; default infinity. The squared error is
+     * the mean squared distance from the planes of the faces, plus that from the planes of the boundary
+     * (without boundary_weight), plus the share of the attributes. */
     double max_error;
     fct_placement placement; /* default OPTIMAL */
     double color_weight;     /* default .1 */
     double texcoord_weight;  /* default .1 */
     double normal_weight;    /* default .01 */
-    double boundary_weight;  /* of the constraint planes through boundaries, borders and seams (3.6); default
-                                1000 */
+    /* Squared distances of boundaries, borders and seams from their place (3.6) count this times as much as
+     * those of the surface; default 3. With 0 nothing holds them. With any other weight a straight part of
+     * such a curve stays on its line, and its ends stay where they are, unless a contraction has to give up
+     * one of two such rules. */
+    double boundary_weight;
     /* Two faces whose colours differ by more in |dr| + |dg| + |db| make a border; default .1; infinity: no
      * borders. Two faces of different materials always make one. */
     double feature_threshold;

@@ -1,5 +1,5 @@
 /* simplify/cost/fundamental.h: the initial quadric of every wedge, the sum of the fundamental quadrics of its
- * faces and constraint planes (Garland 1999, sections 3.4.1, 3.6 and 5.2). */
+ * faces (Garland 1999, sections 3.4.1 and 5.2). */
 #ifndef FCT_SIMPLIFY_FUNDAMENTAL_H
 #define FCT_SIMPLIFY_FUNDAMENTAL_H
 

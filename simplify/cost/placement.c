@@ -9,6 +9,8 @@
  */
 #include "simplify/cost/placement.h"
 
+#include "simplify/cost/constraint.h"
+
 /* The largest distance of a minimiser from the edge's midpoint, in lengths of the edge. */
 #define MAX_REACH 2.0
 
@@ -100,15 +102,49 @@ static void place_by_policy(const fct_simplifier *s, const double *r, v3 a, v3 b
     place_on_segment(r, a, b, ridge, out);
 }
 
+/* The new point of an end on a line and one that may leave its place: the minimum on the line, from the
+ * edge's midpoint. If it is too far away, or if only ends may be tried, as place_at_ends. */
+static void place_on_line(const fct_simplifier *s, const double *r, const fct_joint *joint, v3 a, v3 b,
+                          bool ends_only, fct_candidate *out) {
+    const fct_line *line = &s->lines[joint->held.line];
+    v3 middle = v3_scale(v3_add(a, b), .5), d = line->direction;
+    v3 from = v3_mad(line->origin, v3_dot(v3_sub(middle, line->origin), d), d);
+    double curvature = sym3_form(r, d, d) + s->def->regularization * quadric_trace(r);
+    double t = curvature > 0 ? -v3_dot(d, quadric_gradient(r, from)) / curvature : 0;
+    v3 at = v3_mad(from, t, d);
+    bool near = v3_norm2(v3_sub(at, middle)) <= MAX_REACH * MAX_REACH * v3_norm2(v3_sub(b, a));
+    if (s->def->placement == FCT_PLACE_OPTIMAL && !ends_only && near)
+        *out = (fct_candidate){.at = at, .end = 2, .error = quadric_at(r, at)};
+    else if (!joint->ends[1] || (joint->ends[0] && quadric_at(r, a) <= quadric_at(r, b)))
+        *out = (fct_candidate){.at = a, .end = 0, .error = quadric_at(r, a)};
+    else
+        *out = (fct_candidate){.at = b, .end = 1, .error = quadric_at(r, b)};
+}
+
+/* The position that the constraint and then the policy choose. */
+static void place_point(const fct_simplifier *s, const double *r, const fct_joint *joint, v3 a, v3 b,
+                        bool ends_only, fct_candidate *out) {
+    if (joint && joint->held.hold == HOLD_LINE)
+        place_on_line(s, r, joint, a, b, ends_only, out);
+    else if (joint && joint->held.hold == HOLD_POINT) {
+        v3 at = joint->ends[0] ? a : b;
+        *out = (fct_candidate){.at = at, .end = joint->ends[1], .error = quadric_at(r, at)};
+    } else
+        place_by_policy(s, r, a, b, ends_only, out);
+}
+
 /* Subset placement takes the attributes of the chosen end too, so they are part of its cost. */
-static void place_subset(const fct_simplifier *s, const fct_groups *g, double sums[][MAX_QUADRIC], v3 a, v3 b,
-                         fct_candidate *out) {
+static void place_subset(const fct_simplifier *s, const fct_groups *g, double sums[][MAX_QUADRIC],
+                         const fct_joint *joint, double weight, v3 a, v3 b, fct_candidate *out) {
+    bool found = false;
     for (uint32_t end = 0; end < 2; ++end) {
-        double error = 0;
+        if (joint && !joint->ends[end]) continue;
+        double error = joint ? weight * quadric_at(joint->held.planes, end ? b : a) : 0;
         for (uint32_t i = 0; i < g->group_count; ++i)
             error += fct_quadric_value(sums[i], s->steering, end ? b : a, fct_groups_end(s, g, i, end));
-        if (end == 0 || error < out->error)
+        if (!found || error < out->error)
             *out = (fct_candidate){.at = end ? b : a, .end = end, .error = error};
+        found = true;
     }
 }
 
@@ -134,7 +170,7 @@ static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, doub
     return true;
 }
 
-/* The common case: no attributes, the optimal position, no hub. With m the middle of a-b and d the way from
+/* The common case: no attributes, no constraint, the optimal position, no hub. With m the middle of a-b and d the way from
  * it, (A + ridge I) d = -g, so Q(m + d) = Q(m) + g.d - ridge |d|^2. False if step 1 of 3.5 fails. */
 static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_point *b,
                          fct_candidate *out) {
@@ -150,6 +186,7 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
     out->at = v3_add(middle, delta);
     out->end = 2;
     out->error = error > 0 ? error : 0;
+    out->excess = 0;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);
     out->key = out->error + ridge * (reach2 + .25 * length2);
@@ -159,22 +196,30 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
 bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_candidate *out) {
     const fct_point *first = point_at(s, a), *second = point_at(s, b);
     if (!s->channel_count && s->def->placement == FCT_PLACE_OPTIMAL && !ends_only &&
-        first->valence <= SIMPLIFY_HUB && second->valence <= SIMPLIFY_HUB && place_freely(s, first, second, out))
+        first->valence <= SIMPLIFY_HUB && second->valence <= SIMPLIFY_HUB && !constraint_at(s, a) &&
+        !constraint_at(s, b) && place_freely(s, first, second, out))
         return true;
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
-    v3 pa = point_position(s, a), pb = point_position(s, b);
-    bool larger_b = point_at(s, b)->valence > point_at(s, a)->valence; /* of two hubs the larger one does not move */
-    bool hub_a = !larger_b && point_at(s, a)->valence > SIMPLIFY_HUB;
-    bool hub_b = larger_b && point_at(s, b)->valence > SIMPLIFY_HUB;
+    fct_joint joint;
+    v3 pa = first->at, pb = second->at;
+    bool larger_b = second->valence > first->valence; /* of two hubs the larger one does not move */
+    bool hub_a = !larger_b && first->valence > SIMPLIFY_HUB;
+    bool hub_b = larger_b && second->valence > SIMPLIFY_HUB;
     if (!sum_position_quadric(s, a, b, r, &g, sums)) return false;
+    bool held = fct_constraint_join(s, a, b, &joint);
+    double weight = held ? constraint_weight(s, &joint.held, r[10]) : 0;
+    for (int k = 0; k < 10 && held; ++k) r[k] += weight * joint.held.planes[k];
+    if (held && ((hub_a && !joint.ends[0]) || (hub_b && !joint.ends[1]))) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
     else if (s->steering && s->def->placement == FCT_PLACE_SUBSET)
-        place_subset(s, &g, sums, pa, pb, out);
+        place_subset(s, &g, sums, held ? &joint : NULL, weight, pa, pb, out);
     else
-        place_by_policy(s, r, pa, pb, ends_only, out);
+        place_point(s, r, held ? &joint : NULL, pa, pb, ends_only, out);
     if (!(out->error > 0)) out->error = 0;
+    double planes = held ? weight * quadric_at(joint.held.planes, out->at) : 0;
+    out->excess = held ? planes * (1 - 1 / s->def->boundary_weight) : 0;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);
     double reach2 = v3_norm2(v3_sub(out->at, pa)) + v3_norm2(v3_sub(out->at, pb));

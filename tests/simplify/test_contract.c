@@ -253,7 +253,7 @@ static bool price_edge(fct_simplifier *s, uint32_t e, double *key, double *error
     uint32_t count_a = fct_simplify_gather(s, a, s->ring_a), count_b = fct_simplify_gather(s, b, s->ring_b);
     const fct_move move = {a, b, count_a, count_b, c.at};
     if (!fct_simplify_remains_good(s, &move)) return false;
-    double lost = fct_loss_measure(s, a, b, count_a, count_b, &c, &loss);
+    double lost = fct_simplify_is_level(s) ? 0 : fct_loss_measure(s, a, b, count_a, count_b, &c, &loss);
     *key = c.key + lost, *error2 = (c.error + lost) / c.area;
     return true;
 }
@@ -306,7 +306,7 @@ static void quadrics_of_remaining_points_are_sums(void **state) {
         double sum = 0, area = 0, here = 0;
         for (uint32_t q = 0; q < s->point_count; ++q) {
             if (fct_sets_find(s->point_parents, q) != p) continue;
-            const double *part = old->quadrics + (size_t)POSITION_QUADRIC * q;
+            const double *part = wedge_quadric(old, q);
             sum += quadric_at(part, probe), here += quadric_at(part, at), area += part[10];
         }
         const double *all = wedge_quadric(s, p);

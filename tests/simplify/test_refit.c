@@ -1,5 +1,6 @@
 /* One pass of the refit against dense least-squares systems over all samples and all faces. */
 #include "oracle.h"
+#include "simplify/cost/constraint.h"
 #include "simplify/refit.h"
 
 static fct_env env;
@@ -97,6 +98,21 @@ static void check_pass(unsigned arrays, double amount, uint64_t seed) {
     v3 want[64];
     for (uint32_t p = 0; p < s->point_count; ++p) {
         double *system = x.systems[p], trace = system[0] + system[4] + system[8];
+        const fct_constraint *held = constraint_at(s, p);
+        for (int i = 0; i < 3 && held; ++i) { /* a tenth of their weight in a contraction */
+            double weight = .1 * def.boundary_weight * trace / held->planes[10];
+            double row[3][3] = {{held->planes[0], held->planes[1], held->planes[2]},
+                                {held->planes[1], held->planes[3], held->planes[4]},
+                                {held->planes[2], held->planes[4], held->planes[5]}},
+                   at[3];
+            v3_to_array(point_position(s, p), at);
+            for (int j = 0; j < 3; ++j) {
+                system[3 * i + j] += weight * row[i][j];
+                system[9 + i] -= weight * row[i][j] * at[j];
+            }
+            system[9 + i] -= weight * held->planes[6 + i];
+        }
+        trace = system[0] + system[4] + system[8];
         for (int i = 0; i < 3; ++i) system[4 * i] += .1 * trace;
         solve_dense(3, system, system + 9);
         want[p] = v3_mad(point_position(s, p), .5, (v3){system[9], system[10], system[11]});

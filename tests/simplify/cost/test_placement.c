@@ -1,6 +1,7 @@
 /* Groups by brute force; positions, costs and attributes against one dense system over the position and the
  * attributes of all groups. */
 #include "../oracle.h"
+#include "simplify/cost/constraint.h"
 #include "simplify/cost/placement.h"
 
 static fct_env env;
@@ -8,12 +9,12 @@ static fct_env env;
 enum { MAX_UNKNOWNS = 3 + SIMPLIFY_MAX_CHANNELS * 16 };
 
 /* The sum that a contraction minimises: f(p, a_1 ... a_G) = sum over groups of Q_g(p, a_g) + ridge_g |a_g -
- * mean_g|^2. */
+ * mean_g|^2 + the mean of the squared distances from the held planes, times the area and boundary_weight. */
 typedef struct problem {
     const fct_simplifier *s;
     uint32_t count, wedges[16], group_of[16], groups; /* groups numbered by their first wedge */
     bool second[16];
-    double mean[16][SIMPLIFY_MAX_CHANNELS], ridge[16], area;
+    double mean[16][SIMPLIFY_MAX_CHANNELS], ridge[16], area, planes[POSITION_QUADRIC];
 } problem;
 
 static uint32_t list_wedges(const fct_simplifier *s, uint32_t point, uint32_t *out) {
@@ -60,7 +61,7 @@ static problem make_problem(const fct_simplifier *s, uint32_t a, uint32_t b) {
         double size = 0;
         for (uint32_t i = 0; i < p.count; ++i) {
             if (p.group_of[i] != g) continue;
-            const double *q = wedge_quadric(s, p).wedges[i];
+            const double *q = wedge_quadric(s, p.wedges[i]);
             ++members;
             size += q[0] + q[3] + q[5] + q[10];
             p.area += q[10];
@@ -70,13 +71,23 @@ static problem make_problem(const fct_simplifier *s, uint32_t a, uint32_t b) {
         for (uint32_t k = 0; k < s->channel_count; ++k) p.mean[g][k] /= members;
         p.ridge[g] = s->steering ? s->def->regularization * size : 0;
     }
+    for (int end = 0; end < 2; ++end) {
+        const fct_constraint *held = constraint_at(s, end ? b : a);
+        for (int k = 0; k < POSITION_QUADRIC && held; ++k) p.planes[k] += held->planes[k];
+    }
     return p;
+}
+
+static double planes_at(const problem *p, v3 at) {
+    return p->planes[10] > 0
+               ? p->s->def->boundary_weight * p->area / p->planes[10] * quadric_at(p->planes, at)
+               : 0;
 }
 
 /* f at the unknowns: the position, then the steering attributes of each group. */
 static double evaluate(const problem *p, const double *x) {
     uint32_t m = p->s->steering;
-    double value = 0;
+    double value = planes_at(p, (v3){x[0], x[1], x[2]});
     for (uint32_t i = 0; i < p->count; ++i)
         value += fct_quadric_value(wedge_quadric(p->s, p->wedges[i]), m,
                                    (v3){x[0], x[1], x[2]}, x + 3 + m * p->group_of[i]);
@@ -237,6 +248,8 @@ static void check_edge(fct_simplifier *s, uint32_t e, bool ends_only) {
         assert_near(got.at, expected_position(&p, a, b, ends_only, ridge), 1e-5);
         assert_close(got.error, reduced(&p, got.at), 1e-9);
     }
+    double share = s->def->boundary_weight > 0 ? 1 - 1 / s->def->boundary_weight : 0;
+    assert_close(got.excess, share * planes_at(&p, got.at), 1e-9);
     if (got.end < 2) assert_near(got.at, got.end ? b : a, 0);
     assert_close(got.area, p.area, 1e-12);
     double reach = v3_norm2(v3_sub(got.at, a)) + v3_norm2(v3_sub(got.at, b));
@@ -283,7 +296,7 @@ static void candidates_solve_the_dense_system(void **state) {
                 fct_simplify_def def = fct_simplify_def_default();
                 def.placement = (fct_placement)policy;
                 def.regularization = kind == 1 ? .1 : kind == 3 ? 1e-9 : 1e-5;
-                def.boundary_weight = kind == 3 ? 0 : 1;
+                def.boundary_weight = kind == 3 ? 0 : kind == 2 ? .5 : 4;
                 def.color_weight = def.texcoord_weight = kind == 2 ? 0 : 1;
                 fct_simplifier *s = open_simplifier(&env, &mesh, &def);
                 for (uint32_t e = 0; e < s->edge_count; ++e) {
@@ -313,6 +326,43 @@ static void free_directions_stay_at_the_midpoint(void **state) {
     }
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
+}
+
+/* The new point of a side of a bumpy grid lies on the side, at the minimum of the sum along it. */
+static void points_of_a_line_slide_along_it(void **state) {
+    (void)state;
+    fct_mesh grid = make_grid(&env, 4);
+    uint64_t seed = 5;
+    for (uint32_t v = 5; v < 25; ++v) grid.positions[3 * v + 2] = (float)between(&seed, 0, .1);
+    fct_simplify_def def = fct_simplify_def_default();
+    for (int policy = FCT_PLACE_OPTIMAL; policy <= FCT_PLACE_SUBSET; ++policy) {
+        def.placement = (fct_placement)policy;
+        fct_simplifier *s = open_simplifier(&env, &grid, &def);
+        for (uint32_t e = 0; e < s->edge_count; ++e) {
+            uint32_t ends[2] = {s->edges[e].ends[0], s->edges[e].ends[1]};
+            fct_joint joint;
+            if (!fct_constraint_join(s, ends[0], ends[1], &joint) || joint.held.hold == HOLD_PLANES) continue;
+            v3 a = point_position(s, ends[0]), b = point_position(s, ends[1]);
+            fct_candidate got;
+            assert_true(fct_place(s, ends[0], ends[1], false, &got));
+            problem p = make_problem(s, ends[0], ends[1]);
+            assert_close(got.error, reduced(&p, got.at), 1e-12);
+            if (joint.held.hold == HOLD_POINT || policy != FCT_PLACE_OPTIMAL) {
+                bool second = !joint.ends[0] || (joint.ends[1] && reduced(&p, b) < reduced(&p, a));
+                assert_int_equal(got.end, second);
+                assert_near(got.at, second ? b : a, 0);
+                continue;
+            }
+            v3 d = s->lines[joint.held.line].direction, end = joint.ends[0] ? a : b;
+            assert_near(v3_cross(v3_sub(got.at, end), d), (v3){0, 0, 0}, 1e-15);
+            double here = reduced(&p, got.at);
+            if (v3_norm(v3_sub(got.at, v3_scale(v3_add(a, b), .5))) > 1.99 * v3_norm(v3_sub(b, a))) continue;
+            for (int side = -1; side <= 1 && got.end == 2; side += 2)
+                assert_true(reduced(&p, v3_mad(got.at, .01 * side, d)) > here);
+        }
+        fct_simplifier_destroy(s);
+    }
+    fct_mesh_release(&env, &grid);
 }
 
 static void a_hub_does_not_move(void **state) {
@@ -374,6 +424,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(candidates_solve_the_dense_system),
         cmocka_unit_test(free_directions_stay_at_the_midpoint),
+        cmocka_unit_test(points_of_a_line_slide_along_it),
         cmocka_unit_test(a_hub_does_not_move),
         cmocka_unit_test(a_group_has_the_attributes_of_its_end),
     };

@@ -1,0 +1,147 @@
+/* simplify/cost/constraint.c: see constraint.h.
+ *
+ * 1. The strength of an edge: 1 at open boundaries and at borders between materials or face colours; at
+ *    seams, where both sides have different attributes, the squared difference.
+ * 2. Each face at a held edge adds a plane to both ends: through the edge, perpendicular to the face,
+ *    weighted by the strength and the length of the edge.
+ * 3. lines.c finds the straight parts of the held curves.
+ * Faces without area add nothing. Cost: linear in the corners.
+ */
+#include "simplify/cost/constraint.h"
+
+#include "simplify/cost/lines.h"
+
+/* Squared difference of two wedges' attributes, at most 1. Each channel is divided by its range. */
+static double squared_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
+    if (w == u) return 0;
+    double sum = 0;
+    for (uint32_t i = 0; i < s->channel_count; ++i) {
+        const fct_channel *channel = &s->channels[i];
+        double d =
+            s->attributes[(size_t)s->channel_count * w + i] - s->attributes[(size_t)s->channel_count * u + i];
+        double range = channel->upper - channel->lower;
+        if (range > 0) sum += d * d / (range * range);
+    }
+    return sum < 1 ? sum : 1;
+}
+
+/* The strength of each edge, in [0, 1]. first_sides: scratch, one per edge. */
+static void find_strengths(const fct_simplifier *s, float *strength, uint32_t *first_sides) {
+    for (uint32_t e = 0; e < s->edge_count; ++e) strength[e] = s->edge_flags[e] ? 1 : 0;
+    if (!s->corner_wedges) return;
+    memset(first_sides, 0xff, s->edge_count * sizeof *first_sides);
+    for (uint32_t c = 0; c < 3 * s->mesh->face_count; ++c) {
+        if (corner_dead(s, c)) continue;
+        uint32_t e = s->side_edges[c], d = first_sides[e];
+        if (d == FCT_NONE) {
+            first_sides[e] = c;
+            continue;
+        }
+        uint32_t here = s->corner_wedges[c], there = s->corner_wedges[corner_next(c)];
+        bool same_way = s->triangles[c] == s->triangles[d];
+        uint32_t from = s->corner_wedges[d], to = s->corner_wedges[corner_next(d)];
+        double gap =
+            fct_max(squared_gap(s, here, same_way ? from : to), squared_gap(s, there, same_way ? to : from));
+        if (gap > strength[e]) strength[e] = (float)gap;
+    }
+}
+
+/* Numbers the points at held edges. Returns their count. */
+static uint32_t number_held_points(fct_simplifier *s, const float *strength) {
+    uint32_t count = 0;
+    memset(s->constraint_of, 0xff, s->point_count * sizeof *s->constraint_of);
+    for (uint32_t e = 0; e < s->edge_count; ++e)
+        for (int k = 0; k < 2 && strength[e] > 0; ++k) {
+            uint32_t *at = &s->constraint_of[s->edges[e].ends[k]];
+            if (*at == FCT_NONE) *at = count++;
+        }
+    return count;
+}
+
+/* Adds the planes through the held sides of face f to the points at both ends (3.6). */
+static void add_planes(fct_simplifier *s, uint32_t f, const float *strength) {
+    v3 p[3];
+    for (uint32_t k = 0; k < 3; ++k) p[k] = point_position(s, s->triangles[3 * f + k]);
+    v3 normal = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+    if (!(v3_norm2(normal) > 0)) return;
+    for (uint32_t k = 0; k < 3; ++k) {
+        uint32_t c = 3 * f + k, next = corner_next(c);
+        double held = strength[s->side_edges[c]];
+        if (held == 0) continue;
+        v3 side = v3_sub(p[(k + 1) % 3], p[k]), across = v3_unit(v3_cross(normal, side));
+        double length = v3_norm(side);
+        for (int end = 0; end < 2; ++end) {
+            double *planes = s->constraints[s->constraint_of[s->triangles[end ? next : c]]].planes;
+            quadric_add_plane(planes, across, p[k], held * length);
+            planes[10] += length;
+        }
+    }
+}
+
+fct_result fct_simplify_constraints(fct_simplifier *s) {
+    if (!(s->def->boundary_weight > 0)) return FCT_OK;
+    float *strength = NULL;
+    uint32_t *first_sides = NULL;
+    const fct_array scratch[] = {FCT_ARRAY(strength, s->edge_count),
+                                 FCT_ARRAY_IF(s->corner_wedges, first_sides, s->edge_count)};
+    fct_result result = fct_allocate_all(s->env, scratch, FCT_LENGTH(scratch), "constraints");
+    if (result != FCT_OK) return result;
+    s->constraint_of = fct_allocate(s->env, s->point_count, sizeof *s->constraint_of);
+    if (!s->constraint_of) {
+        result = fct_fail_memory(s->env, "constraints");
+        goto done;
+    }
+    find_strengths(s, strength, first_sides);
+    s->constraint_count = number_held_points(s, strength);
+    s->constraints = fct_allocate_zero(s->env, s->constraint_count, sizeof *s->constraints);
+    if (!s->constraints) {
+        result = fct_fail_memory(s->env, "constraints");
+        goto done;
+    }
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f)
+        if (!corner_dead(s, 3 * f)) add_planes(s, f, strength);
+    result = fct_simplify_find_lines(s, strength);
+done:
+    fct_release_all(s->env, scratch, FCT_LENGTH(scratch));
+    return result;
+}
+
+/* Whether the point lies on the line, apart from the rounding of the input. */
+static bool lies_on_line(const fct_simplifier *s, v3 p, uint32_t line) {
+    v3 rest = v3_cross(v3_sub(p, s->lines[line].origin), s->lines[line].direction);
+    return v3_norm2(rest) <= s->least_height * s->least_height;
+}
+
+/* 1. A point that stays and one that nothing but planes holds: the first wins.
+ * 2. Two points of one line: the line. A point of a line and one that stays on this line: the second.
+ * 3. Else both are broken. */
+static void join_holds(const fct_simplifier *s, const fct_constraint *a, const fct_constraint *b, v3 pa,
+                       v3 pb, fct_joint *out) {
+    uint8_t ha = a ? a->hold : HOLD_PLANES, hb = b ? b->hold : HOLD_PLANES;
+    out->held.hold = HOLD_PLANES, out->held.line = FCT_NONE;
+    out->ends[0] = out->ends[1] = true;
+    if (ha == HOLD_PLANES && hb == HOLD_PLANES) return;
+    bool first = hb == HOLD_PLANES || (ha == HOLD_POINT && hb == HOLD_LINE && lies_on_line(s, pa, b->line));
+    bool second = ha == HOLD_PLANES || (hb == HOLD_POINT && ha == HOLD_LINE && lies_on_line(s, pb, a->line));
+    bool both = ha == HOLD_LINE && hb == HOLD_LINE && a->line == b->line;
+    if (!first && !second && !both) return;
+    const fct_constraint *from = second ? b : a;
+    out->held.hold = from->hold, out->held.line = from->line;
+    out->ends[0] = !second, out->ends[1] = !first;
+}
+
+bool fct_constraint_join(const fct_simplifier *s, uint32_t a, uint32_t b, fct_joint *out) {
+    const fct_constraint *first = constraint_at(s, a), *second = constraint_at(s, b);
+    if (!first && !second) return false;
+    for (int k = 0; k < POSITION_QUADRIC; ++k)
+        out->held.planes[k] = (first ? first->planes[k] : 0) + (second ? second->planes[k] : 0);
+    join_holds(s, first, second, point_position(s, a), point_position(s, b), out);
+    return true;
+}
+
+void fct_constraint_merge(fct_simplifier *s, uint32_t a, uint32_t b) {
+    fct_joint joint;
+    if (!fct_constraint_join(s, a, b, &joint)) return;
+    if (s->constraint_of[a] == FCT_NONE) s->constraint_of[a] = s->constraint_of[b];
+    s->constraints[s->constraint_of[a]] = joint.held;
+}
