@@ -8,7 +8,7 @@
  */
 #include "simplify/contract.h"
 #include "simplify/output.h"
-#include "simplify/refit.h"
+#include "simplify/refit/refit.h"
 #include "simplify/simplifier.h"
 #include "simplify/topology/curve.h"
 

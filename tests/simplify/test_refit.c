@@ -1,7 +1,7 @@
 /* One pass of the refit against dense least-squares systems over all samples and all faces. */
 #include "oracle.h"
 #include "simplify/cost/constraint.h"
-#include "simplify/refit.h"
+#include "simplify/refit/refit.h"
 
 static fct_env env;
 

@@ -1,4 +1,4 @@
-/* simplify/refit.h: moves the remaining points and attributes closer to the input. */
+/* simplify/refit/refit.h: moves the remaining points and attributes closer to the input. */
 #ifndef FCT_SIMPLIFY_REFIT_H
 #define FCT_SIMPLIFY_REFIT_H
 

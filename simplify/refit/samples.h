@@ -1,0 +1,68 @@
+/* simplify/refit/samples.h: the samples of the input and the faces on which they land. */
+#ifndef FCT_SIMPLIFY_SAMPLES_H
+#define FCT_SIMPLIFY_SAMPLES_H
+
+#include "simplify/state.h"
+
+/* The point of the remaining faces that is nearest to a sample. */
+typedef struct fct_landing {
+    uint32_t face;   /* FCT_NONE: there is none */
+    float u, v;      /* weights of its second and third corner */
+    bool attributes; /* the face is on the sample's side of a seam, so its attributes count */
+} fct_landing;
+
+typedef struct fct_refit {
+    fct_simplifier *s;
+    uint32_t pass;
+    uint32_t *corners;      /* per wedge of the input: one of its corners, or FCT_NONE */
+    double *corner_weights; /* per wedge of the input */
+    fct_landing *landings;  /* per sample: first the wedges of the input, then its faces */
+    double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
+    double *sums;           /* per wedge and channel: weighted residuals */
+    double *weights;        /* per wedge */
+} fct_refit;
+
+/* A corner of the input in the unit cube. */
+static inline v3 find_input_position(const fct_simplifier *s, uint32_t corner) {
+    v3 p = v3_load(s->mesh->positions + 3 * (size_t)s->mesh->triangles[corner]);
+    return v3_scale(v3_sub(p, s->center), 1 / s->extent);
+}
+
+/* Whether two corners of a face of the input share a point. */
+static inline bool is_degenerate(const fct_simplifier *s, uint32_t f) {
+    const uint32_t *t = s->mesh->triangles + 3 * (size_t)f;
+    uint32_t a = s->point_of[t[0]], b = s->point_of[t[1]], c = s->point_of[t[2]];
+    return a == b || b == c || c == a;
+}
+
+static inline double find_area(const v3 p[3]) {
+    return .5 * v3_norm(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
+}
+
+static inline uint32_t find_input_wedge(const fct_simplifier *s, uint32_t corner) {
+    return s->corner_wedges ? s->corner_wedges[corner] : s->point_of[s->mesh->triangles[corner]];
+}
+
+/* A sample is the mean of these corners: one for a wedge, three for a face. Returns their number; 0 if the
+ * sample does not count. */
+static inline uint32_t find_sample_corners(const fct_refit *r, size_t sample, uint32_t corners[3]) {
+    const fct_simplifier *s = r->s;
+    if (sample < s->wedge_count) {
+        corners[0] = r->corners[sample];
+        return corners[0] != FCT_NONE;
+    }
+    uint32_t f = (uint32_t)(sample - s->wedge_count);
+    for (uint32_t k = 0; k < 3; ++k) corners[k] = 3 * f + k;
+    return is_degenerate(s, f) ? 0 : 3;
+}
+
+/* The position of a sample; p receives those of its corners. */
+static inline v3 find_sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count,
+                                      v3 p[3]) {
+    p[0] = find_input_position(s, corners[0]);
+    if (count == 1) return p[0];
+    p[1] = find_input_position(s, corners[1]), p[2] = find_input_position(s, corners[2]);
+    return v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
+}
+
+#endif
