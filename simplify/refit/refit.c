@@ -1,6 +1,7 @@
 /* simplify/refit/refit.c: see refit.h. Each pass:
  *
- * 1. Samples are the corners (1/12 of the face's area) and centroids (3/4) of the input's faces. Each finds
+ * 1. Samples are the corners (1/12 of the face's area) and centroids (3/4) of the input's faces, or an even
+ *    part of them: those at equal steps along the curve on which the input is sorted. Each finds
  *    the nearest point of the faces around the points that its corners were contracted to.
  * 2. Each point takes one damped least-squares step along the directions to its samples. Each attribute takes
  *    a step towards their values. Steps that would fold a face over are left out.
@@ -33,7 +34,10 @@
 #define CENTROID_WEIGHT .75
 #define CORNER_DIVISOR  12
 
-enum { CHUNK = 1024 /* samples per parallel task */ };
+enum {
+    CHUNK = 1024,      /* samples per parallel task */
+    MOST_SAMPLES = 32, /* per point: more do not make the result better */
+};
 
 /* Samples [begin, end): the first pass searches the face; later passes keep it, because points move little. */
 static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -46,7 +50,7 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
     }
     for (size_t i = begin; i < end; ++i) {
         fct_landing *out = &r->landings[i];
-        uint32_t corners[3], count = find_sample_corners(r, i, corners);
+        uint32_t corners[3] = {0}, count = find_sample_corners(r, i, corners);
         if (count == 0 || out->face == FCT_NONE) continue;
         v3 ends[3], p = find_sample_position(s, corners, count, ends);
         const uint32_t *t = s->triangles + 3 * (size_t)out->face;
@@ -89,9 +93,9 @@ static void add_attribute_residual(fct_refit *r, const uint32_t *corners, uint32
 static void add_sample(fct_refit *r, size_t sample, const fct_landing *at) {
     const fct_simplifier *s = r->s;
     if (at->face == FCT_NONE) return;
-    uint32_t corners[3], count = find_sample_corners(r, sample, corners);
+    uint32_t corners[3] = {0}, count = find_sample_corners(r, sample, corners);
     v3 ends[3], p = find_sample_position(s, corners, count, ends);
-    double weight = count == 1 ? r->corner_weights[sample] : CENTROID_WEIGHT * find_area(ends);
+    double weight = count == 1 ? r->corner_weights[sample * r->stride] : CENTROID_WEIGHT * find_area(ends);
     const uint32_t *t = s->triangles + 3 * (size_t)at->face;
     v3 a = point_position(s, t[0]), ab = v3_sub(point_position(s, t[1]), a), ac = v3_sub(point_position(s, t[2]), a);
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
@@ -222,7 +226,11 @@ static fct_result run_pass(fct_refit *r, uint32_t pass, size_t samples) {
 
 fct_result fct_simplify_refit(fct_simplifier *s) {
     fct_refit r = {.s = s};
-    size_t samples = (size_t)s->wedge_count + s->mesh->face_count;
+    /* A closed mesh has half as many points as faces. */
+    size_t all = (size_t)s->wedge_count + s->mesh->face_count, enough = MOST_SAMPLES / 2 * (size_t)s->live_faces;
+    r.stride = all > enough && enough > 0 ? (uint32_t)(all / enough) : 1;
+    r.wedge_samples = (s->wedge_count + r.stride - 1) / r.stride;
+    size_t samples = r.wedge_samples + (size_t)(s->mesh->face_count + r.stride - 1) / r.stride;
     const fct_array arrays[] = {FCT_ARRAY(r.corners, s->wedge_count),
                                 FCT_ARRAY_ZERO(r.corner_weights, s->wedge_count),
                                 FCT_ARRAY(r.landings, samples),

@@ -14,9 +14,11 @@ typedef struct fct_landing {
 typedef struct fct_refit {
     fct_simplifier *s;
     uint32_t pass;
+    uint32_t stride;        /* each stride-th wedge and face of the input has a sample */
+    uint32_t wedge_samples; /* the first samples; those of faces follow */
     uint32_t *corners;      /* per wedge of the input: one of its corners, or FCT_NONE */
     double *corner_weights; /* per wedge of the input */
-    fct_landing *landings;  /* per sample: first the wedges of the input, then its faces */
+    fct_landing *landings;  /* per sample */
     double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
     double *sums;           /* per wedge and channel: weighted residuals */
     double *weights;        /* per wedge */
@@ -47,11 +49,11 @@ static inline uint32_t find_input_wedge(const fct_simplifier *s, uint32_t corner
  * sample does not count. */
 static inline uint32_t find_sample_corners(const fct_refit *r, size_t sample, uint32_t corners[3]) {
     const fct_simplifier *s = r->s;
-    if (sample < s->wedge_count) {
-        corners[0] = r->corners[sample];
+    if (sample < r->wedge_samples) {
+        corners[0] = r->corners[sample * r->stride];
         return corners[0] != FCT_NONE;
     }
-    uint32_t f = (uint32_t)(sample - s->wedge_count);
+    uint32_t f = (uint32_t)(sample - r->wedge_samples) * r->stride;
     for (uint32_t k = 0; k < 3; ++k) corners[k] = 3 * f + k;
     return is_degenerate(s, f) ? 0 : 3;
 }

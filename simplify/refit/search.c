@@ -145,7 +145,7 @@ void fct_refit_search(const fct_refit *r, size_t begin, size_t end) {
     search w = {.s = s};
     for (uint32_t i = 0; i < CACHE; ++i) w.cache[i].point = FCT_NONE;
     for (size_t i = begin; i < end; ++i) {
-        uint32_t corners[3], points[3], count = find_sample_corners(r, i, corners), number = 0;
+        uint32_t corners[3] = {0}, points[3], count = find_sample_corners(r, i, corners), number = 0;
         w.out = &r->landings[i];
         *w.out = (fct_landing){.face = FCT_NONE};
         if (count == 0) continue;
