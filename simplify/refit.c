@@ -3,7 +3,8 @@
  * 1. Samples are the corners (1/12 of the face's area) and centroids (3/4) of the input's faces. Each finds
  *    the nearest point of the faces around the points that its corners were contracted to.
  * 2. Each point takes one damped least-squares step along the directions to its samples. Each attribute takes
- *    a step towards their values. Steps that would fold a face over are left out.
+ *    a step towards their values. Steps that would fold a face over are left out, and those that would take
+ *    the point too far from the input are made shorter.
  * The search is parallel. The sums run in the order of the samples, so the result does not depend on the
  * threads. Cost of a pass: O(samples * valence).
  */
@@ -25,6 +26,11 @@
 #define PLANES .1
 /* The longest step, in lengths of the shortest edge at the point. */
 #define MAX_STEP .5
+/* A point may be as far from the input as this times the root mean square distance of its own samples, or as
+ * this part of the distance of the farthest point. With 2 and 3, E_max is up to 1.08 and 1.20 times as large
+ * as without a refit, and E_avg .67 and .65 times. */
+#define OWN_REACH   2.5
+#define POINT_REACH .5
 /* Shorter distances, in the unit cube, are rounding errors of the input's floats. */
 #define NOISE 1e-7
 /* A barycentric weight above this counts as positive. */
@@ -34,7 +40,11 @@
 #define CENTROID_WEIGHT .75
 #define CORNER_DIVISOR  12
 
-enum { CHUNK = 1024 /* items per parallel task */, MAX_WALK = 4 /* steps from ring to ring */ };
+enum {
+    CHUNK = 1024,    /* items per parallel task */
+    MAX_WALK = 4,    /* steps from ring to ring */
+    MAX_HALVINGS = 3 /* of a step that goes too far */
+};
 
 /* The nearest point of a sample: a + u ab + v ac of the target. */
 typedef struct landing {
@@ -54,6 +64,14 @@ typedef struct target {
     uint32_t face;
 } target;
 
+/* What limits the step of a point. */
+typedef struct reach {
+    double residual2; /* the mean squared distance of its samples from the surface, times `weight` */
+    double weight;
+    double nearest2;  /* the smallest squared distance of the point from a centroid among its samples */
+    uint32_t nearest; /* the face of this centroid in the input; it stands for the input near the point */
+} reach;
+
 typedef struct refit {
     fct_simplifier *s;
     uint32_t *corners;      /* per wedge of the input: one of its corners, or FCT_NONE */
@@ -65,6 +83,7 @@ typedef struct refit {
     double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
     double *sums;           /* per wedge and channel: weighted residuals */
     double *weights;        /* per wedge */
+    reach *reaches;         /* per point */
 } refit;
 
 /* Updates *best and *out by the faces around a point. Faces on the wedge's side of a seam take precedence
@@ -214,6 +233,12 @@ static void add_attribute_residual(refit *r, const uint32_t *corners, uint32_t c
     }
 }
 
+static void add_reach(reach *own, v3 point, v3 sample, double weight, double residual, uint32_t face) {
+    own->residual2 += weight * residual * residual, own->weight += weight;
+    double distance2 = v3_norm2(v3_sub(sample, point));
+    if (face != FCT_NONE && distance2 < own->nearest2) own->nearest2 = distance2, own->nearest = face;
+}
+
 /* Adds weight * b^2 n n^T and weight * b * residual * n to the system of each corner of the target, where n
  * points from the target to the sample. */
 static void add_sample(refit *r, size_t sample, const landing *at) {
@@ -230,7 +255,10 @@ static void add_sample(refit *r, size_t sample, const landing *at) {
     double residual = v3_norm(rest);
     v3 n = residual > NOISE ? v3_scale(rest, 1 / residual) : face->n;
     for (size_t k = 0; k < 3; ++k) {
-        double *system = r->systems[s->triangles[3 * (size_t)face->face + k]];
+        uint32_t point = s->triangles[3 * (size_t)face->face + k];
+        double *system = r->systems[point];
+        add_reach(&r->reaches[point], point_position(s, point), p, weight * b[k], residual,
+                  count == 3 ? (uint32_t)(sample - s->wedge_count) : FCT_NONE);
         sym3_add_outer(system, weight * b[k] * b[k], n);
         double g = residual > NOISE ? weight * b[k] * residual : 0;
         system[6] += g * n.x, system[7] += g * n.y, system[8] += g * n.z;
@@ -275,10 +303,38 @@ static v3 find_step(const refit *r, uint32_t point) {
     return v3_scale(solve_damped(q), STEP);
 }
 
+/* The squared distance from the face of the input near the point; 0 if there is none. */
+static double find_distance2(const refit *r, uint32_t point, v3 at) {
+    uint32_t f = r->reaches[point].nearest;
+    if (f == FCT_NONE) return 0;
+    triangle t = triangle_make(find_input_position(r->s, 3 * f), find_input_position(r->s, 3 * f + 1),
+                               find_input_position(r->s, 3 * f + 2));
+    return triangle_nearest(&t, at).distance2;
+}
+
+static double find_farthest_point2(const refit *r) {
+    double most2 = 0;
+    for (uint32_t p = 0; p < r->s->point_count; ++p)
+        if (r->s->valences[p] > 0) most2 = fct_max(most2, find_distance2(r, p, point_position(r->s, p)));
+    return most2;
+}
+
+/* Halves a step until the point stays near the input, or is no farther from it than before. */
+static v3 limit_step(const refit *r, uint32_t point, v3 step, double most2) {
+    v3 from = point_position(r->s, point);
+    const reach *own = &r->reaches[point];
+    most2 = fct_max(most2, find_distance2(r, point, from));
+    if (own->weight > 0) most2 = fct_max(most2, OWN_REACH * OWN_REACH * own->residual2 / own->weight);
+    for (int i = 0; i <= MAX_HALVINGS; ++i, step = v3_scale(step, .5))
+        if (find_distance2(r, point, v3_add(from, step)) <= most2) return step;
+    return (v3){0, 0, 0};
+}
+
 /* Moves each point by its step, in the order of the points. Hubs and steps that would fold a face over are
  * left out. */
 static void move_points(refit *r) {
     fct_simplifier *s = r->s;
+    double most_away2 = POINT_REACH * POINT_REACH * find_farthest_point2(r);
     for (uint32_t p = 0; p < s->point_count; ++p) {
         if (s->valences[p] == 0 || s->valences[p] > SIMPLIFY_HUB) continue;
         v3 step = find_step(r, p);
@@ -294,6 +350,8 @@ static void move_points(refit *r) {
         }
         double most2 = MAX_STEP * MAX_STEP * shortest2;
         if (length2 > most2) step = v3_scale(step, sqrt(most2 / length2));
+        step = limit_step(r, p, step, most_away2);
+        if (v3_norm2(step) == 0) continue;
         v3 at = v3_add(from, step);
         const fct_move move = {.a = p, .b = FCT_NONE, .count_a = count, .at = at};
         if (!fct_simplify_remains_good(s, &move)) continue;
@@ -371,6 +429,7 @@ static fct_result run_pass(refit *r, uint32_t pass, size_t samples) {
     fct_simplifier *s = r->s;
     memset(r->systems, 0, s->point_count * sizeof *r->systems);
     memset(r->sums, 0, (size_t)s->wedge_count * s->channel_count * sizeof *r->sums);
+    for (uint32_t p = 0; p < s->point_count; ++p) r->reaches[p] = (reach){0, 0, INFINITY, FCT_NONE};
     if (s->channel_count) memset(r->weights, 0, s->wedge_count * sizeof *r->weights);
     fct_result result = fct_progress(s->env, "refit", (double)pass / s->def->refit_passes);
     if (result != FCT_OK) return result;
@@ -393,7 +452,8 @@ fct_result fct_simplify_refit(fct_simplifier *s) {
                                 FCT_ARRAY(r.ring_ends, s->point_count),
                                 FCT_ARRAY(r.systems, s->point_count),
                                 FCT_ARRAY(r.sums, (size_t)s->wedge_count * s->channel_count),
-                                FCT_ARRAY(r.weights, s->channel_count ? s->wedge_count : 0)};
+                                FCT_ARRAY(r.weights, s->channel_count ? s->wedge_count : 0),
+                                FCT_ARRAY(r.reaches, s->point_count)};
     fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the refit");
     if (result != FCT_OK) return result;
     prepare_samples(&r);
