@@ -11,6 +11,15 @@ typedef struct fct_landing {
     bool attributes; /* the face is on the sample's side of a seam, so its attributes count */
 } fct_landing;
 
+/* What limits the step of a point. */
+typedef struct fct_reach {
+    double residual2; /* the mean squared distance of its samples from the surface, times `weight` */
+    double weight;
+    double nearest2;  /* the smallest squared distance from the point to the centroid of a face of the input
+                         that is among its samples or has a corner that was contracted to it */
+    uint32_t nearest; /* this face; it stands for the input near the point */
+} fct_reach;
+
 typedef struct fct_refit {
     fct_simplifier *s;
     uint32_t pass;
@@ -22,6 +31,7 @@ typedef struct fct_refit {
     double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
     double *sums;           /* per wedge and channel: weighted residuals */
     double *weights;        /* per wedge */
+    fct_reach *reaches;     /* per point */
 } fct_refit;
 
 /* A corner of the input in the unit cube. */

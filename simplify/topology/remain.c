@@ -4,8 +4,8 @@
  *    test. If a is a hub, of its faces only those at the neighbours of b are listed.
  * 2. Each face marks its two edges from the moved point. The second face of an edge is compared with the
  * first: they may be equal, or folded onto each other. A third face may be the start of a non-manifold edge.
- * 3. A face that turned by more than 4 degrees is compared with the face across its third side, which does
- * not move. Cost: O(faces), plus the valence of a neighbour per turned face and per face at a hub.
+ * 3. A face that turned by more than 4 degrees in a contraction, or at all in the refit, is compared with the
+ * face across its third side, which does not move. Cost: O(faces), plus the valence of a neighbour per turned face and per face at a hub.
  */
 #include "simplify/topology/remain.h"
 
@@ -226,7 +226,8 @@ bool fct_simplify_remains_good(fct_simplifier *s, const fct_move *move) {
     s->open_sides = 0;
     for (uint32_t i = 0; i < s->remaining_count; ++i) {
         if (!check_moved_sides(s, move, i)) return false;
-        if (s->remaining[i].turned && !check_fixed_side(s, move, &s->remaining[i])) return false;
+        bool check = s->remaining[i].turned || move->b == FCT_NONE;
+        if (check && !check_fixed_side(s, move, &s->remaining[i])) return false;
     }
     return true;
 }
