@@ -54,9 +54,9 @@ counts "25 degrees" "$(judge flat180.obj fold25.obj)" 0 0 1 0 4
 counts "27 degrees" "$(judge flat180.obj fold27.obj)" 0 0 0 0 4
 counts_new "25 degrees, as before" "$(judge fold25.obj fold25.obj)" 0 0 0 0 0
 expect "25 degrees, not before" "$(judge flat180.obj fold25.obj)" new_folds 1
-# Both faces wind in the same direction around the edge, and the angle passes from 350 to 10 degrees.
-obj wound '0 0 0' '0 0 1' '.9848078 .1736482 .3' '.9848078 -.1736482 .6' '-1 0 .5' : '1 2 5' '1 2 3' '1 2 4'
-counts "across zero" "$(judge flat180.obj wound.obj)" 0 0 1 1 6
+# Angles count from the first apex, which is opposite: the two others are at 170 and -170 degrees. All faces wind in one direction.
+obj wound '0 0 0' '0 0 1' '-1 0 .5' '.9848078 .1736482 .3' '.9848078 -.1736482 .6' : '1 2 5' '1 2 3' '1 2 4'
+counts "across 180 degrees" "$(judge flat180.obj wound.obj)" 0 0 1 1 6
 
 # Three faces at one edge, the third of them new. Its third corner is far from the borders of the first two.
 obj three '0 0 0' '0 0 1' '1 0 .3' '-1 0 .6' '0 -1 .5' : '1 2 3' '2 1 4' '1 2 5'
@@ -73,6 +73,9 @@ counts_new duplicates "$one" 2 0 0 0 0
 # Faces without area: a repeated corner, two vertices at one place, corners on a line that is not an axis.
 obj thin '0 0 0' '1 0 0' '1 1 0' '0 1 0' '0 0 0' '.1 .3 .7' '.2 .6 1.4' '.4 1.2 2.8' : '1 2 3' '1 3 4' '1 1 2' '1 5 3' '6 7 8'
 counts "faces without area" "$(judge square.obj thin.obj)" 0 3 0 0 7
+# A face without area makes no fold, but it is a third face at its edge.
+obj third '0 0 0' '1 0 0' '1 1 0' '0 1 0' '.5 .5 0' : '1 2 3' '1 3 4' '1 3 5'
+counts "a third face without area" "$(judge square.obj third.obj)" 0 1 0 1 6
 # A needle has area.
 obj needle '0 0 0' '1 0 0' '.5 1e-6 0' : '1 2 3'
 expect "a needle" "$(judge square.obj needle.obj)" flat 0
@@ -85,6 +88,20 @@ expect "doubled vertices" "$one" e_max 0 1e-12
 obj moved '0 0 0' '1.1 0 0' '1 1 0' '0 1 0' : '1 2 3' '1 3 4'
 expect "a moved corner" "$(judge square.obj moved.obj)" drift .0707107 1e-6
 "$programs/facetree" make box --quiet -o box.ply
+expect "a moved corner, the other way" "$(judge moved.obj square.obj)" drift .0672673 1e-6
+# The hypotenuse of half a square has its ends on the old border and its middle far from it.
+obj half '0 0 0' '1 0 0' '0 1 0' : '1 2 3'
+expect "half a square" "$(judge square.obj half.obj)" new_borders 1
+# A defect is new beyond 1 % of the diagonal (.01414), and beyond a quarter of its longest side (.04 / 4).
+obj up138 '0 0 .0138' '1 0 .0138' '1 1 .0138' '0 1 .0138' : '1 2 3' '1 3 4'
+obj up145 '0 0 .0145' '1 0 .0145' '1 1 .0145' '0 1 .0145' : '1 2 3' '1 3 4'
+expect "within 1 %" "$(judge square.obj up138.obj)" new_borders 0
+expect "beyond 1 %" "$(judge square.obj up145.obj)" new_borders 4
+obj corner '0 0 0' '1 0 0' '1 1 0' '0 1 0' '2 0 0' '2.04 0 0' '2 .04 0' : '1 2 3' '1 3 4' '5 6 7'
+obj up97 '2 0 .0097' '2.04 0 .0097' '2 .04 .0097' : '1 2 3'
+obj up103 '2 0 .0103' '2.04 0 .0103' '2 .04 .0103' : '1 2 3'
+expect "within a quarter" "$(judge corner.obj up97.obj)" new_borders 0
+expect "beyond a quarter" "$(judge corner.obj up103.obj)" new_borders 2 # the hypotenuse is longer
 expect "a border that is gone" "$(judge square.obj box.ply)" drift -1
 counts "a box" "$(judge box.ply box.ply)" 0 0 0 0 0
 
