@@ -33,7 +33,7 @@ expect "a higher square" "$one" e_avg .005 1e-8
 expect "a higher square" "$one" e_max .0707107 1e-6
 expect "a higher square" "$one" drift .0707107 1e-6
 counts "a higher square" "$one" 0 0 0 0 4
-counts_new "a higher square" "$one" 0 0 0 0 4 # .1 is farther than 1 % of the diagonal
+counts_new "a higher square" "$one" 0 0 0 0 4 # .1 is farther than 2 % of the diagonal
 # The same as what facetree compare says.
 "$programs/facetree" make torso --triangles 3000 --quiet -o torso.ply
 "$programs/bench_simplify_facetree" default torso.ply 300 1 small.ply >small.json
@@ -68,6 +68,7 @@ counts_new "three faces, as before" "$(judge three.obj three.obj)" 0 0 0 0 0
 # Duplicates count once each, in either direction, and make no fold, border or edge of three faces.
 obj twice '0 0 0' '1 0 0' '1 1 0' '0 1 0' : '1 2 3' '1 3 4' '3 2 1' '2 3 1'
 one=$(judge square.obj twice.obj)
+expect "the input of duplicates" "$(judge twice.obj square.obj)" input_duplicates 2
 counts duplicates "$one" 2 0 0 0 4
 counts_new duplicates "$one" 2 0 0 0 0
 # Faces without area: a repeated corner, two vertices at one place, corners on a line that is not an axis.
@@ -92,16 +93,16 @@ expect "a moved corner, the other way" "$(judge moved.obj square.obj)" drift .06
 # The hypotenuse of half a square has its ends on the old border and its middle far from it.
 obj half '0 0 0' '1 0 0' '0 1 0' : '1 2 3'
 expect "half a square" "$(judge square.obj half.obj)" new_borders 1
-# A defect is new beyond 1 % of the diagonal (.01414), and beyond a quarter of its longest side (.04 / 4).
-obj up138 '0 0 .0138' '1 0 .0138' '1 1 .0138' '0 1 .0138' : '1 2 3' '1 3 4'
-obj up145 '0 0 .0145' '1 0 .0145' '1 1 .0145' '0 1 .0145' : '1 2 3' '1 3 4'
-expect "within 1 %" "$(judge square.obj up138.obj)" new_borders 0
-expect "beyond 1 %" "$(judge square.obj up145.obj)" new_borders 4
+# A defect is new beyond 2 % of the diagonal (.02828), and beyond half of its longest side (.04 / 2).
+obj up277 '0 0 .0277' '1 0 .0277' '1 1 .0277' '0 1 .0277' : '1 2 3' '1 3 4'
+obj up290 '0 0 .029' '1 0 .029' '1 1 .029' '0 1 .029' : '1 2 3' '1 3 4'
+expect "within 2 %" "$(judge square.obj up277.obj)" new_borders 0
+expect "beyond 2 %" "$(judge square.obj up290.obj)" new_borders 4
 obj corner '0 0 0' '1 0 0' '1 1 0' '0 1 0' '2 0 0' '2.04 0 0' '2 .04 0' : '1 2 3' '1 3 4' '5 6 7'
-obj up97 '2 0 .0097' '2.04 0 .0097' '2 .04 .0097' : '1 2 3'
-obj up103 '2 0 .0103' '2.04 0 .0103' '2 .04 .0103' : '1 2 3'
-expect "within a quarter" "$(judge corner.obj up97.obj)" new_borders 0
-expect "beyond a quarter" "$(judge corner.obj up103.obj)" new_borders 2 # the hypotenuse is longer
+obj up194 '2 0 .0194' '2.04 0 .0194' '2 .04 .0194' : '1 2 3'
+obj up206 '2 0 .0206' '2.04 0 .0206' '2 .04 .0206' : '1 2 3'
+expect "within half a side" "$(judge corner.obj up194.obj)" new_borders 0
+expect "beyond half a side" "$(judge corner.obj up206.obj)" new_borders 2 # the hypotenuse is longer
 expect "a border that is gone" "$(judge square.obj box.ply)" drift -1
 counts "a box" "$(judge box.ply box.ply)" 0 0 0 0 0
 

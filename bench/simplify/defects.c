@@ -14,8 +14,8 @@
  * the cross product in double. Corners that are floats on one line stay below. */
 #define NO_AREA 1e-15
 /* A defect is near one of the input within this part of its longest side, and of the diagonal. */
-#define NEAR_SIDE     .25
-#define NEAR_DIAGONAL .01
+#define NEAR_SIDE     .5
+#define NEAR_DIAGONAL .02
 
 /* --- Points --- */
 

@@ -26,7 +26,7 @@ bench_places bench_find_defects(const fct_mesh *mesh);
 void bench_free_places(bench_places *places);
 
 /* The defects of `mesh` that are not near one of the same kind in `input`: whose middle is farther from it
- * than a quarter of their longest side, and farther than 1 % of the diagonal of `input`. */
+ * than half of their longest side, or than 2 % of the diagonal of `input`. */
 uint32_t bench_count_new(const fct_env *env, const fct_mesh *input, const bench_places *before,
                          const fct_mesh *mesh, const bench_places *after, bench_defect kind);
 

@@ -3,8 +3,9 @@
  * usage: bench_simplify_judge SAMPLES BUDGET ORIGINAL RESULT...
  * Prints one JSON line per result. Each face gets SAMPLES random points, or fewer if both meshes together
  * would get more than BUDGET, but at least one. e_avg is divided by the squared diagonal of the original,
- * e_max and drift by the diagonal. Each defect has two counts: all of the result, and those that the original
- * does not have nearby. drift is -1 if only one of the meshes has borders.
+ * e_max and drift by the diagonal. Each defect has three counts: all of the result, all of the original, and
+ * those of the result that the original does not have nearby. drift is -1 if only one of the meshes has
+ * borders.
  */
 #include <math.h>
 #include <stdio.h>
@@ -57,7 +58,8 @@ static void judge(const fct_env *env, const subject *original, const subject *re
     if (each < samples) samples = each < 1 ? 1 : (uint32_t)each;
     if (result->bvh) print_errors(env, original, result, samples);
     for (int kind = 0; kind < BENCH_DEFECTS; ++kind)
-        printf(", \"%s\": %u, \"new_%s\": %u", names[kind], result->places.count[kind], names[kind],
+        printf(", \"%s\": %u, \"input_%s\": %u, \"new_%s\": %u", names[kind], result->places.count[kind],
+               names[kind], original->places.count[kind], names[kind],
                bench_count_new(env, &original->mesh, &original->places, &result->mesh, &result->places,
                                (bench_defect)kind));
     double drift =

@@ -17,7 +17,7 @@ import time
 ROUNDS = 5
 SHARES = [.5, .1, .01, .001]
 JUDGED = ["samples", "e_avg", "e_max", "color_rms", "color_relative", "drift"] + [
-    prefix + kind for kind in ("duplicates", "flat", "folds", "nonmanifold", "borders") for prefix in ("", "new_")]
+    prefix + kind for kind in ("duplicates", "flat", "folds", "nonmanifold", "borders") for prefix in ("", "input_", "new_")]
 FIELDS = ["mesh", "faces", "share", "target", "library", "threads", "run", "status", "reached", "seconds", "cpu", "grown_bytes"] + JUDGED
 FIGURE_FIELDS = ["figure", "mesh", "faces", "library", "target", "run", "status", "reached", "cpu", "samples", "e_avg", "e_max"]
 # Name, program, policy, threads, and the seconds that its turns on one mesh at one size may take.
