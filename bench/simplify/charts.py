@@ -72,7 +72,7 @@ def draw_noise(out, figures):
         return False
     draw_curves(f"{out}/simplify-noise", curves, [
         "set title 'Cubes with noise, in percent of the diagonal: error to the cube without noise'", "set xlabel 'faces'",
-        "set ylabel 'E_{avg} over the squared diagonal' offset 1,0", "set format x '%g'", "set key outside right reverse Left"])
+        "set ylabel 'E_{avg} over the squared diagonal' offset 1,0", "set format x '%g'", "set xrange [10:15000]", "set key outside right reverse Left"])
     return True
 
 

@@ -65,6 +65,8 @@ class Bench:
         raise SystemExit(f"{self.path(mesh)}: expected a PLY with a header")
 
     def present(self, meshes):
+        if self.options.mesh:
+            meshes = [mesh for mesh in meshes if mesh in self.options.mesh]
         found = [mesh for mesh in meshes if os.path.exists(self.path(mesh))]
         for mesh in meshes:
             if mesh not in found:
@@ -98,7 +100,7 @@ class Bench:
                 return dict(row, status="refused: " + found["refused"])
         except subprocess.TimeoutExpired:
             row["status"] = "over the limit"
-        self.slow[name, threads] = row.get("seconds", time.monotonic() - begin), faces
+        self.slow[name, threads] = row.get("cpu", time.monotonic() - begin), faces
         return row
 
     def judge(self, rows, original, samples):
@@ -151,6 +153,7 @@ class Bench:
         rows = self.turns(mesh, target, libraries, rounds)
         self.judge(rows, self.path(original or mesh), FIGURE_SAMPLES)
         self.figures += [dict(row, figure=figure) for row in rows]
+        self.save("figures.csv", FIGURE_FIELDS, self.figures)
 
     def draw_figures(self):
         quick = self.options.quick
@@ -171,7 +174,6 @@ class Bench:
         for mesh in self.present(["cube-" + noise for noise in NOISE]):
             for target in (12, 25, 50, 100, 200, 400, 800, 1600, 3200, 6400, 12288):
                 self.point("6.18", mesh, target, ours + contracted[:1], original="cube")
-        self.save("figures.csv", FIGURE_FIELDS, self.figures)
 
     def save(self, name, fields, rows):
         with open(os.path.join(self.options.out, name), "w", newline="", encoding="ascii") as file:
@@ -196,6 +198,7 @@ def main():
     parser.add_argument("--load", type=float, default=os.getloadavg()[0], help="of the machine before anything was built")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--large", action="store_true")
+    parser.add_argument("--mesh", action="append", help="only this mesh")
     parser.add_argument("--only", action="append", choices=["sizes", "figures"])
     bench = Bench(parser.parse_args())
     options, begin = bench.options, time.monotonic()

@@ -34,6 +34,10 @@ def times(a, b):
     return a * b if a is not None and b is not None else None
 
 
+def at_least_rounding(error, key):
+    return max(error, ROUNDING ** (2 if key == "e_avg" else 1)) if error is not None else None
+
+
 def read_rows(path):
     if not os.path.exists(path):
         return []
@@ -76,8 +80,7 @@ class Case:
 
     def error(self, library, key):
         """e_avg or e_max for ratios: errors below the rounding of floats are equal."""
-        found = self.judged(library, key)
-        return max(found, ROUNDING ** (2 if key == "e_avg" else 1)) if found is not None else None
+        return at_least_rounding(self.judged(library, key), key)
 
     def shape(self):
         """Our result for geometry alone."""
@@ -97,12 +100,16 @@ class Case:
     def qslim_error(self):
         if (self.mesh, self.share) in QSLIM:
             return QSLIM[self.mesh, self.share]
-        return times(self.error("cgal", "e_avg"), factor(QSLIM_CGAL[self.share], self.faces)) if self.share in QSLIM_CGAL else None
+        if self.share not in QSLIM_CGAL:
+            return None
+        return at_least_rounding(times(self.judged("cgal", "e_avg"), factor(QSLIM_CGAL[self.share], self.faces)), "e_avg")
 
     def newest_error(self):
         if (self.mesh, self.share) in NEWEST:
             return NEWEST[self.mesh, self.share]
-        return times(self.error("meshopt", "e_avg"), factor(UPDATE[self.share], self.faces)) if self.share in UPDATE else None
+        if self.share not in UPDATE:
+            return None
+        return at_least_rounding(times(self.judged("meshopt", "e_avg"), factor(UPDATE[self.share], self.faces)), "e_avg")
 
     def name(self):
         return [self.mesh, str(self.faces), f"{100 * self.share:g}"]
