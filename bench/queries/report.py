@@ -8,8 +8,10 @@ import math
 import os
 import shutil
 import statistics
-import subprocess
 import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir))
+from plot import block, plot # noqa: E402
 
 # Colours of Okabe and Ito, which colour-blind people can tell apart; each also has a shape of its own.
 STYLE = {"facetree": ("#0072b2", 7), "batch": ("#0072b2", 6), "Embree": ("#d55e00", 5), "robust": ("#e69f00", 4),
@@ -31,25 +33,6 @@ def read_rows(path):
 
 def pick(rows, row, side, threads=1):
     return [r for r in rows if r["row"] == row and r["side"] == side and r["threads"] == threads]
-
-
-def plot(path, size, body):
-    """Runs a script for both terminals."""
-    done = []
-    for kind, terminal in (("svg", "svg size %d,%d font 'sans,13'" % size), # pixels; points in the other
-                           ("png", "pngcairo size %d,%d font 'sans,10' fontscale 2 linewidth 2 pointscale 3" %
-                            (2 * size[0], 2 * size[1]))):
-        script = [f"set terminal {terminal} background '#ffffff'", f"set output '{path}.{kind}'"] + body
-        try:
-            subprocess.run(["gnuplot"], input="\n".join(script) + "\n", text=True, check=True)
-            done.append(f"{path}.{kind}")
-        except (OSError, subprocess.CalledProcessError) as error:
-            print(f"no chart: {error}", file=sys.stderr)
-    print("  ".join(done))
-
-
-def block(name, points):
-    return f"${name} << END\n" + "\n".join(" ".join(map(str, p)) for p in points) + "\nEND"
 
 
 def short_count(count):
