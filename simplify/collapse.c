@@ -11,6 +11,10 @@ void fct_simplify_drop_edge(fct_simplifier *s, uint32_t e) {
     s->edges[e].state = EDGE_DEAD;
 }
 
+static void add_quadric(double *to, const double *from, uint32_t size) {
+    for (uint32_t i = 0; i < size; ++i) to[i] += from[i];
+}
+
 /* Removes a wedge without faces from its point's list. Its quadric, with the attributes eliminated, goes to
  * the wedge of the point that most corners use. The last wedge of a point stays. */
 static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
@@ -20,6 +24,7 @@ static void retire_wedge(fct_simplifier *s, uint32_t point, uint32_t wedge) {
     if (keep == FCT_NONE) return;
     while (*link != wedge) link = &s->next_wedges[*link];
     *link = s->next_wedges[wedge];
+    if (!s->steering) return;
     const double *q = wedge_quadric(s, wedge);
     double *to = wedge_quadric(s, keep);
     fct_elimination e;
@@ -80,9 +85,7 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
                 keep = w;
                 continue;
             }
-            double *to = wedge_quadric(s, keep);
-            const double *from = wedge_quadric(s, w);
-            for (uint32_t j = 0; j < s->quadric_size; ++j) to[j] += from[j];
+            if (s->steering) add_quadric(wedge_quadric(s, keep), wedge_quadric(s, w), s->quadric_size);
             s->wedge_parents[w] = keep;
             s->wedge_uses[keep] += s->wedge_uses[w];
             uint32_t class_keep = fct_sets_find(s->class_parents, s->wedge_classes[keep]);
@@ -145,13 +148,8 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     uint32_t source = candidate->end < 2 ? point_at(s, ends[candidate->end])->source : FCT_NONE;
     move_corners(s, a, b, count_b);
     point_at(s, a)->source = source;
-    if (s->corner_wedges)
-        merge_wedges(s, &g, candidate, a, first, second);
-    else {
-        double *to = wedge_quadric(s, a);
-        const double *from = wedge_quadric(s, b);
-        for (int k = 0; k < POSITION_QUADRIC; ++k) to[k] += from[k];
-    }
+    if (s->corner_wedges) merge_wedges(s, &g, candidate, a, first, second);
+    add_quadric(point_at(s, a)->quadric, point_at(s, b)->quadric, POSITION_QUADRIC);
     fct_constraint_merge(s, a, b);
     point_at(s, a)->at = candidate->at;
 }

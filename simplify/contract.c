@@ -40,11 +40,6 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
     queue_push(s->queue, e, s->queue->current);
 }
 
-static double *find_first_quadric(const fct_simplifier *s, uint32_t point) {
-    uint32_t w = s->first_wedges ? s->first_wedges[point] : point;
-    return wedge_quadric(s, w);
-}
-
 /* Returns the refused edges of the faces of a ring to the queue. `refused` marks the points that may have
  * some. */
 static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t count) {
@@ -77,7 +72,7 @@ static bool confirm_cost(fct_simplifier *s, uint32_t e, const uint32_t ends[2],
         return false;
     }
     double bound = s->def->max_error / s->extent;
-    if (candidate->error > 0 && candidate->error - candidate->excess > bound * bound * candidate->area) {
+    if (candidate->distance2 > 0 && candidate->distance2 > bound * bound * candidate->area) {
         refuse_edge(s, e, ends, EDGE_OVER_BOUND);
         return false;
     }
@@ -99,7 +94,8 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     fct_edge *edge = &s->edges[e];
     uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
     uint32_t a = ends[keep], b = ends[1 - keep];
-    bool hub = point_at(s, a)->valence > SIMPLIFY_HUB, two_hubs = point_at(s, b)->valence > SIMPLIFY_HUB, body;
+    bool hub = point_at(s, a)->valence > SIMPLIFY_HUB, two_hubs = point_at(s, b)->valence > SIMPLIFY_HUB,
+         body;
     if (two_hubs || fct_simplify_find_side(s, point_at(s, b)->first_corner, a) == FCT_NONE) {
         fct_simplify_drop_edge(s, e);
         return false;
@@ -119,17 +115,19 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
         return false;
     }
     fct_loss loss;
-    double cost = body  ? fct_loss_measure_body(s, b, count_b, candidate, &loss)
-                  : hub || fct_simplify_is_level(s) ? 0
-                        : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
+    double cost = body ? fct_loss_measure_body(s, b, count_b, candidate, &loss)
+                  : hub || fct_simplify_is_level(s)
+                      ? 0
+                      : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
     if (cost > 0) {
-        candidate->error += cost, candidate->key += cost;
+        candidate->error += cost, candidate->distance2 += cost, candidate->key += cost;
         if (!confirm_cost(s, e, ends, candidate)) return false;
     }
     fct_simplify_drop_edge(s, e);
     fct_simplify_collapse(s, ends, candidate, keep, count_b);
     if (body) fct_simplify_remove_faces(s, a);
-    if (cost > 0) fct_loss_add(&loss, find_first_quadric(s, a));
+    if (cost > 0) fct_loss_add(&loss, point_at(s, a)->quadric);
+    if (cost > 0 && s->steering) fct_loss_add(&loss, wedge_quadric(s, s->first_wedges[a]));
     s->refused[a] |= s->refused[b];
     if (s->refused[a]) {
         requeue_around(s, s->ring_a, count_a);
@@ -153,8 +151,7 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
     }
     if (!confirm_cost(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
-    if (candidate.error > 0)
-        s->max_error2 = fct_max(s->max_error2, (candidate.error - candidate.excess) / candidate.area);
+    if (candidate.distance2 > 0) s->max_error2 = fct_max(s->max_error2, candidate.distance2 / candidate.area);
     return true;
 }
 

@@ -30,7 +30,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->next_corners,  s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,
                       s->quadrics,      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,
                       s->wedge_classes, s->class_parents, s->link_marks,    s->side_marks,   s->refused,
-                      s->constraint_of, s->constraints, s->lines,   s->scratches};
+                      s->constraint_of, s->constraints,   s->lines,         s->scratches};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_release(s->env, s);
 }

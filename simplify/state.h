@@ -66,12 +66,12 @@ typedef struct fct_side_mark {
     uint32_t first; /* the only face so far, as an index of `remaining`; FCT_NONE after the second */
 } fct_side_mark;
 
-/* A point: two lines of the cache without attributes. */
+/* A point: two lines of the cache. */
 typedef struct fct_point {
     v3 at;
     uint32_t source; /* input vertex with exactly this position; FCT_NONE after a move */
     uint32_t valence, first_corner, last_corner;
-    double quadric[POSITION_QUADRIC]; /* only without attributes */
+    double quadric[POSITION_QUADRIC]; /* of the planes of its faces, without attributes */
 } fct_point;
 
 /* What one thread needs for the contraction of an edge. */
@@ -93,10 +93,9 @@ typedef struct fct_simplifier {
     uint32_t *point_of;              /* vertex -> point; FCT_NONE if no face uses the vertex */
 
     /* Per point. */
-    char *points; /* fct_point, point_stride bytes apart */
-    size_t point_stride;
+    fct_point *points;
     uint32_t *point_parents; /* the point that this one was contracted to; itself while alive */
-    uint32_t *first_wedges; /* NULL without attributes */
+    uint32_t *first_wedges;  /* NULL without attributes */
 
     /* Per corner. */
     uint32_t *triangles;    /* points */
@@ -111,7 +110,7 @@ typedef struct fct_simplifier {
      */
     uint32_t steering, channel_count, quadric_size;
     fct_channel channels[SIMPLIFY_MAX_CHANNELS];
-    double *quadrics;   /* x quadric_size, of the faces alone; NULL without attributes: the quadrics of the points */
+    double *quadrics;   /* x quadric_size, of the faces alone; NULL if no attribute steers */
     double *attributes; /* x channel_count; NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
     uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
@@ -132,7 +131,7 @@ typedef struct fct_simplifier {
     uint32_t remaining_count, open_sides; /* of the last move: faces, and edges with one face */
     bool level;                           /* no face turned by more than 25 degrees */
     /* In a sweep (sweep.h), a copy of the simplifier works on one block of points. */
-    const uint32_t *blocks; /* per point: its block; NULL outside of sweeps */
+    const uint32_t *blocks;      /* per point: its block; NULL outside of sweeps */
     uint32_t block, least_faces; /* the block, and live_faces at which it stops */
     double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
     uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
@@ -165,11 +164,12 @@ static inline bool corner_dead(const fct_simplifier *s, uint32_t c) {
     return s->triangles[c - c % 3] == FCT_NONE;
 }
 static inline fct_point *point_at(const fct_simplifier *s, uint32_t p) {
-    return (fct_point *)(void *)(s->points + s->point_stride * p);
+    return &s->points[p];
 }
 static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
     return point_at(s, p)->at;
 }
+/* Without attributes a wedge is its point. Not for meshes whose attributes do not steer. */
 static inline double *wedge_quadric(const fct_simplifier *s, uint32_t w) {
     return s->quadrics ? s->quadrics + (size_t)s->quadric_size * w : point_at(s, w)->quadric;
 }

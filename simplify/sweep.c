@@ -14,7 +14,7 @@
 enum {
     BLOCK_POINTS = 4096,
     LEAST_EDGES = 8192, /* of a sweep */
-    LEAST_SHARE = 32,               /* sweeps go on while they contract this part of their edges */
+    LEAST_SHARE = 32,   /* sweeps go on while they contract this part of their edges */
 };
 
 typedef struct sweep {
@@ -25,8 +25,9 @@ typedef struct sweep {
     uint32_t *edges, edge_count; /* the edges that are not dead yet */
     uint32_t *blocks;            /* per point that is left: its block */
     uint32_t *chosen, *owners;   /* edges of the sweep, and their blocks */
-    uint32_t *starts, *ordered;  /* the edges of block b are ordered[starts[b]] to ordered[starts[b + 1] - 1] */
-    fct_simplifier *results;     /* per block: the copy that worked on it */
+    uint32_t *starts,
+        *ordered;            /* the edges of block b are ordered[starts[b]] to ordered[starts[b + 1] - 1] */
+    fct_simplifier *results; /* per block: the copy that worked on it */
 } sweep;
 
 /* Drops dead edges from the list, and returns the highest bucket up to which at most `most` edges are queued;
@@ -141,10 +142,10 @@ static fct_result run_sweeps(sweep *w) {
 fct_result fct_simplify_sweep(fct_simplifier *s, fct_block_body *body) {
     sweep w = {.s = s, .body = body};
     size_t most = s->edge_count;
-    const fct_array arrays[] = {FCT_ARRAY(w.edges, most),        FCT_ARRAY(w.blocks, s->point_count),
-                                FCT_ARRAY(w.chosen, most),       FCT_ARRAY(w.owners, most),
-                                FCT_ARRAY(w.ordered, most),
-                                FCT_ARRAY(w.starts, s->point_count / BLOCK_POINTS + 3)};
+    const fct_array arrays[] = {
+        FCT_ARRAY(w.edges, most),   FCT_ARRAY(w.blocks, s->point_count),
+        FCT_ARRAY(w.chosen, most),  FCT_ARRAY(w.owners, most),
+        FCT_ARRAY(w.ordered, most), FCT_ARRAY(w.starts, s->point_count / BLOCK_POINTS + 3)};
     if (s->live_faces < s->def->target_faces + LEAST_EDGES) return FCT_OK;
     fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the blocks of a sweep");
     if (result != FCT_OK) return result;

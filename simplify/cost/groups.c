@@ -28,6 +28,13 @@ static void join_groups(fct_groups *g, uint32_t i, uint32_t j) {
         if (g->group_of[k] == high) g->group_of[k] = low;
 }
 
+bool fct_groups_fit(const fct_simplifier *s, uint32_t a, uint32_t b) {
+    uint32_t count = 0;
+    for (uint32_t w = s->first_wedges[a]; w != FCT_NONE; w = s->next_wedges[w]) ++count;
+    for (uint32_t w = s->first_wedges[b]; w != FCT_NONE; w = s->next_wedges[w]) ++count;
+    return count <= SIMPLIFY_MAX_WEDGES;
+}
+
 bool fct_groups_find(fct_simplifier *s, uint32_t a, uint32_t b, fct_groups *g) {
     g->wedge_count = 0;
     if (!list_wedges(s, a, false, g) || !list_wedges(s, b, true, g)) return false;

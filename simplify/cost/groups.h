@@ -21,6 +21,8 @@ typedef struct fct_groups {
 /* The groups of the edge a-b of a mesh with attributes. False if there are too many wedges. Reads the rings.
  */
 bool fct_groups_find(fct_simplifier *s, uint32_t a, uint32_t b, fct_groups *out);
+/* Whether fct_groups_find would succeed. */
+bool fct_groups_fit(const fct_simplifier *s, uint32_t a, uint32_t b);
 /* sum (quadric_size): the sum of the group's quadrics. mean (channel_count): the mean of its attributes. */
 void fct_groups_sum(const fct_simplifier *s, const fct_groups *g, uint32_t group, double *sum, double *mean);
 /* Attributes (channel_count) of the group's first wedge at the given end (0 or 1). If the group has none

@@ -11,13 +11,9 @@
 #include "simplify/cost/loss.h"
 #include "simplify/cost/nearest.h"
 
-/* The area that the quadrics of a point have summed. */
+/* The area that the quadric of a point has summed. */
 static double sum_area(const fct_simplifier *s, uint32_t point) {
-    if (!s->corner_wedges) return wedge_quadric(s, point)[10];
-    double area = 0;
-    for (uint32_t w = s->first_wedges[point]; w != FCT_NONE; w = s->next_wedges[w])
-        area += wedge_quadric(s, w)[10];
-    return area;
+    return point_at(s, point)->quadric[10];
 }
 
 static void add_lost(fct_loss *loss, v3 lost, v3 at, double weight) {

@@ -153,10 +153,10 @@ static void place_subset(const fct_simplifier *s, const fct_groups *g, double su
 static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, double *r, fct_groups *g,
                                  double sums[][MAX_QUADRIC]) {
     memset(r, 0, POSITION_QUADRIC * sizeof *r);
-    if (!s->corner_wedges) {
-        const double *qa = wedge_quadric(s, a);
-        const double *qb = wedge_quadric(s, b);
-        for (int k = 0; k < POSITION_QUADRIC; ++k) r[k] = qa[k] + qb[k];
+    if (!s->steering) {
+        if (s->corner_wedges && !fct_groups_fit(s, a, b)) return false;
+        for (int k = 0; k < POSITION_QUADRIC; ++k)
+            r[k] = point_at(s, a)->quadric[k] + point_at(s, b)->quadric[k];
         return true;
     }
     if (!fct_groups_find(s, a, b, g)) return false;
@@ -170,8 +170,9 @@ static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, doub
     return true;
 }
 
-/* The common case: no attributes, no constraint, the optimal position, no hub. With m the middle of a-b and d the way from
- * it, (A + ridge I) d = -g, so Q(m + d) = Q(m) + g.d - ridge |d|^2. False if step 1 of 3.5 fails. */
+/* The common case: no attributes that steer, no constraint, the optimal position, no hub. With m the middle
+ * of a-b and d the way from it, (A + ridge I) d = -g, so Q(m + d) = Q(m) + g.d - ridge |d|^2. False if step 1
+ * of 3.5 fails. */
 static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_point *b,
                          fct_candidate *out) {
     double r[POSITION_QUADRIC];
@@ -186,7 +187,7 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
     out->at = v3_add(middle, delta);
     out->end = 2;
     out->error = error > 0 ? error : 0;
-    out->excess = 0;
+    out->distance2 = out->error;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);
     out->key = out->error + ridge * (reach2 + .25 * length2);
@@ -195,9 +196,10 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
 
 bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_candidate *out) {
     const fct_point *first = point_at(s, a), *second = point_at(s, b);
-    if (!s->channel_count && s->def->placement == FCT_PLACE_OPTIMAL && !ends_only &&
-        first->valence <= SIMPLIFY_HUB && second->valence <= SIMPLIFY_HUB && !constraint_at(s, a) &&
-        !constraint_at(s, b) && place_freely(s, first, second, out))
+    if (!s->steering && s->def->placement == FCT_PLACE_OPTIMAL && !ends_only &&
+        (!s->corner_wedges || fct_groups_fit(s, a, b)) && first->valence <= SIMPLIFY_HUB &&
+        second->valence <= SIMPLIFY_HUB && !constraint_at(s, a) && !constraint_at(s, b) &&
+        place_freely(s, first, second, out))
         return true;
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
@@ -218,8 +220,9 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     else
         place_point(s, r, held ? &joint : NULL, pa, pb, ends_only, out);
     if (!(out->error > 0)) out->error = 0;
-    double planes = held ? weight * quadric_at(joint.held.planes, out->at) : 0;
-    out->excess = held ? planes * (1 - 1 / s->def->boundary_weight) : 0;
+    out->distance2 = quadric_at(first->quadric, out->at) + quadric_at(second->quadric, out->at);
+    if (held) out->distance2 += weight / s->def->boundary_weight * quadric_at(joint.held.planes, out->at);
+    if (!(out->distance2 > 0)) out->distance2 = 0;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);
     double reach2 = v3_norm2(v3_sub(out->at, pa)) + v3_norm2(v3_sub(out->at, pb));

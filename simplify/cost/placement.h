@@ -6,10 +6,10 @@
 
 typedef struct fct_candidate {
     v3 at;
-    uint32_t end;         /* 0 or 1 if `at` is that end of the edge, else 2 */
-    double error;         /* Q(at) with the best attributes, at least 0 */
-    double excess;        /* the part of `error` that makes boundaries weigh more than their distance */
-    double area;          /* of the faces that the quadric sums */
+    uint32_t end;     /* 0 or 1 if `at` is that end of the edge, else 2 */
+    double error;     /* Q(at) with the best attributes, at least 0 */
+    double distance2; /* squared distance from the faces and held curves, times `area`, without attributes */
+    double area;      /* of the faces that the quadric sums */
     double resistance[6]; /* A of the position's quadric: xx xy xz yy yz zz */
     double key;           /* error plus the energy of the regularisation; orders the queue */
 } fct_candidate;

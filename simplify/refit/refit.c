@@ -46,7 +46,8 @@ enum {
     MAX_HALVINGS = 3,  /* of a step that goes too far */
 };
 
-/* Samples [begin, end): the first pass searches the face; later passes keep it, because points move little. */
+/* Samples [begin, end): the first pass searches the face; later passes keep it, because points move little.
+ */
 static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const fct_refit *r = user;
@@ -61,7 +62,8 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
         if (count == 0 || out->face == FCT_NONE) continue;
         v3 ends[3], p = find_sample_position(s, corners, count, ends);
         const uint32_t *t = s->triangles + 3 * (size_t)out->face;
-        triangle shape = triangle_make(point_position(s, t[0]), point_position(s, t[1]), point_position(s, t[2]));
+        triangle shape =
+            triangle_make(point_position(s, t[0]), point_position(s, t[1]), point_position(s, t[2]));
         foot best = triangle_nearest(&shape, p);
         out->u = (float)best.u, out->v = (float)best.v;
     }
@@ -109,7 +111,8 @@ static void add_sample(fct_refit *r, size_t sample, const fct_landing *at) {
     v3 ends[3], p = find_sample_position(s, corners, count, ends);
     double weight = count == 1 ? r->corner_weights[sample * r->stride] : CENTROID_WEIGHT * find_area(ends);
     const uint32_t *t = s->triangles + 3 * (size_t)at->face;
-    v3 a = point_position(s, t[0]), ab = v3_sub(point_position(s, t[1]), a), ac = v3_sub(point_position(s, t[2]), a);
+    v3 a = point_position(s, t[0]), ab = v3_sub(point_position(s, t[1]), a),
+       ac = v3_sub(point_position(s, t[2]), a);
     double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
     v3 rest = v3_sub(v3_sub(p, a), v3_add(v3_scale(ab, b[1]), v3_scale(ac, b[2])));
     double residual = v3_norm(rest);
@@ -297,7 +300,8 @@ static fct_result run_pass(fct_refit *r, uint32_t pass, size_t samples) {
 fct_result fct_simplify_refit(fct_simplifier *s) {
     fct_refit r = {.s = s};
     /* A closed mesh has half as many points as faces. */
-    size_t all = (size_t)s->wedge_count + s->mesh->face_count, enough = MOST_SAMPLES / 2 * (size_t)s->live_faces;
+    size_t all = (size_t)s->wedge_count + s->mesh->face_count,
+           enough = MOST_SAMPLES / 2 * (size_t)s->live_faces;
     r.stride = all > enough && enough > 0 ? (uint32_t)(all / enough) : 1;
     r.wedge_samples = (s->wedge_count + r.stride - 1) / r.stride;
     size_t samples = r.wedge_samples + (size_t)(s->mesh->face_count + r.stride - 1) / r.stride;

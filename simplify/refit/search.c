@@ -20,8 +20,8 @@ typedef struct octet {
     uint32_t rest;         /* the corner that follows in the list */
     uint32_t corners[8], wedges[8];
     v3 center;
-    double scale;             /* 1 / the largest coordinate of x and y */
-    float x[3][8], y[3][8];   /* the next two points of each face, relative to the centre, scaled */
+    double scale;           /* 1 / the largest coordinate of x and y */
+    float x[3][8], y[3][8]; /* the next two points of each face, relative to the centre, scaled */
 } octet;
 
 typedef struct search {

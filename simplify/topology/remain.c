@@ -5,7 +5,8 @@
  * 2. Each face marks its two edges from the moved point. The second face of an edge is compared with the
  * first: they may be equal, or folded onto each other. A third face may be the start of a non-manifold edge.
  * 3. A face that turned by more than 4 degrees in a contraction, or at all in the refit, is compared with the
- * face across its third side, which does not move. Cost: O(faces), plus the valence of a neighbour per turned face and per face at a hub.
+ * face across its third side, which does not move. Cost: O(faces), plus the valence of a neighbour per turned
+ * face and per face at a hub.
  */
 #include "simplify/topology/remain.h"
 
@@ -239,7 +240,8 @@ bool fct_simplify_is_level(const fct_simplifier *s) {
     double sum2 = v3_norm2(sum);
     for (uint32_t i = 0; i < s->remaining_count; ++i) {
         double dot = v3_dot(sum, s->remaining[i].normal);
-        if (!(dot > 0 && dot * dot > LEVEL_COSINE * LEVEL_COSINE * sum2 * s->remaining[i].norm2)) return false;
+        if (!(dot > 0 && dot * dot > LEVEL_COSINE * LEVEL_COSINE * sum2 * s->remaining[i].norm2))
+            return false;
     }
     return true;
 }

@@ -10,7 +10,6 @@
 #include "simplify/topology/topology.h"
 
 #include <float.h>
-#include <stddef.h>
 
 #include "base/key.h"
 #include "simplify/topology/weld.h"
@@ -115,9 +114,7 @@ static fct_result make_points(fct_simplifier *s) {
     if (result != FCT_OK) return result;
 
     uint32_t count = s->point_count;
-    s->point_stride = s->channel_count ? offsetof(fct_point, quadric) : sizeof(fct_point);
-    const fct_array arrays[] = {FCT_ARRAY_ZERO(s->points, s->point_stride * count),
-                                FCT_ARRAY(s->point_parents, count)};
+    const fct_array arrays[] = {FCT_ARRAY_ZERO(s->points, count), FCT_ARRAY(s->point_parents, count)};
     result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the points of a mesh");
     if (result != FCT_OK) return result;
     find_frame(s);

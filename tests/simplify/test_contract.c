@@ -39,8 +39,7 @@ static void the_queue_pops_within_an_eighth(void **state) {
 /* --- One contraction --- */
 
 static double value_at(const fct_simplifier *s, uint32_t wedge, const double *v) {
-    return fct_quadric_value(wedge_quadric(s, wedge), s->steering,
-                             (v3){v[0], v[1], v[2]}, v + 3);
+    return fct_quadric_value(wedge_quadric(s, wedge), s->steering, (v3){v[0], v[1], v[2]}, v + 3);
 }
 
 static uint32_t wedge_of(fct_simplifier *s, uint32_t c) {
@@ -54,7 +53,8 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
     def.placement = e % 3 ? FCT_PLACE_OPTIMAL : FCT_PLACE_SUBSET;
     fct_simplifier *s = open_simplifier(&env, mesh, &def), *old = open_simplifier(&env, mesh, &def);
     uint32_t ends[2] = {s->edges[e].ends[swap], s->edges[e].ends[!swap]}, corners = 3 * mesh->face_count;
-    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence, a = ends[keep], b = ends[!keep];
+    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence, a = ends[keep],
+             b = ends[!keep];
     fct_candidate candidate;
     assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
     fct_groups groups;
@@ -65,7 +65,8 @@ static void check_collapse(const fct_mesh *mesh, uint32_t e, bool swap) {
 
     v3 at = point_position(s, a);
     assert_true(at.x == candidate.at.x && at.y == candidate.at.y && at.z == candidate.at.z);
-    assert_int_equal(point_at(s, a)->source, candidate.end < 2 ? point_at(old, ends[candidate.end])->source : FCT_NONE);
+    assert_int_equal(point_at(s, a)->source,
+                     candidate.end < 2 ? point_at(old, ends[candidate.end])->source : FCT_NONE);
     assert_int_equal(s->point_parents[b], a);
     uint32_t live = 0, valences[64] = {0};
     for (uint32_t f = 0; f < mesh->face_count; ++f) {
@@ -222,8 +223,7 @@ static void the_busiest_wedge_takes_a_quadric(void **state) {
             wedges[mesh.triangles[3 * (size_t)f]] = s->corner_wedges[3 * (size_t)f];
         fct_elimination e;
         double before[3][POSITION_QUADRIC];
-        for (int k = 0; k < 3; ++k)
-            memcpy(before[k], wedge_quadric(s, wedges[k]), sizeof before[k]);
+        for (int k = 0; k < 3; ++k) memcpy(before[k], wedge_quadric(s, wedges[k]), sizeof before[k]);
         fct_quadric_eliminate(wedge_quadric(s, wedges[lone]), s->steering,
                               s->attributes + (size_t)s->channel_count * wedges[lone], 0, &e);
         uint32_t ends[2] = {s->point_of[3 + alone], s->point_of[4 + alone]};
@@ -231,8 +231,7 @@ static void the_busiest_wedge_takes_a_quadric(void **state) {
         fct_candidate candidate;
         assert_true(fct_place(s, ends[0], ends[1], false, &candidate));
         fct_simplify_collapse(s, ends, &candidate, keep, fct_simplify_gather(s, ends[!keep], s->ring_b));
-        const double *taken = wedge_quadric(s, wedges[most]),
-                     *kept = wedge_quadric(s, wedges[few]);
+        const double *taken = wedge_quadric(s, wedges[most]), *kept = wedge_quadric(s, wedges[few]);
         for (int k = 0; k < POSITION_QUADRIC; ++k) {
             assert_close(taken[k], before[most][k] + e.position[k], 1e-9);
             assert_true(kept[k] == before[few][k]);
@@ -254,7 +253,7 @@ static bool price_edge(fct_simplifier *s, uint32_t e, double *key, double *error
     const fct_move move = {a, b, count_a, count_b, c.at};
     if (!fct_simplify_remains_good(s, &move)) return false;
     double lost = fct_simplify_is_level(s) ? 0 : fct_loss_measure(s, a, b, count_a, count_b, &c, &loss);
-    *key = c.key + lost, *error2 = (c.error + lost) / c.area;
+    *key = c.key + lost, *error2 = (c.distance2 + lost) / c.area;
     return true;
 }
 
