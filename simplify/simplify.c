@@ -60,22 +60,34 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
     return fct_mesh_validate(env, mesh);
 }
 
+/* The measured errors in the units of the input. */
+static void report_fit(const fct_simplifier *s, const fct_fit *fit, fct_simplify_stats *stats) {
+    stats->distance_rms = sqrt(fit->distance2) * s->extent;
+    stats->distance_max = sqrt(fit->farthest2) * s->extent;
+    double sums[3] = {0};
+    for (uint32_t i = 0; i < s->channel_count; ++i)
+        sums[s->channels[i].source] += fit->channels2[i] / (s->channels[i].factor * s->channels[i].factor);
+    stats->color_rms = sqrt(sums[CHANNEL_COLOR] / 3);
+    stats->normal_rms = sqrt(sums[CHANNEL_NORMAL]);
+    stats->texcoord_rms = sqrt(sums[CHANNEL_TEXCOORD]);
+}
+
 /* Contracts, refits and writes a sorted mesh. */
-static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out,
+static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out, bool measure,
                                  fct_simplify_stats *stats) {
     double start = fct_seconds();
+    fct_fit fit = {0};
     fct_result result = fct_simplify_contract(s, &stats->stopped_because);
     double contracted = fct_seconds();
     stats->seconds_contract = contracted - start;
-    /* Subset placement promises vertices of the input, so nothing may move. */
-    bool refit =
-        s->live_faces < s->face_count && s->def->placement != FCT_PLACE_SUBSET && s->def->refit_passes > 0;
-    if (result == FCT_OK && refit) result = fct_simplify_refit(s);
+    bool changed = s->live_faces < s->face_count;
+    if (result == FCT_OK && changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
     if (result == FCT_OK) result = fct_simplify_output(s, places, out);
     if (result != FCT_OK) fct_mesh_release(s->env, out);
     stats->seconds_refit = fct_seconds() - contracted;
     stats->faces_after = out->face_count;
     stats->max_cost = sqrt(s->max_error2) * s->extent;
+    report_fit(s, &fit, stats);
     return result;
 }
 
@@ -93,7 +105,7 @@ fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simp
     fct_simplifier *s;
     result = fct_simplifier_create(env, &sorted, def, &s);
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = run_simplifier(s, places, out, &found);
+    if (result == FCT_OK) result = run_simplifier(s, places, out, stats != NULL, &found);
     fct_simplifier_destroy(s);
     fct_simplify_release_sorted(env, &sorted);
     fct_release(env, places);

@@ -34,9 +34,9 @@ static const struct argp_option simplify_options_table[] = {
     {"faces", KEY_FACES, "N", 0, "Stop at N faces or fewer", 0},
     {"ratio", KEY_RATIO, "R", 0, "Stop at R times the faces of the input, above 0 and at most 1", 0},
     {"max-error", KEY_MAX_ERROR, "E", 0,
-     "Make no contraction whose error is above E, in the mesh's unit. The error is the root of the quadric "
-     "error over "
-     "the area; it includes attributes and boundary planes (default: no limit)",
+     "Make no contraction whose error is above E, a distance in the mesh's unit: the root mean square from "
+     "the "
+     "planes of the faces and of the boundary (default: no limit)",
      0},
     {"attributes", KEY_ATTRIBUTES, "LIST", 0,
      "The attributes that count in the error, with optional weights, such as color=.1,uv=.1,normal=.01; "
@@ -152,14 +152,17 @@ static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_sta
     static const char *const reasons[] = {
         [FCT_STOP_FACES] = "faces", [FCT_STOP_ERROR] = "error", [FCT_STOP_EXHAUSTED] = "exhausted"};
     double total = tool_seconds() - t->start;
-    tool_say(t, "%u faces to %u (stopped by %s), largest error %.3g, %.2f s", s->faces_before, s->faces_after,
-             reasons[s->stopped_because], s->max_cost, total);
-    return tool_json(t, json_pack("{s:I, s:I, s:I, s:s, s:f, s:{s:f, s:f, s:f, s:f}, s:I}", "faces_before",
-                                  (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after,
-                                  "vertices", (json_int_t)mesh->vertex_count, "stopped_because",
-                                  reasons[s->stopped_because], "max_cost", s->max_cost, "seconds", "init",
-                                  s->seconds_init, "contract", s->seconds_contract, "refit", s->seconds_refit,
-                                  "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
+    tool_say(t, "%u faces to %u (stopped by %s), distance %.3g (largest %.3g), %.2f s", s->faces_before,
+             s->faces_after, reasons[s->stopped_because], s->distance_rms, s->distance_max, total);
+    return tool_json(
+        t,
+        json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f, s:{s:f, s:f, s:f, s:f}, s:I}",
+                  "faces_before", (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after,
+                  "vertices", (json_int_t)mesh->vertex_count, "stopped_because", reasons[s->stopped_because],
+                  "max_cost", s->max_cost, "distance_rms", s->distance_rms, "distance_max", s->distance_max,
+                  "color_rms", s->color_rms, "uv_rms", s->texcoord_rms, "normal_rms", s->normal_rms,
+                  "seconds", "init", s->seconds_init, "contract", s->seconds_contract, "refit",
+                  s->seconds_refit, "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
 }
 
 static int run_simplify(tool *t, void *options) {
@@ -207,7 +210,8 @@ int tool_simplify(int argc, char **argv) {
                 "exceed --max-error.\n\n"
                 "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
                 "exhausted), max_cost (the largest "
-                "error of a contraction), seconds{init, contract, refit, total}, peak_bytes.",
+                "error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms (errors "
+                "of the result), seconds{init, contract, refit, total}, peak_bytes.",
         .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb",
         .options = simplify_options_table,

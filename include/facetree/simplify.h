@@ -36,9 +36,9 @@ typedef enum fct_stop {
 typedef struct fct_simplify_def {
     uint32_t size;
     uint32_t target_faces; /* stop at this count or below; default 0 */
-    /* Make no contraction whose error is larger; in the mesh's unit; default infinity. The squared error is
-     * the mean squared distance from the planes of the faces, plus that from the planes of the boundary
-     * (without boundary_weight), plus the share of the attributes. */
+    /* Make no contraction whose error is larger; in the mesh's unit; default infinity. The error is a
+     * distance, the root of the mean squared distance from the planes of the faces plus that from the planes
+     * of the boundary (without boundary_weight). Attributes have no part in it. */
     double max_error;
     fct_placement placement; /* default OPTIMAL */
     double color_weight;     /* default .1 */
@@ -68,6 +68,14 @@ typedef struct fct_simplify_stats {
     uint32_t faces_before, faces_after;
     fct_stop stopped_because;
     double max_cost; /* the largest error of a contraction that was made, as max_error measures it */
+    /* Errors of the result: root mean square, by area, over samples of the input (vertices and centroids of
+     * faces, at least 16 per vertex of the result if there are as many), and the largest. A sample's distance
+     * is that to the faces of the result around it, so the nearest one may be nearer. In units of the mesh.
+     */
+    double distance_rms, distance_max;
+    double color_rms;    /* of one component */
+    double texcoord_rms; /* length of the difference of (u, v); 0 if the mesh has no such attribute */
+    double normal_rms;   /* length of the difference of normals, before they get unit length */
     double seconds_init, seconds_contract, seconds_refit;
 } fct_simplify_stats;
 

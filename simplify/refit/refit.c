@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/nearest.h"
+#include "simplify/refit/measure.h"
 #include "simplify/refit/search.h"
 #include "simplify/topology/remain.h"
 #include "simplify/topology/ring.h"
@@ -35,11 +36,6 @@
 #define POINT_REACH .5
 /* Shorter distances, in the unit cube, are rounding errors of the input's floats. */
 #define NOISE 1e-7
-/* Quadrature over a face, exact for polynomials of degree 2: the centroid weighs 3/4 of the area, each corner
- * 1/12. */
-#define CENTROID_WEIGHT .75
-#define CORNER_DIVISOR  12
-
 enum {
     CHUNK = 1024,      /* samples per parallel task */
     MOST_SAMPLES = 32, /* per point: more do not make the result better */
@@ -67,16 +63,6 @@ static void land_samples(void *user, size_t begin, size_t end, size_t chunk, uin
         foot best = triangle_nearest(&shape, p);
         out->u = (float)best.u, out->v = (float)best.v;
     }
-}
-
-/* The scaled value of a channel at a corner of the input. */
-static double find_input_value(const fct_simplifier *s, const fct_channel *channel, uint32_t corner) {
-    const fct_mesh *mesh = s->mesh;
-    size_t v = mesh->triangles[corner], i = channel->component;
-    double value = channel->source == CHANNEL_COLOR    ? mesh->colors[3 * v + i]
-                   : channel->source == CHANNEL_NORMAL ? mesh->normals[3 * v + i]
-                                                       : mesh->texcoords[2 * (size_t)corner + i];
-    return value * channel->factor;
 }
 
 /* Adds the residual of the sample's attributes to the wedges of its target, with barycentric weights b. */
@@ -109,7 +95,7 @@ static void add_sample(fct_refit *r, size_t sample, const fct_landing *at) {
     if (at->face == FCT_NONE) return;
     uint32_t corners[3] = {0}, count = find_sample_corners(r, sample, corners);
     v3 ends[3], p = find_sample_position(s, corners, count, ends);
-    double weight = count == 1 ? r->corner_weights[sample * r->stride] : CENTROID_WEIGHT * find_area(ends);
+    double weight = find_sample_weight(r, sample, count, ends);
     const uint32_t *t = s->triangles + 3 * (size_t)at->face;
     v3 a = point_position(s, t[0]), ab = v3_sub(point_position(s, t[1]), a),
        ac = v3_sub(point_position(s, t[2]), a);
@@ -297,8 +283,12 @@ static fct_result run_pass(fct_refit *r, uint32_t pass, size_t samples) {
     return FCT_OK;
 }
 
-fct_result fct_simplify_refit(fct_simplifier *s) {
+fct_result fct_simplify_refit(fct_simplifier *s, fct_fit *fit) {
     fct_refit r = {.s = s};
+    /* Subset placement promises vertices of the input, so nothing may move. */
+    uint32_t passes = s->def->placement == FCT_PLACE_SUBSET ? 0 : s->def->refit_passes;
+    if (fit) *fit = (fct_fit){0};
+    if (passes == 0 && !fit) return FCT_OK;
     /* A closed mesh has half as many points as faces. */
     size_t all = (size_t)s->wedge_count + s->mesh->face_count,
            enough = MOST_SAMPLES / 2 * (size_t)s->live_faces;
@@ -316,8 +306,12 @@ fct_result fct_simplify_refit(fct_simplifier *s) {
     if (result != FCT_OK) return result;
     prepare_samples(&r);
     for (size_t i = 0; i < samples; ++i) r.landings[i] = (fct_landing){.face = FCT_NONE};
-    for (uint32_t pass = 0; pass < s->def->refit_passes && result == FCT_OK; ++pass)
-        result = run_pass(&r, pass, samples);
+    for (uint32_t pass = 0; pass < passes && result == FCT_OK; ++pass) result = run_pass(&r, pass, samples);
+    if (result == FCT_OK && fit) {
+        r.pass = passes;
+        fct_parallel_for(s->env, samples, CHUNK, land_samples, &r);
+        result = fct_refit_measure(&r, samples, fit);
+    }
     fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
     return result;
 }

@@ -4,6 +4,11 @@
 
 #include "simplify/state.h"
 
+/* Quadrature over a face, exact for polynomials of degree 2: the centroid weighs 3/4 of the area, each corner
+ * 1/12. */
+#define CENTROID_WEIGHT .75
+#define CORNER_DIVISOR  12
+
 /* The point of the remaining faces that is nearest to a sample. */
 typedef struct fct_landing {
     uint32_t face;   /* FCT_NONE: there is none */
@@ -75,6 +80,21 @@ static inline v3 find_sample_position(const fct_simplifier *s, const uint32_t *c
     if (count == 1) return p[0];
     p[1] = find_input_position(s, corners[1]), p[2] = find_input_position(s, corners[2]);
     return v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
+}
+
+/* The area for which a sample stands; `ends` are the positions of its corners. */
+static inline double find_sample_weight(const fct_refit *r, size_t sample, uint32_t count, const v3 ends[3]) {
+    return count == 1 ? r->corner_weights[sample * r->stride] : CENTROID_WEIGHT * find_area(ends);
+}
+
+/* The scaled value of a channel at a corner of the input. */
+static inline double find_input_value(const fct_simplifier *s, const fct_channel *channel, uint32_t corner) {
+    const fct_mesh *mesh = s->mesh;
+    size_t v = mesh->triangles[corner], i = channel->component;
+    double value = channel->source == CHANNEL_COLOR    ? mesh->colors[3 * v + i]
+                   : channel->source == CHANNEL_NORMAL ? mesh->normals[3 * v + i]
+                                                       : mesh->texcoords[2 * (size_t)corner + i];
+    return value * channel->factor;
 }
 
 #endif

@@ -1,6 +1,6 @@
 /* simplify/refit/search.c: see search.h.
  *
- * The faces of a ring are measured eight at a time (an octet), relative to their common point and scaled by
+ * The faces of a ring are measured in octets, relative to their common point and scaled by
  * the ring's size, so that floats suffice. Samples that follow each other on the curve land on the same
  * rings, so a small cache holds the octets.
  */

@@ -159,7 +159,7 @@ static void check_pass(unsigned arrays, double amount, uint64_t seed) {
             double value = s->attributes[(size_t)s->channel_count * w + i] + x.sums[w][i] / x.weights[w];
             values[w][i] = fmin(fmax(value, s->channels[i].lower), s->channels[i].upper);
         }
-    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    assert_int_equal(fct_simplify_refit(s, NULL), FCT_OK);
     for (uint32_t p = 0; p < s->point_count; ++p)
         assert_true(v3_norm(v3_sub(point_position(s, p), want[p])) < 1e-4 * amount);
     for (uint32_t w = 0; w < s->wedge_count && s->channel_count; ++w)
@@ -191,7 +191,7 @@ static void steps_are_at_most_half_the_shortest_edge(void **state) {
     fct_simplifier *s = open_simplifier(&env, &mesh, &def);
     for (uint32_t k = 4; k < 6; ++k) point_at(s, s->point_of[k])->at.z += .05;
     v3 from = point_position(s, s->point_of[4]);
-    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    assert_int_equal(fct_simplify_refit(s, NULL), FCT_OK);
     double step = v3_norm(v3_sub(point_position(s, s->point_of[4]), from));
     assert_ratio(step, .5 * .02 / 2, 1e-4); /* half of .02, in the unit cube */
     assert_int_equal(point_at(s, s->point_of[4])->source, FCT_NONE);
@@ -256,7 +256,7 @@ static void points_stay_near_the_input(void **state) {
     fct_stop stop;
     assert_int_equal(fct_simplify_contract(s, &stop), FCT_OK);
     double before = farthest_point(s), sample = farthest_sample(s);
-    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    assert_int_equal(fct_simplify_refit(s, NULL), FCT_OK);
     double after = farthest_point(s);
     assert_true(after <= fmax(before, sample));
     fct_simplifier_destroy(s);
@@ -269,7 +269,7 @@ static void nothing_moves_without_a_residual(void **state) {
     fct_mesh mesh = make_sheet(&env, 0, 3);
     fct_simplify_def def = fct_simplify_def_default();
     fct_simplifier *s = open_simplifier(&env, &mesh, &def);
-    assert_int_equal(fct_simplify_refit(s), FCT_OK);
+    assert_int_equal(fct_simplify_refit(s, NULL), FCT_OK);
     for (uint32_t p = 0; p < s->point_count; ++p) assert_true(point_at(s, p)->source != FCT_NONE);
     fct_simplifier_destroy(s);
     fct_mesh_release(&env, &mesh);
