@@ -1,6 +1,7 @@
 /* bvh/bvh.c: creation of the structure with either backend. */
 #include <string.h>
 
+#include "bvh/build/frame.h"
 #include "bvh/build/nodes.h"
 #include "bvh/build/pairs.h"
 #include "bvh/build/refit.h"
@@ -14,6 +15,7 @@ static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {
     fct_result result = fct_progress(bvh->env, "ray structure", 0);
     if (result == FCT_OK) result = fct_leaves_build(bvh, &leaves);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .2);
+    if (result == FCT_OK) result = fct_frame_choose(bvh, &leaves);
     if (result == FCT_OK) result = fct_top_build(bvh->env, &leaves, &top);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .5);
     if (result == FCT_OK) result = fct_wide_build(bvh, &leaves, &top, &wide);

@@ -215,5 +215,6 @@ void fct_leaf_list_release(const fct_env *env, fct_leaf_list *list) {
     fct_release(env, list->nodes);
     fct_release(env, list->offsets);
     fct_release(env, list->bounds);
+    fct_release(env, list->frame_bounds);
     *list = (fct_leaf_list){0};
 }

@@ -10,6 +10,9 @@ typedef struct fct_leaf_list {
     uint32_t *nodes;   /* count, ids in the cluster tree */
     uint32_t *offsets; /* count, units of 64 bytes in bvh->leaves */
     float *bounds;     /* count x 6, lower then upper, scaled */
+    /* If the top is split along other axes than those of the coordinates, see frame.h; else NULL: */
+    float *frame_bounds; /* count x 6, lower then upper along the axes of `frame`, relative to fct_bvh.center */
+    v3 frame[3];
 } fct_leaf_list;
 
 /* Fills bvh->leaves and *out; fct_leaf_list_release frees *out. Errors: MEMORY. */

@@ -144,6 +144,7 @@ static bool split_node(const float *bounds, fct_top *top, pending at, uint32_t n
     clear_bounds(node->bounds);
     for (uint32_t i = node->begin; i < node->end; ++i)
         join_bounds(node->bounds, bounds + 6 * (size_t)top->order[i]);
+    node->area = half_area(node->bounds);
     if (node->end - node->begin == 1) return false;
     uint32_t middle = split_leaves(bounds, top->order, node, at.depth);
     node->left = next, node->right = next + 1;
@@ -218,6 +219,20 @@ static fct_result split_all(const fct_env *env, const float *bounds, fct_top *to
     return FCT_OK;
 }
 
+/* Sets the bounds along the coordinate axes, where the splits had other axes. */
+static void bound_nodes(const float *bounds, fct_top *top) {
+    for (uint32_t n = top->node_count; n-- > 0;) {
+        fct_top_node *node = &top->nodes[n];
+        clear_bounds(node->bounds);
+        if (node->left == FCT_NONE) {
+            join_bounds(node->bounds, bounds + 6 * (size_t)top->order[node->begin]);
+        } else {
+            join_bounds(node->bounds, top->nodes[node->left].bounds);
+            join_bounds(node->bounds, top->nodes[node->right].bounds);
+        }
+    }
+}
+
 fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_top *out) {
     *out = (fct_top){0};
     fct_top top = {.node_count = 1};
@@ -227,7 +242,8 @@ fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_to
     if (result != FCT_OK) return result;
     for (uint32_t i = 0; i < leaves->count; ++i) top.order[i] = i;
     top.nodes[0] = (fct_top_node){.left = FCT_NONE, .right = FCT_NONE, .begin = 0, .end = leaves->count};
-    result = split_all(env, leaves->bounds, &top, leaves->count);
+    result = split_all(env, leaves->frame_bounds ? leaves->frame_bounds : leaves->bounds, &top, leaves->count);
+    if (result == FCT_OK && leaves->frame_bounds) bound_nodes(leaves->bounds, &top);
     if (result != FCT_OK)
         fct_top_release(env, &top);
     else

@@ -6,6 +6,7 @@
 
 typedef struct fct_top_node {
     float bounds[6];      /* lower then upper, scaled */
+    float area;           /* half of the surface of the box along the axes of the splits */
     uint32_t left, right; /* nodes; FCT_NONE in a leaf, which has end == begin + 1 */
     uint32_t begin, end;  /* range of fct_top.order */
 } fct_top_node;
