@@ -7,7 +7,8 @@
 /* In order of place. */
 typedef struct fct_leaf_list {
     uint32_t count;
-    uint32_t *nodes;   /* count, ids in the cluster tree */
+    uint32_t *nodes;   /* count, ids in the cluster tree: the cluster, or, if bvh->places is set, a large one in it */
+    uint32_t *firsts;  /* count + 1: triangles in the leaves before each */
     uint32_t *offsets; /* count, units of 64 bytes in bvh->leaves */
     float *bounds;     /* count x 6, lower then upper, scaled */
     /* If the top is split along other axes than those of the coordinates, see frame.h; else NULL: */

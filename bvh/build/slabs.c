@@ -102,10 +102,14 @@ fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, cons
             const uint32_t number = top->order[node->begin], cluster = leaves->nodes[number];
             const fct_leaf *leaf = fct_bvh_leaf(bvh, leaves->offsets[number]);
             fct_cluster room;
-            spans[n] = (fct_span){.first = leaf->first,
-                                  .last = leaf->first + leaf->count,
+            spans[n] = (fct_span){.first = FCT_NONE,
                                   .largest = cluster,
                                   .area = fct_node_cluster(bvh->tree, cluster, &room)->area};
+            for (uint32_t i = 0; i < leaf->count; ++i) {
+                const uint32_t place = fct_leaf_place(bvh, leaf, i);
+                if (place < spans[n].first) spans[n].first = place;
+                if (place + 1 > spans[n].last) spans[n].last = place + 1;
+            }
         } else {
             const fct_span *l = &spans[node->left], *r = &spans[node->right];
             spans[n] = r->area > l->area ? *r : *l;
@@ -127,7 +131,7 @@ fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const f
     fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
     const bool is_leaf = node->left == FCT_NONE;
-    if (is_leaf && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED)) return best;
+    if (is_leaf && !bvh->places && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED)) return best;
     const uint32_t clusters[2] = {span->largest, span->enclosing};
     for (int i = 0; i < 3; ++i) {
         if (i == 2 ? !leaves->frame_bounds : !adds_axes(clusters, i)) continue;

@@ -30,7 +30,7 @@ FCT_DECLARE_KERNEL(void, fct_slabs_hold,
 /* Of the leaves of a node of the top. */
 typedef struct fct_span {
     uint32_t first, last; /* places [first, last) around all faces */
-    uint32_t largest;     /* the leaf's cluster of largest area */
+    uint32_t largest;     /* the cluster of largest area among fct_leaf_list.nodes */
     uint32_t
         enclosing; /* the smallest cluster with all faces; FCT_NONE if none, or if the tree has many roots */
     float area;    /* of `largest` */

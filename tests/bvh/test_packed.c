@@ -267,7 +267,7 @@ static void splits_of_the_top_have_the_least_binned_cost(void **state) {
         }
     fct_leaf_list leaves = {.count = COUNT, .bounds = bounds};
     fct_top top;
-    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    assert_int_equal(fct_top_build(&env, &leaves, 1, &top), FCT_OK);
     assert_int_equal(top.node_count, 2 * COUNT - 1);
     for (uint32_t n = 0; n < top.node_count; ++n) {
         const fct_top_node *node = top.nodes + n;
@@ -305,7 +305,7 @@ static void nested_leaves_do_not_make_a_deep_top(void **state) {
     }
     fct_leaf_list leaves = {.count = COUNT, .bounds = bounds};
     fct_top top;
-    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    assert_int_equal(fct_top_build(&env, &leaves, 1, &top), FCT_OK);
     uint32_t depth[2 * COUNT] = {0}, deepest = 0;
     for (uint32_t n = 0; n < top.node_count; ++n) {
         if (depth[n] > deepest) deepest = depth[n];
@@ -327,7 +327,7 @@ static void spans_name_the_clusters_around_their_leaves(void **state) {
     fct_span *spans;
     char *packed = m.bvh->leaves;
     assert_int_equal(fct_leaves_build(m.bvh, &leaves), FCT_OK);
-    assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+    assert_int_equal(fct_top_build(&env, &leaves, 1, &top), FCT_OK);
     assert_int_equal(fct_spans_build(m.bvh, &leaves, &top, &spans), FCT_OK);
     for (uint32_t n = 0; n < top.node_count; ++n) {
         uint32_t first = UINT32_MAX, last = 0, fewest = UINT32_MAX;
@@ -393,7 +393,7 @@ static void the_collapse_has_the_least_cost(void **state) {
         fct_top top;
         fct_wide_node nodes[MOST];
         uint32_t wide_count, seen[MOST] = {0};
-        assert_int_equal(fct_top_build(&env, &leaves, &top), FCT_OK);
+        assert_int_equal(fct_top_build(&env, &leaves, 1, &top), FCT_OK);
         assert_int_equal(fct_collapse(&env, &top, nodes, &wide_count), FCT_OK);
         double cost = 0;
         for (uint32_t n = 0; n < wide_count; ++n) {
