@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "bvh/build/frame.h"
+#include "bvh/build/leaves.h"
 #include "bvh/build/nodes.h"
 #include "bvh/build/pairs.h"
 #include "bvh/build/refit.h"
@@ -76,8 +77,8 @@ static fct_result copy_structure(const fct_env *env, const fct_bvh *old, const f
     const fct_tree_view *view = &old->view;
     *bvh = *old;
     bvh->env = env;
-    bvh->nodes = bvh->leaves = NULL, bvh->places = NULL, bvh->pairs = NULL, bvh->parts = NULL, bvh->moments = NULL,
-    bvh->embree = NULL;
+    bvh->nodes = bvh->leaves = NULL, bvh->places = NULL, bvh->pairs = NULL, bvh->parts = NULL,
+    bvh->moments = NULL, bvh->embree = NULL;
     bvh->moved = fct_allocate(env, view->vertex_count, 3 * sizeof *bvh->moved);
     if (!bvh->moved || !copy_array(env, old->nodes, old->node_bytes, &bvh->nodes) ||
         !copy_array(env, old->leaves, old->leaf_bytes, &bvh->leaves) ||

@@ -124,8 +124,8 @@ struct fct_bvh {
     /* FCT_BACKEND_OBB */
     char *nodes, *leaves;
     size_t node_bytes, leaf_bytes;
-    uint32_t *places;                /* of the triangles of all leaves, if these are not in order; else NULL */
-    uint32_t root;                   /* reference */
+    uint32_t *places; /* of the triangles of all leaves, if these are not in order; else NULL */
+    uint32_t root;    /* reference */
     struct fct_moment_node *moments; /* with FCT_BVH_SIGN; NULL if the model is one leaf */
     size_t moment_bytes;
     bool has_sign; /* winding numbers can be asked for */

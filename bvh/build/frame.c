@@ -5,7 +5,8 @@
  * side by side.
  *
  * Two frames compete with the coordinate axes: the principal axes of the directions in which the boxes of the
- * leaves extend, and the axes of the leaf of largest area. The least sum of the areas of boxes wins. O(leaves).
+ * leaves extend, and the axes of the leaf of largest area. The least sum of the areas of boxes wins.
+ * O(leaves).
  */
 #include "bvh/build/frame.h"
 

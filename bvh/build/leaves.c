@@ -62,9 +62,9 @@ static uint32_t list_candidates(const fct_tree *tree, uint32_t most, uint32_t *s
 }
 
 /* A model is dense if a line through its bounds meets the boxes of more than DENSE candidates on average: 1.2
- * to 1.9 on scans and beams, 2.5 to 3.6 on separate cubes, 47 on stacked blocks, 45 on needles. On the blocks,
- * leaves of at most DENSE_FACES faces that are put together of clusters of PART_FACES faces make rays 1.6 times
- * as fast, for 37 bytes per triangle instead of 28. */
+ * to 1.9 on scans and beams, 2.5 to 3.6 on separate cubes, 47 on stacked blocks, 45 on needles. On the
+ * blocks, leaves of at most DENSE_FACES faces that are put together of clusters of PART_FACES faces make
+ * rays 1.6 times as fast, for 37 bytes per triangle instead of 28. */
 #define DENSE 16
 enum { DENSE_FACES = 8, PART_FACES = 2 };
 
@@ -101,7 +101,11 @@ typedef struct choose_job {
     choice *choices;
 } choose_job;
 
-enum { CHOOSE_CHUNK = 1024, PACK_CHUNK = 1024, FACE_CHUNK = 4096 }; /* candidates or nodes, leaves, faces per task */
+enum {
+    CHOOSE_CHUNK = 1024,
+    PACK_CHUNK = 1024,
+    FACE_CHUNK = 4096
+}; /* candidates or nodes, leaves, faces per task */
 
 /* Descends from each candidate to the clusters that fit a leaf. */
 static void choose_leaves(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -113,7 +117,8 @@ static void choose_leaves(void *user, size_t begin, size_t end, size_t chunk, ui
         stack[0] = job->candidates[i];
         while (height) {
             uint32_t node = stack[--height];
-            size_t bytes = measure_leaf(&tree->view, NULL, fct_node_first(tree, node), fct_node_faces(tree, node));
+            size_t bytes =
+                measure_leaf(&tree->view, NULL, fct_node_first(tree, node), fct_node_faces(tree, node));
             if (bytes == 0) {
                 stack[height++] = fct_node_child(tree, node, 1);
                 stack[height++] = fct_node_child(tree, node, 0);
@@ -190,7 +195,8 @@ static uint32_t find_largest_part(const regroup_job *job, const fct_top_node *no
     return found;
 }
 
-/* Makes a leaf of each set that the top does not split. A set of too many vertices is halved until it fits. */
+/* Makes a leaf of each set that the top does not split. A set of too many vertices is halved until it fits.
+ */
 static void cut_top(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const regroup_job *job = user;
@@ -268,7 +274,8 @@ static void pack_leaves(void *user, size_t begin, size_t end, size_t chunk, uint
     for (size_t i = begin; i < end; ++i) {
         char *at = job->bvh->leaves + (size_t)job->list->offsets[i] * FCT_REF_UNIT;
         const uint32_t first = job->list->firsts[i];
-        pack_leaf(job->bvh, first, job->list->firsts[i + 1] - first, (fct_leaf *)(void *)at, job->list->bounds + 6 * i);
+        pack_leaf(job->bvh, first, job->list->firsts[i + 1] - first, (fct_leaf *)(void *)at,
+                  job->list->bounds + 6 * i);
     }
 }
 
@@ -294,8 +301,7 @@ fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out) {
     uint32_t *stack, *candidates, *parts;
     choice *choices;
     const fct_array scratch[] = {FCT_ARRAY(stack, (size_t)view->depth + view->root_count + 2),
-                                 FCT_ARRAY(candidates, view->face_count),
-                                 FCT_ARRAY(parts, view->face_count),
+                                 FCT_ARRAY(candidates, view->face_count), FCT_ARRAY(parts, view->face_count),
                                  FCT_ARRAY(choices, view->face_count)};
     fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "the leaves of a ray structure");
     if (result != FCT_OK) return result;
@@ -311,8 +317,9 @@ fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out) {
         fct_parallel_for(env, candidate_count, CHOOSE_CHUNK, choose_leaves, &choose);
     }
     for (uint32_t p = 0; p < view->face_count; ++p) list.count += choices[p].node != FCT_NONE;
-    const fct_array arrays[] = {FCT_ARRAY(list.nodes, list.count), FCT_ARRAY(list.firsts, (size_t)list.count + 1), FCT_ARRAY(list.offsets, list.count),
-                                FCT_ARRAY(list.bounds, 6 * (size_t)list.count)};
+    const fct_array arrays[] = {
+        FCT_ARRAY(list.nodes, list.count), FCT_ARRAY(list.firsts, (size_t)list.count + 1),
+        FCT_ARRAY(list.offsets, list.count), FCT_ARRAY(list.bounds, 6 * (size_t)list.count)};
     result = fct_allocate_all(env, arrays, FCT_LENGTH(arrays), "the leaves of a ray structure");
     if (result != FCT_OK) goto done;
     uint64_t units;

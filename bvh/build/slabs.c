@@ -131,7 +131,8 @@ fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const f
     fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
     const bool is_leaf = node->left == FCT_NONE;
-    if (is_leaf && !bvh->places && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED)) return best;
+    if (is_leaf && !bvh->places && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED))
+        return best;
     const uint32_t clusters[2] = {span->largest, span->enclosing};
     for (int i = 0; i < 3; ++i) {
         if (i == 2 ? !leaves->frame_bounds : !adds_axes(clusters, i)) continue;

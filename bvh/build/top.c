@@ -208,7 +208,8 @@ static void split_parts(void *user, size_t begin, size_t end, size_t chunk, uint
 }
 
 /* Splits nodes until each holds at most `most` leaves. A part of n leaves takes at most 2n - 2 new nodes, so
- * the numbers of all nodes are known before the parts are split. If `most` is above 1, some numbers are unused.
+ * the numbers of all nodes are known before the parts are split. If `most` is above 1, some numbers are
+ * unused.
  */
 static fct_result split_all(const fct_env *env, const float *bounds, fct_top *top, uint32_t most,
                             uint32_t leaves) {

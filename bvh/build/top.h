@@ -2,7 +2,7 @@
 #ifndef FCT_BVH_TOP_H
 #define FCT_BVH_TOP_H
 
-#include "bvh/build/leaves.h"
+#include "bvh/build/leaf_list.h"
 
 typedef struct fct_top_node {
     float bounds[6];      /* lower then upper, scaled */
@@ -17,8 +17,8 @@ typedef struct fct_top {
     uint32_t *order;     /* indices into fct_leaf_list */
 } fct_top;
 
-/* At most FCT_TOP_DEPTH levels. A node of at most `most` leaves is not split; if `most` is above 1, nodes without
- * leaves may lie between the others. fct_top_release frees *out. Errors: MEMORY. */
+/* At most FCT_TOP_DEPTH levels. A node of at most `most` leaves is not split; if `most` is above 1, nodes
+ * without leaves may lie between the others. fct_top_release frees *out. Errors: MEMORY. */
 fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, uint32_t most, fct_top *out);
 void fct_top_release(const fct_env *env, fct_top *top);
 

@@ -161,7 +161,8 @@ static void measure_listed(distance_search *s, leaf_pair *l) {
     if ((double)upper[nearest] + error < s->upper) set_way(s, &l->maps, d, nearest);
     for (uint32_t i = 0; i < used && !s->done; ++i)
         add_candidate(s, fct_max((double)lower[i] - error, 0), (double)upper[i] + error,
-                      fct_leaf_place(s->map->a, l->a, l->list_a[i]), fct_leaf_place(s->map->b, l->b, l->list_b[i]));
+                      fct_leaf_place(s->map->a, l->a, l->list_a[i]),
+                      fct_leaf_place(s->map->b, l->b, l->list_b[i]));
     l->listed -= used;
     for (uint32_t i = 0; i < l->listed; ++i) l->list_a[i] = l->list_a[i + 8], l->list_b[i] = l->list_b[i + 8];
 }
