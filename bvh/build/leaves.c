@@ -6,7 +6,8 @@
  * one thread lists the clusters, adds up their surfaces and numbers the leaves.
  *
  * A line through a scan meets the boxes of one or two leaves. Where a model fills its volume, as stacked
- * blocks do, boxes overlap and a line meets dozens. Then leaves of few faces save more than they cost.
+ * blocks do, boxes overlap and a line meets dozens. Then sets of small clusters, split by surface area cost,
+ * make better leaves. These are not in order of place: bvh->places lists their faces.
  */
 #include "bvh/build/leaves.h"
 
