@@ -1,6 +1,8 @@
 /* bvh/bvh.c: creation of the structure with either backend. */
 #include <string.h>
 
+#include "bvh/build/frame.h"
+#include "bvh/build/leaves.h"
 #include "bvh/build/nodes.h"
 #include "bvh/build/pairs.h"
 #include "bvh/build/refit.h"
@@ -14,7 +16,8 @@ static fct_result build_packed(fct_bvh *bvh, uint32_t parts) {
     fct_result result = fct_progress(bvh->env, "ray structure", 0);
     if (result == FCT_OK) result = fct_leaves_build(bvh, &leaves);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .2);
-    if (result == FCT_OK) result = fct_top_build(bvh->env, &leaves, &top);
+    if (result == FCT_OK) result = fct_frame_choose(bvh, &leaves);
+    if (result == FCT_OK) result = fct_top_build(bvh->env, &leaves, 1, &top);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .5);
     if (result == FCT_OK) result = fct_wide_build(bvh, &leaves, &top, &wide);
     if (result == FCT_OK) result = fct_progress(bvh->env, "ray structure", .9);
@@ -74,11 +77,12 @@ static fct_result copy_structure(const fct_env *env, const fct_bvh *old, const f
     const fct_tree_view *view = &old->view;
     *bvh = *old;
     bvh->env = env;
-    bvh->nodes = bvh->leaves = NULL, bvh->pairs = NULL, bvh->parts = NULL, bvh->moments = NULL,
-    bvh->embree = NULL;
+    bvh->nodes = bvh->leaves = NULL, bvh->places = NULL, bvh->pairs = NULL, bvh->parts = NULL,
+    bvh->moments = NULL, bvh->embree = NULL;
     bvh->moved = fct_allocate(env, view->vertex_count, 3 * sizeof *bvh->moved);
     if (!bvh->moved || !copy_array(env, old->nodes, old->node_bytes, &bvh->nodes) ||
         !copy_array(env, old->leaves, old->leaf_bytes, &bvh->leaves) ||
+        !copy_array(env, old->places, view->face_count * sizeof *old->places, &bvh->places) ||
         !copy_array(env, old->pairs, old->pair_count * sizeof *old->pairs, &bvh->pairs) ||
         !copy_array(env, old->parts, old->part_count * sizeof *old->parts, &bvh->parts))
         return fct_fail_memory(env, "a ray structure");
@@ -124,6 +128,7 @@ void fct_bvh_destroy(fct_bvh *bvh) {
     fct_embree_destroy(bvh->env, bvh->embree);
     fct_release(bvh->env, bvh->nodes);
     fct_release(bvh->env, bvh->leaves);
+    fct_release(bvh->env, bvh->places);
     fct_release(bvh->env, bvh->pairs);
     fct_release(bvh->env, bvh->parts);
     fct_release(bvh->env, bvh->moments);
@@ -135,6 +140,7 @@ size_t fct_bvh_bytes(const fct_bvh *bvh) {
     if (bvh->embree) return sizeof *bvh + fct_embree_bytes(bvh->embree);
     return sizeof *bvh + bvh->node_bytes + bvh->leaf_bytes + bvh->moment_bytes +
            bvh->pair_count * sizeof *bvh->pairs + bvh->part_count * sizeof *bvh->parts +
+           (bvh->places ? sizeof *bvh->places * bvh->view.face_count : 0) +
            (bvh->moved ? 3 * sizeof *bvh->moved * bvh->view.vertex_count : 0);
 }
 

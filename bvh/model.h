@@ -77,7 +77,7 @@ typedef struct fct_pair_node {
  *
  * Vertex 0 fills the unused end of each row. */
 typedef struct fct_leaf {
-    uint32_t first;        /* place of the first triangle */
+    uint32_t first;        /* triangles in the leaves before it, see fct_leaf_place */
     uint16_t mask;         /* bit i: triangle i is not degenerate */
     uint8_t count;         /* triangles */
     uint8_t vertex_octets; /* 1 or 2 */
@@ -124,7 +124,8 @@ struct fct_bvh {
     /* FCT_BACKEND_OBB */
     char *nodes, *leaves;
     size_t node_bytes, leaf_bytes;
-    uint32_t root;                   /* reference */
+    uint32_t *places; /* of the triangles of all leaves, if these are not in order; else NULL */
+    uint32_t root;    /* reference */
     struct fct_moment_node *moments; /* with FCT_BVH_SIGN; NULL if the model is one leaf */
     size_t moment_bytes;
     bool has_sign; /* winding numbers can be asked for */
@@ -142,6 +143,11 @@ static inline const fct_leaf *fct_bvh_leaf(const fct_bvh *bvh, uint32_t ref) {
 }
 static inline const void *fct_bvh_node(const fct_bvh *bvh, uint32_t ref) {
     return bvh->nodes + (size_t)(ref & ~FCT_REF_ORIENTED) * FCT_REF_UNIT;
+}
+/* The place of triangle `number` of a leaf. */
+static inline uint32_t fct_leaf_place(const fct_bvh *bvh, const fct_leaf *leaf, uint32_t number) {
+    uint32_t i = leaf->first + number;
+    return bvh->places ? bvh->places[i] : i;
 }
 /* The references of the eight children of a node; bit i of *present: child i exists. */
 static inline const uint32_t *fct_bvh_children(const fct_bvh *bvh, uint32_t ref, uint32_t *present) {

@@ -23,12 +23,6 @@ typedef struct choice {
     uint8_t split[7];
 } choice;
 
-/* Half of the surface. */
-static float bounds_area(const float b[6]) {
-    float x = b[3] - b[0], y = b[4] - b[1], z = b[5] - b[2];
-    return x * y + y * z + z * x;
-}
-
 /* D(n, places), and its k. */
 static float split_places(const choice *left, const choice *right, uint32_t places, uint8_t *k) {
     float best = INFINITY;
@@ -46,7 +40,7 @@ static void choose_splits(const fct_top *top, choice *choices) {
         *c = (choice){{0}, {0}};
         if (node->left == FCT_NONE) continue;
         const choice *left = &choices[node->left], *right = &choices[node->right];
-        c->cost[0] = bounds_area(node->bounds) + split_places(left, right, 8, &c->split[0]);
+        c->cost[0] = node->area + split_places(left, right, 8, &c->split[0]);
         for (uint32_t i = 2; i < 8; ++i) {
             uint8_t k = 1;
             float cost = split_places(left, right, i, &k);

@@ -2,15 +2,7 @@
 #ifndef FCT_BVH_LEAVES_H
 #define FCT_BVH_LEAVES_H
 
-#include "bvh/model.h"
-
-/* In order of place. */
-typedef struct fct_leaf_list {
-    uint32_t count;
-    uint32_t *nodes;   /* count, ids in the cluster tree */
-    uint32_t *offsets; /* count, units of 64 bytes in bvh->leaves */
-    float *bounds;     /* count x 6, lower then upper, scaled */
-} fct_leaf_list;
+#include "bvh/build/leaf_list.h"
 
 /* Fills bvh->leaves and *out; fct_leaf_list_release frees *out. Errors: MEMORY. */
 fct_result fct_leaves_build(fct_bvh *bvh, fct_leaf_list *out);

@@ -54,7 +54,7 @@ static void move_leaf(const fct_bvh *bvh, fct_leaf *leaf) {
     for (uint32_t i = 0; i < stride; ++i) vertices[i] = FCT_NONE;
     leaf->mask = 0;
     for (uint32_t i = 0; i < leaf->count; ++i) {
-        uint32_t place = leaf->first + i;
+        uint32_t place = fct_leaf_place(bvh, leaf, i);
         if (!fct_bvh_degenerate(bvh, place)) leaf->mask |= (uint16_t)(1u << i);
         for (uint32_t c = 0; c < 3; ++c)
             vertices[corners[24 * (i / 8) + 8 * c + i % 8]] = bvh->view.triangles[3 * (size_t)place + c];

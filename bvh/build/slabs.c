@@ -1,6 +1,8 @@
 /* bvh/build/slabs.c: see slabs.h. O(vertices of the leaves) for each set of axes. */
 #include "bvh/build/slabs.h"
 
+#include <string.h>
+
 #include "cluster/tree/node.h"
 
 /* An oriented box of a leaf that saves a smaller share of the area is not fitted. */
@@ -100,10 +102,14 @@ fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, cons
             const uint32_t number = top->order[node->begin], cluster = leaves->nodes[number];
             const fct_leaf *leaf = fct_bvh_leaf(bvh, leaves->offsets[number]);
             fct_cluster room;
-            spans[n] = (fct_span){.first = leaf->first,
-                                  .last = leaf->first + leaf->count,
+            spans[n] = (fct_span){.first = FCT_NONE,
                                   .largest = cluster,
                                   .area = fct_node_cluster(bvh->tree, cluster, &room)->area};
+            for (uint32_t i = 0; i < leaf->count; ++i) {
+                const uint32_t place = fct_leaf_place(bvh, leaf, i);
+                if (place < spans[n].first) spans[n].first = place;
+                if (place + 1 > spans[n].last) spans[n].last = place + 1;
+            }
         } else {
             const fct_span *l = &spans[node->left], *r = &spans[node->right];
             spans[n] = r->area > l->area ? *r : *l;
@@ -115,16 +121,25 @@ fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, cons
     return FCT_OK;
 }
 
+/* Whether the axes of cluster i are there, and are not those of another one. */
+static bool adds_axes(const uint32_t clusters[2], int i) {
+    return clusters[i] != FCT_NONE && (i == 0 || clusters[0] != clusters[1]);
+}
+
 fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                         const fct_top_node *node, const fct_span *span) {
     fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
     const bool is_leaf = node->left == FCT_NONE;
-    if (is_leaf && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED)) return best;
-    const uint32_t candidates[2] = {span->largest, span->enclosing};
-    for (int i = 0; i < 2; ++i) {
-        if (candidates[i] == FCT_NONE || (i == 1 && candidates[1] == candidates[0])) continue;
-        use_cluster_axes(bvh, candidates[i], &s);
+    if (is_leaf && !bvh->places && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED))
+        return best;
+    const uint32_t clusters[2] = {span->largest, span->enclosing};
+    for (int i = 0; i < 3; ++i) {
+        if (i == 2 ? !leaves->frame_bounds : !adds_axes(clusters, i)) continue;
+        if (i == 2)
+            memcpy(s.axes, leaves->frame, sizeof s.axes);
+        else
+            use_cluster_axes(bvh, clusters[i], &s);
         fct_slabs_clear(&s);
         fct_slabs_hold(bvh, leaves->offsets, top->order + node->begin, node->end - node->begin, &s);
         const double area = fct_slabs_area(&s);

@@ -30,7 +30,7 @@ FCT_DECLARE_KERNEL(void, fct_slabs_hold,
 /* Of the leaves of a node of the top. */
 typedef struct fct_span {
     uint32_t first, last; /* places [first, last) around all faces */
-    uint32_t largest;     /* the leaf's cluster of largest area */
+    uint32_t largest;     /* the cluster of largest area among fct_leaf_list.nodes */
     uint32_t
         enclosing; /* the smallest cluster with all faces; FCT_NONE if none, or if the tree has many roots */
     float area;    /* of `largest` */
@@ -40,8 +40,9 @@ typedef struct fct_span {
 fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                            fct_span **out);
 
-/* The slabs of least area of the leaves of a node of the top. Of three sets of axes: those of the smallest
- * face cluster that holds all its faces, those of its leaf of largest area, and the coordinate axes. */
+/* The slabs of least area of the leaves of a node of the top. Of these sets of axes: those of the smallest
+ * face cluster that holds all its faces, those of its leaf of largest area, the coordinate axes, and those
+ * along which the top was split. */
 fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                         const fct_top_node *node, const fct_span *span);
 

@@ -8,12 +8,14 @@
  */
 #include "bvh/build/top.h"
 
+#include <string.h>
+
 #include "base/parallel.h"
 
 enum { BIN_COUNT = 16, SPLIT_DEPTH = 48, PART_LEAVES = 2048 };
 
 typedef struct bin {
-    float bounds[6];
+    float bounds[6]; /* of a bin that is not empty */
     uint32_t count;
 } bin;
 
@@ -53,20 +55,23 @@ static uint32_t find_bin(float value, float lower, float factor) {
 /* Replaces *best by the plane of least cost among the 15 between the bins of one axis, if it costs less. The
  * cost is area times number of leaves, summed over both sides. */
 static void find_best_plane(const bin bins[BIN_COUNT], int axis, split *best) {
-    float right[BIN_COUNT], b[6];
+    float right[BIN_COUNT], sum = 0, b[6];
     uint32_t count = 0;
     clear_bounds(b);
     for (uint32_t i = BIN_COUNT; i-- > 1;) {
-        join_bounds(b, bins[i].bounds);
-        count += bins[i].count;
-        right[i] = count ? half_area(b) * (float)count : 0;
+        if (bins[i].count) {
+            join_bounds(b, bins[i].bounds);
+            count += bins[i].count;
+            sum = half_area(b) * (float)count;
+        }
+        right[i] = sum;
     }
     clear_bounds(b);
     count = 0;
     for (uint32_t i = 0; i + 1 < BIN_COUNT; ++i) {
+        if (bins[i].count == 0) continue;
         join_bounds(b, bins[i].bounds);
         count += bins[i].count;
-        if (count == 0) continue;
         float cost = half_area(b) * (float)count + right[i + 1];
         if (cost < best->cost) *best = (split){axis, i, cost};
     }
@@ -95,15 +100,17 @@ static void fill_bins(const float *bounds, const uint32_t *order, uint32_t count
         float width = high[k] - b->lower[k];
         b->factor[k] = width > 0 ? (float)BIN_COUNT * (1 - 0x1p-20f) / width : 0;
         if (!(b->factor[k] < INFINITY)) b->factor[k] = 0;
-        for (int i = 0; i < BIN_COUNT; ++i) clear_bounds(b->bins[k][i].bounds), b->bins[k][i].count = 0;
+        for (int i = 0; i < BIN_COUNT; ++i) b->bins[k][i].count = 0;
     }
     for (uint32_t i = 0; i < count; ++i) {
         const float *box = bounds + 6 * (size_t)order[i];
         for (int k = 0; k < 3; ++k) {
             if (b->factor[k] == 0) continue;
             bin *into = &b->bins[k][find_bin(double_center(box, k), b->lower[k], b->factor[k])];
-            join_bounds(into->bounds, box);
-            ++into->count;
+            if (into->count++)
+                join_bounds(into->bounds, box);
+            else
+                memcpy(into->bounds, box, sizeof into->bounds);
         }
     }
 }
@@ -137,14 +144,15 @@ typedef struct pending {
     uint32_t node, depth;
 } pending;
 
-/* Sets the bounds of a node. Gives it two children, `next` and next + 1, unless it holds one leaf: returns
- * whether it did. */
-static bool split_node(const float *bounds, fct_top *top, pending at, uint32_t next) {
+/* Sets the bounds of a node. Gives it two children, `next` and next + 1, unless it holds at most
+ * `most` leaves: returns whether it did. */
+static bool split_node(const float *bounds, fct_top *top, pending at, uint32_t most, uint32_t next) {
     fct_top_node *node = &top->nodes[at.node];
     clear_bounds(node->bounds);
     for (uint32_t i = node->begin; i < node->end; ++i)
         join_bounds(node->bounds, bounds + 6 * (size_t)top->order[i]);
-    if (node->end - node->begin == 1) return false;
+    node->area = half_area(node->bounds);
+    if (node->end - node->begin <= most) return false;
     uint32_t middle = split_leaves(bounds, top->order, node, at.depth);
     node->left = next, node->right = next + 1;
     fct_top_node child = {.left = FCT_NONE, .right = FCT_NONE, .begin = node->begin, .end = middle};
@@ -156,7 +164,7 @@ static bool split_node(const float *bounds, fct_top *top, pending at, uint32_t n
 
 /* Splits the nodes of more than PART_LEAVES leaves, and lists the others below them. Returns the number of
  * the latter. */
-static uint32_t split_upper(const float *bounds, fct_top *top, pending *parts) {
+static uint32_t split_upper(const float *bounds, fct_top *top, uint32_t most, pending *parts) {
     pending stack[FCT_TOP_DEPTH + 2];
     uint32_t height = 1, count = 0;
     stack[0] = (pending){0, 0};
@@ -166,7 +174,7 @@ static uint32_t split_upper(const float *bounds, fct_top *top, pending *parts) {
             parts[count++] = at;
             continue;
         }
-        split_node(bounds, top, at, top->node_count);
+        split_node(bounds, top, at, most, top->node_count);
         stack[height++] = (pending){top->node_count + 1, at.depth + 1};
         stack[height++] = (pending){top->node_count, at.depth + 1};
         top->node_count += 2;
@@ -176,6 +184,7 @@ static uint32_t split_upper(const float *bounds, fct_top *top, pending *parts) {
 
 typedef struct part_job {
     const float *bounds;
+    uint32_t most;
     fct_top *top;
     const pending *parts;
     const uint32_t *first; /* per part: the number of its first new node */
@@ -190,7 +199,7 @@ static void split_parts(void *user, size_t begin, size_t end, size_t chunk, uint
         stack[0] = job->parts[i];
         while (height) {
             pending at = stack[--height];
-            if (!split_node(job->bounds, job->top, at, next)) continue;
+            if (!split_node(job->bounds, job->top, at, job->most, next)) continue;
             stack[height++] = (pending){next + 1, at.depth + 1};
             stack[height++] = (pending){next, at.depth + 1};
             next += 2;
@@ -198,27 +207,44 @@ static void split_parts(void *user, size_t begin, size_t end, size_t chunk, uint
     }
 }
 
-/* Splits nodes until each holds one leaf. A part of n leaves takes 2n - 2 new nodes, so the numbers of all
- * nodes are known before the parts are split. */
-static fct_result split_all(const fct_env *env, const float *bounds, fct_top *top, uint32_t leaves) {
+/* Splits nodes until each holds at most `most` leaves. A part of n leaves takes at most 2n - 2 new nodes, so
+ * the numbers of all nodes are known before the parts are split. If `most` is above 1, some numbers are
+ * unused.
+ */
+static fct_result split_all(const fct_env *env, const float *bounds, fct_top *top, uint32_t most,
+                            uint32_t leaves) {
     pending *parts;
     uint32_t *first;
     const fct_array scratch[] = {FCT_ARRAY(parts, leaves), FCT_ARRAY(first, leaves)};
     fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "the top of a ray structure");
     if (result != FCT_OK) return result;
-    const uint32_t count = split_upper(bounds, top, parts);
+    const uint32_t count = split_upper(bounds, top, most, parts);
     for (uint32_t i = 0; i < count; ++i) {
         const fct_top_node *node = &top->nodes[parts[i].node];
         first[i] = top->node_count;
         top->node_count += 2 * (node->end - node->begin) - 2;
     }
-    part_job job = {bounds, top, parts, first};
+    part_job job = {bounds, most, top, parts, first};
     fct_parallel_for(env, count, 1, split_parts, &job);
     fct_release_all(env, scratch, FCT_LENGTH(scratch));
     return FCT_OK;
 }
 
-fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_top *out) {
+/* Sets the bounds along the coordinate axes, where the splits had other axes. */
+static void bound_nodes(const float *bounds, fct_top *top) {
+    for (uint32_t n = top->node_count; n-- > 0;) {
+        fct_top_node *node = &top->nodes[n];
+        clear_bounds(node->bounds);
+        if (node->left == FCT_NONE) {
+            join_bounds(node->bounds, bounds + 6 * (size_t)top->order[node->begin]);
+        } else {
+            join_bounds(node->bounds, top->nodes[node->left].bounds);
+            join_bounds(node->bounds, top->nodes[node->right].bounds);
+        }
+    }
+}
+
+fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, uint32_t most, fct_top *out) {
     *out = (fct_top){0};
     fct_top top = {.node_count = 1};
     const fct_array arrays[] = {FCT_ARRAY(top.nodes, 2 * (size_t)leaves->count),
@@ -227,7 +253,11 @@ fct_result fct_top_build(const fct_env *env, const fct_leaf_list *leaves, fct_to
     if (result != FCT_OK) return result;
     for (uint32_t i = 0; i < leaves->count; ++i) top.order[i] = i;
     top.nodes[0] = (fct_top_node){.left = FCT_NONE, .right = FCT_NONE, .begin = 0, .end = leaves->count};
-    result = split_all(env, leaves->bounds, &top, leaves->count);
+    if (most > 1)
+        for (uint32_t n = 1; n < 2 * leaves->count; ++n) top.nodes[n] = (fct_top_node){.left = FCT_NONE};
+    const float *bounds = leaves->frame_bounds ? leaves->frame_bounds : leaves->bounds;
+    result = split_all(env, bounds, &top, most, leaves->count);
+    if (result == FCT_OK && leaves->frame_bounds) bound_nodes(leaves->bounds, &top);
     if (result != FCT_OK)
         fct_top_release(env, &top);
     else

@@ -149,7 +149,7 @@ static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     for (int c = 0; c < 3; ++c) p[c] = map_position(s, p[c]);
     v3 q = fct_triangle_closest(s->point, p[0], p[1], p[2], &u, &v);
     double distance = v3_norm(v3_sub(q, s->point));
-    uint32_t place = leaf->first + number;
+    uint32_t place = fct_leaf_place(s->bvh, leaf, number);
     const uint32_t *ids = s->bvh->view.face_ids;
     ++s->visits.triangles;
     if (!(distance <= s->best.distance)) return;

@@ -37,7 +37,8 @@ typedef struct search {
     double best2; /* squared distance of the best face, or of the maximum distance */
     double u, v;
     uint32_t place;
-    const fct_leaf *leaf; /* that holds the place */
+    const fct_leaf *leaf; /* triangle `number` of this leaf is at the place */
+    uint32_t number;
     fct_visits visits;
     /* If `normal` is set, best2 stays the maximum distance, and faces compete by their cosine to it. */
     const v3 *normal;
@@ -54,7 +55,7 @@ static void set_bound(search *s, double bound) {
 
 /* Takes the face if it is in reach and its normal is closer to the wanted one than that of the best face. */
 static void consider_facing(search *s, const v3 p[3], double d2, double u, double v, const fct_leaf *leaf,
-                            uint32_t place) {
+                            uint32_t number, uint32_t place) {
     if (!(d2 <= s->best2)) return;
     v3 n = v3_unit(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])));
     double agreement = v3_norm2(n) > 0 ? v3_dot(n, *s->normal) : -2;
@@ -65,7 +66,7 @@ static void consider_facing(search *s, const v3 p[3], double d2, double u, doubl
         if (tie && (d2 > s->facing2 || (d2 == s->facing2 && ids[place] > ids[s->place]))) return;
     }
     s->agreement = agreement, s->facing2 = d2;
-    s->u = u, s->v = v, s->place = place, s->leaf = leaf;
+    s->u = u, s->v = v, s->place = place, s->leaf = leaf, s->number = number;
 }
 
 static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
@@ -74,15 +75,15 @@ static void measure_triangle(search *s, const fct_leaf *leaf, uint32_t number) {
     fct_leaf_triangle(leaf, number, p);
     v3 q = fct_triangle_closest(s->point, p[0], p[1], p[2], &u, &v);
     double d2 = v3_norm2(v3_sub(q, s->point));
-    uint32_t place = leaf->first + number;
+    uint32_t place = fct_leaf_place(s->bvh, leaf, number);
     ++s->visits.triangles;
     if (s->normal) {
-        consider_facing(s, p, d2, u, v, leaf, place);
+        consider_facing(s, p, d2, u, v, leaf, number, place);
         return;
     }
     const uint32_t *ids = s->bvh->view.face_ids;
     if (!(d2 < s->best2 || (d2 == s->best2 && (s->place == FCT_NONE || ids[place] < ids[s->place])))) return;
-    s->u = u, s->v = v, s->place = place, s->leaf = leaf, s->best2 = d2;
+    s->u = u, s->v = v, s->place = place, s->leaf = leaf, s->number = number, s->best2 = d2;
     double distance = sqrt(d2);
     if (distance < s->bound) set_bound(s, distance);
 }
@@ -148,7 +149,7 @@ static void search_leaf(void *user, uint32_t ref) {
 static void report_face(const search *s, double distance2, fct_near *out) {
     v3 p[3];
     double scale = s->bvh->scale;
-    fct_leaf_triangle(s->leaf, s->place - s->leaf->first, p);
+    fct_leaf_triangle(s->leaf, s->number, p);
     *out = (fct_near){.distance2 = distance2 / scale / scale, .u = s->u, .v = s->v, .place = s->place};
     v3 scaled = v3_add(v3_scale(p[0], 1 - s->u - s->v), v3_add(v3_scale(p[1], s->u), v3_scale(p[2], s->v)));
     out->point = fct_bvh_from_scaled(s->bvh, scaled);

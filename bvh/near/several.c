@@ -68,7 +68,7 @@ static double measure_face(const several *s, const fct_leaf *leaf, uint32_t numb
 static void offer_face(several *s, const fct_leaf *leaf, uint32_t leaf_ref, uint32_t number) {
     v3 nearest;
     double u, v, d2 = measure_face(s, leaf, number, &nearest, &u, &v);
-    uint32_t face = s->bvh->view.face_ids[leaf->first + number];
+    uint32_t face = s->bvh->view.face_ids[fct_leaf_place(s->bvh, leaf, number)];
     ++s->visits.triangles;
     if (!(d2 <= s->bound2)) return;
     if (s->count < s->k) {
@@ -108,7 +108,7 @@ static void fill_item(const several *s, fct_closest *item) {
     v3_store(item->point, fct_bvh_from_scaled(s->bvh, scaled));
     item->distance = (float)sqrt(d2 / scale / scale);
     item->u = (float)u, item->v = (float)v;
-    item->place = leaf->first + number;
+    item->place = fct_leaf_place(s->bvh, leaf, number);
 }
 
 uint32_t fct_several_search(const fct_bvh *bvh, v3 point, uint32_t k, double max_distance, fct_closest *out,

@@ -161,7 +161,8 @@ static void measure_listed(distance_search *s, leaf_pair *l) {
     if ((double)upper[nearest] + error < s->upper) set_way(s, &l->maps, d, nearest);
     for (uint32_t i = 0; i < used && !s->done; ++i)
         add_candidate(s, fct_max((double)lower[i] - error, 0), (double)upper[i] + error,
-                      l->a->first + l->list_a[i], l->b->first + l->list_b[i]);
+                      fct_leaf_place(s->map->a, l->a, l->list_a[i]),
+                      fct_leaf_place(s->map->b, l->b, l->list_b[i]));
     l->listed -= used;
     for (uint32_t i = 0; i < l->listed; ++i) l->list_a[i] = l->list_a[i + 8], l->list_b[i] = l->list_b[i + 8];
 }
@@ -186,17 +187,22 @@ static void extend_along_way(const distance_search *s, const leaf_pair *l, float
     }
 }
 
+/* Measures face i of leaf a and face j of leaf b. */
+static void measure_faces(distance_search *s, const fct_leaf *a, uint32_t i, const fct_leaf *b, uint32_t j) {
+    measure_pair(s, fct_leaf_place(s->map->a, a, i), fct_leaf_place(s->map->b, b, j));
+}
+
 /* Leaves that are far apart, or of which one is large. A pair of faces with the least bound comes first. */
 static void search_far_leaves(distance_search *s, const fct_leaf *a, const fct_leaf *b) {
     fct_far_leaves far;
     double scale = s->map->a->scale;
     v3 way = v3_unit(v3_sub(s->best.point_b, s->best.point_a));
     if (!fct_bound_far_leaves(s->map, a, b, way, s->reach / scale, &far)) return;
-    measure_pair(s, a->first + far.first_a, b->first + far.first_b);
+    measure_faces(s, a, far.first_a, b, far.first_b);
     for (uint32_t i = 0; i < a->count; ++i)
         for (uint32_t j = 0; j < b->count && !s->done; ++j)
             if ((i != far.first_a || j != far.first_b) && fct_far_gap(&far, i, j) <= s->reach / scale)
-                measure_pair(s, a->first + i, b->first + j);
+                measure_faces(s, a, i, b, j);
 }
 
 /* Faces of leaf b whose boxes are near enough to the box of leaf a. */

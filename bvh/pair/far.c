@@ -50,8 +50,8 @@ static uint32_t find_tops(const v3 p[][3], uint32_t count, v3 along, v3 from, do
 bool fct_bound_far_leaves(const fct_pair_map *map, const fct_leaf *a, const fct_leaf *b, v3 way, double reach,
                           fct_far_leaves *out) {
     v3 p[FCT_LEAF_FACES][3], q[FCT_LEAF_FACES][3];
-    for (uint32_t i = 0; i < a->count; ++i) fct_pair_triangle_a(map, a->first + i, p[i]);
-    for (uint32_t i = 0; i < b->count; ++i) fct_pair_triangle_b(map, b->first + i, q[i]);
+    for (uint32_t i = 0; i < a->count; ++i) fct_pair_triangle_a(map, fct_leaf_place(map->a, a, i), p[i]);
+    for (uint32_t i = 0; i < b->count; ++i) fct_pair_triangle_b(map, fct_leaf_place(map->b, b, i), q[i]);
     double reach_a, reach_b, largest = -INFINITY;
     v3 from = find_middle(p, a->count, &reach_a), to = find_middle(q, b->count, &reach_b);
     const v3 directions[2] = {v3_unit(v3_sub(to, from)), way};

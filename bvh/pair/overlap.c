@@ -62,13 +62,15 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
         if (s->self && box_a == box_b) open_a &= (1u << i) - 1;
         if (!open_a) continue;
         v3 p[3], q[3];
-        fct_pair_triangle_b(map, b->first + i, q);
+        const uint32_t place_b = fct_leaf_place(map->b, b, i);
+        fct_pair_triangle_b(map, place_b, q);
         for (; open_a; open_a &= open_a - 1) {
             uint32_t j = (uint32_t)__builtin_ctz(open_a);
-            fct_pair_triangle_a(map, a->first + j, p);
+            const uint32_t place_a = fct_leaf_place(map->a, a, j);
+            fct_pair_triangle_a(map, place_a, p);
             ++s->visits.triangles;
             if ((s->self && share_corner(p, q)) || !fct_triangles_meet(p, q)) continue;
-            record_pair(s, a->first + j, b->first + i);
+            record_pair(s, place_a, place_b);
             if (s->count == s->limit) return true;
         }
     }

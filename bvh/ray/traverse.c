@@ -206,7 +206,7 @@ static inline bool test_triangle(traversal *t, const fct_leaf *leaf, uint32_t nu
     }
     float at = (float)((s.w[0] * s.z[0] + s.w[1] * s.z[1] + s.w[2] * s.z[2]) / det);
     if (!(at >= t->ray->t_min && at <= t->hit.t)) return false;
-    uint32_t place = leaf->first + number;
+    uint32_t place = fct_leaf_place(t->bvh, leaf, number);
     const uint32_t *ids = t->bvh->view.face_ids;
     if (t->ray->except != FCT_NONE && ids[place] == t->ray->except) return false;
     if (t->all) {

@@ -104,9 +104,12 @@ static inline void classify_by_ball(const region *r, const eight_boxes *boxes, u
     for (int i = 0; i < 8; ++i) masks[i] = far2[i] < r->inside2 ? 0 : 1;
 }
 
+static void add_face(region *r, const fct_leaf *leaf, uint32_t number) {
+    fct_face_list_add(r->list, r->bvh->view.face_ids[fct_leaf_place(r->bvh, leaf, number)]);
+}
+
 static void add_leaf(region *r, const fct_leaf *leaf) {
-    for (uint32_t i = 0; i < leaf->count; ++i)
-        fct_face_list_add(r->list, r->bvh->view.face_ids[leaf->first + i]);
+    for (uint32_t i = 0; i < leaf->count; ++i) add_face(r, leaf, i);
 }
 
 static void add_leaf_in_planes(region *r, const fct_leaf *leaf, uint32_t mask) {
@@ -114,8 +117,7 @@ static void add_leaf_in_planes(region *r, const fct_leaf *leaf, uint32_t mask) {
         v3 p[3];
         fct_leaf_triangle(leaf, i, p);
         ++r->visits.triangles;
-        if (fct_clip_touches(p, r->half_spaces, mask))
-            fct_face_list_add(r->list, r->bvh->view.face_ids[leaf->first + i]);
+        if (fct_clip_touches(p, r->half_spaces, mask)) add_face(r, leaf, i);
     }
 }
 
@@ -137,8 +139,7 @@ static void add_leaf_in_ball(region *r, const fct_leaf *leaf) {
         uint32_t inside = f8_lt(near.upper2, f8_set(r->inside2));
         for (lanes &= inside | fct_triangles_within(&near, r->reach2); lanes; lanes &= lanes - 1) {
             uint32_t i = (uint32_t)__builtin_ctz(lanes);
-            if (inside >> i & 1 || is_in_ball(r, leaf, first + i))
-                fct_face_list_add(r->list, r->bvh->view.face_ids[leaf->first + first + i]);
+            if (inside >> i & 1 || is_in_ball(r, leaf, first + i)) add_face(r, leaf, first + i);
         }
     }
 }
