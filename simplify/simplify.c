@@ -15,7 +15,7 @@ fct_simplify_def fct_simplify_def_default(void) {
         .size = sizeof(fct_simplify_def),
         .max_error = INFINITY,
         .placement = FCT_PLACE_OPTIMAL,
-        .color_weight = .1,
+        .color_weight = FCT_WEIGHT_AUTO,
         .texcoord_weight = .1,
         .normal_weight = .01,
         .boundary_weight = 3,
@@ -45,10 +45,13 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
                    {"normal_weight", def->normal_weight},
                    {"boundary_weight", def->boundary_weight},
                    {"regularization", def->regularization}};
-    for (size_t i = 0; i < sizeof weights / sizeof *weights; ++i)
+    for (size_t i = def->color_weight == FCT_WEIGHT_AUTO; i < sizeof weights / sizeof *weights; ++i)
         if (!is_weight(weights[i].value))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected a finite number of at least 0",
                             weights[i].name, weights[i].value);
+    if ((unsigned)def->weighting > FCT_WEIGHT_UNIFORM)
+        return fct_fail(env, FCT_ERROR_DATA, "weighting is %d, expected a fct_weighting",
+                        (int)def->weighting);
     if (!(def->feature_threshold >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "feature_threshold is %g, expected at least 0",
                         def->feature_threshold);

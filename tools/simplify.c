@@ -23,6 +23,7 @@ enum {
     KEY_MAX_ERROR,
     KEY_ATTRIBUTES,
     KEY_PLACEMENT,
+    KEY_WEIGHTS,
     KEY_BOUNDARY,
     KEY_FEATURE,
     KEY_REGULARIZE,
@@ -39,15 +40,19 @@ static const struct argp_option simplify_options_table[] = {
      "the area; it includes attributes and boundary planes (default: no limit)",
      0},
     {"attributes", KEY_ATTRIBUTES, "LIST", 0,
-     "The attributes that count in the error, with optional weights, such as color=.1,uv=.1,normal=.01; "
-     "none: only the "
-     "shape counts. Default: all attributes of the mesh, with the weights of this example",
+     "The attributes that count in the error, with optional weights, such as color=.02,uv=.1,normal=.01; "
+     "none: "
+     "only the shape counts. Default: all attributes of the mesh; uv and normal have the weights of this "
+     "example, "
+     "color has 2 / sqrt(faces of the result), at most .1",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
      "midpoint) or subset "
      "(either end)",
      0},
+    {"weights", KEY_WEIGHTS, "HOW", 0,
+     "How much a face weighs at its corners: area (default), angle or uniform (the same for all faces)", 0},
     {"boundary", KEY_BOUNDARY, "W", 0,
      "How many times the squared distance of boundaries and borders from their place counts, relative to "
      "that of "
@@ -88,6 +93,7 @@ static error_t parse_attributes(simplify_options *o, char *list, struct argp_sta
 
 static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
+    static const char *const weightings[] = {"area", "angle", "uniform", NULL}; /* in the order of the enum */
     static const fct_placement values[] = {FCT_PLACE_OPTIMAL, FCT_PLACE_SEGMENT, FCT_PLACE_ENDS,
                                            FCT_PLACE_SUBSET};
     simplify_options *o = state->input;
@@ -110,6 +116,10 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     case KEY_PLACEMENT:
         error = tool_parse_choice(state, "--placement", text, placements, &index);
         o->def.placement = values[index];
+        return error;
+    case KEY_WEIGHTS:
+        error = tool_parse_choice(state, "--weights", text, weightings, &index);
+        o->def.weighting = (fct_weighting)index;
         return error;
     case KEY_BOUNDARY:
         return tool_parse_real(state, "--boundary", text, 0, 1e12, &o->def.boundary_weight);
