@@ -27,6 +27,7 @@ enum {
     KEY_BOUNDARY,
     KEY_FEATURE,
     KEY_REGULARIZE,
+    KEY_LOCK_BORDER,
     KEY_TOPOLOGY,
     KEY_REFIT
 };
@@ -64,6 +65,8 @@ static const struct argp_option simplify_options_table[] = {
      0},
     {"regularize", KEY_REGULARIZE, "G", 0,
      "Weight of the distance to the edge's midpoint, 0 to 1 (default 1e-9)", 0},
+    {"lock-border", KEY_LOCK_BORDER, NULL, 0,
+     "Keep the vertices of open boundaries, so that tiles still fit exactly", 0},
     {"keep-topology", KEY_TOPOLOGY, NULL, 0, "Refuse contractions that change the topology", 0},
     {"refit", KEY_REFIT, "N", 0, "Passes that fit the vertices to the input afterwards, 0 to 100 (default 2)",
      0},
@@ -127,6 +130,9 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         return tool_parse_real(state, "--feature-threshold", text, 0, INFINITY, &o->def.feature_threshold);
     case KEY_REGULARIZE:
         return tool_parse_real(state, "--regularize", text, 0, 1, &o->def.regularization);
+    case KEY_LOCK_BORDER:
+        o->def.lock_border = true;
+        return 0;
     case KEY_TOPOLOGY:
         o->def.keep_topology = true;
         return 0;

@@ -71,7 +71,11 @@ typedef struct fct_simplify_def {
     double regularization;
     uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions; default 2.
                               None are made with SUBSET, whose vertices are those of the input */
-    bool keep_topology;    /* refuse contractions that fail the link condition; default false */
+    /* vertex_count bytes, or NULL. A vertex whose byte is not 0 keeps its position and attributes exactly and
+     * is not contracted away. Other vertices at its place that are joined with it are locked too. */
+    const uint8_t *locks;
+    bool lock_border;   /* lock the vertices of open boundaries; default false */
+    bool keep_topology; /* refuse contractions that fail the link condition; default false */
     /* Refuse contractions that make a bad face or edge: a face that folds over, loses its area or gets the
      * corners of another, or an edge of more than two faces; default true. */
     bool check_foldover;
