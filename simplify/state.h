@@ -35,6 +35,7 @@ typedef struct fct_channel {
     enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD } source;
     uint32_t component;
     double factor;
+    double unit;         /* the difference of value * factor that a whole range makes */
     double lower, upper; /* range of value * factor in the input; results are clamped to it */
 } fct_channel;
 

@@ -39,6 +39,7 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
             channel->lower = fct_min(channel->lower, value), channel->upper = fct_max(channel->upper, value);
         }
         if (count == 0) channel->lower = channel->upper = 0;
+        channel->unit = source == CHANNEL_COLOR ? 1 : channel->upper - channel->lower;
     }
 }
 
@@ -113,7 +114,8 @@ static void weigh_colors(fct_simplifier *s) {
     for (uint32_t i = 0; i < s->steering; ++i) {
         fct_channel *channel = &s->channels[i];
         if (channel->source == CHANNEL_COLOR)
-            channel->factor *= weight, channel->lower *= weight, channel->upper *= weight;
+            channel->factor *= weight, channel->unit *= weight, channel->lower *= weight,
+                channel->upper *= weight;
     }
 }
 

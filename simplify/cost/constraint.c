@@ -13,7 +13,7 @@
 #include "simplify/cost/groups.h"
 #include "simplify/cost/lines.h"
 
-/* Squared difference of two wedges' attributes, at most 1. Each channel is divided by its range. */
+/* Squared difference of two wedges' attributes, at most 1. Each channel is divided by its unit. */
 static double squared_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
     if (w == u) return 0;
     double sum = 0;
@@ -21,8 +21,7 @@ static double squared_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
         const fct_channel *channel = &s->channels[i];
         double d =
             s->attributes[(size_t)s->channel_count * w + i] - s->attributes[(size_t)s->channel_count * u + i];
-        double range = channel->upper - channel->lower;
-        if (range > 0) sum += d * d / (range * range);
+        if (channel->unit > 0) sum += d * d / (channel->unit * channel->unit);
     }
     return sum < 1 ? sum : 1;
 }

@@ -38,6 +38,7 @@ static void colors_scale_by_the_middle_of_their_range(void **state) {
         for (int i = 0; i < 3; ++i) {
             const fct_channel *channel = &s->channels[i];
             assert_ratio(channel->factor, .3 / cases[k].range, .006);
+            assert_ratio(channel->unit, .3, 1e-12);
             assert_ratio(channel->lower, channel->factor * reds[0], 1e-12);
             assert_ratio(channel->upper, channel->factor * reds[COUNT - 1], 1e-12);
         }
@@ -80,6 +81,7 @@ static void the_automatic_weight_falls_with_the_faces(void **state) {
         assert_int_equal(s->steering, 3);
         for (int i = 0; i < 3; ++i) {
             assert_ratio(s->channels[i].factor, cases[k].weight / .96, .006);
+            assert_ratio(s->channels[i].unit, cases[k].weight, 1e-12);
             assert_ratio(s->channels[i].upper, s->channels[i].factor * reds[COUNT - 1], 1e-12);
             assert_ratio(s->channels[i].lower, s->channels[i].factor * reds[0], 1e-12);
         }
@@ -103,6 +105,8 @@ static void check_limits(const fct_simplifier *s) {
         raw_range(s->mesh, &s->channels[i], &low, &high);
         assert_close(s->channels[i].lower, s->channels[i].factor * low, 1e-15);
         assert_close(s->channels[i].upper, s->channels[i].factor * high, 1e-15);
+        if (s->channels[i].source != CHANNEL_COLOR)
+            assert_close(s->channels[i].unit, s->channels[i].factor * (high - low), 1e-15);
     }
 }
 
