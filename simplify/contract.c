@@ -14,6 +14,7 @@
 
 #include "base/parallel.h"
 #include "simplify/collapse.h"
+#include "simplify/cost/constraint.h"
 #include "simplify/cost/loss.h"
 #include "simplify/sweep.h"
 #include "simplify/topology/link.h"
@@ -56,6 +57,7 @@ static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t cou
  * belongs to a body of four faces, and all of them vanish. */
 static bool check_contraction(fct_simplifier *s, const fct_move *move, bool *body) {
     *body = s->def->check_foldover && !s->def->keep_topology && fct_simplify_is_tetrahedron(s, move);
+    if (!fct_constraint_keeps_locked(s, move->a, move->b, move->count_b, *body)) return false;
     if (*body) return true;
     if (s->def->keep_topology && !fct_simplify_link_holds(s, move->a, move->b, move->count_a, move->count_b))
         return false;

@@ -1,6 +1,8 @@
 /* simplify/output.c: see output.h. Cost: linear in the corners of the input. */
 #include "simplify/output.h"
 
+#include "simplify/cost/constraint.h"
+
 /* Corners with equal keys share an output vertex: their point, or the class of their wedge. */
 static uint32_t find_vertex_key(fct_simplifier *s, uint32_t c) {
     if (!s->wedge_classes) return s->triangles[c];
@@ -33,12 +35,9 @@ static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, 
     }
 }
 
-static void normalize_normals(fct_mesh *out) {
-    for (uint32_t v = 0; v < out->vertex_count; ++v) {
-        float *n = out->normals + 3 * (size_t)v;
-        v3 unit = v3_unit(v3_load(n));
-        if (v3_norm2(unit) > 0) v3_store(n, unit);
-    }
+static void normalize_normal(float *n) {
+    v3 unit = v3_unit(v3_load(n));
+    if (v3_norm2(unit) > 0) v3_store(n, unit);
 }
 
 static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
@@ -102,10 +101,11 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
             out->triangles[3 * (size_t)to + k] = v;
             write_position(s, s->triangles[c], out->positions + 3 * (size_t)v);
             if (s->channel_count) write_attributes(s, out, 3 * to + k, c, v);
+            if (out->normals && !point_is_locked(s, s->triangles[c]))
+                normalize_normal(out->normals + 3 * (size_t)v);
         }
         write_face(mesh, out, f, to++);
     }
-    if (result == FCT_OK && out->normals) normalize_normals(out);
     fct_release(s->env, numbers);
     return result;
 }

@@ -17,7 +17,7 @@ fct_simplify_def fct_simplify_def_default(void) {
         .size = sizeof(fct_simplify_def),
         .max_error = INFINITY,
         .placement = FCT_PLACE_OPTIMAL,
-        .color_weight = .1,
+        .color_weight = FCT_WEIGHT_AUTO,
         .texcoord_weight = .1,
         .normal_weight = .01,
         .boundary_weight = 3,
@@ -47,10 +47,13 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
                    {"normal_weight", def->normal_weight},
                    {"boundary_weight", def->boundary_weight},
                    {"regularization", def->regularization}};
-    for (size_t i = 0; i < sizeof weights / sizeof *weights; ++i)
+    for (size_t i = def->color_weight == FCT_WEIGHT_AUTO; i < sizeof weights / sizeof *weights; ++i)
         if (!is_weight(weights[i].value))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected a finite number of at least 0",
                             weights[i].name, weights[i].value);
+    if ((unsigned)def->weighting > FCT_WEIGHT_UNIFORM)
+        return fct_fail(env, FCT_ERROR_DATA, "weighting is %d, expected a fct_weighting",
+                        (int)def->weighting);
     if (!(def->feature_threshold >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "feature_threshold is %g, expected at least 0",
                         def->feature_threshold);
@@ -98,17 +101,17 @@ fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simp
     if (result != FCT_OK) return result;
     double start = fct_seconds();
     fct_simplify_stats found = {.faces_before = mesh->face_count};
-    fct_mesh sorted;
-    uint32_t *places;
-    result = fct_simplify_sort(env, mesh, &sorted, &places);
+    fct_sorted sorted;
+    result = fct_simplify_sort(env, mesh, def->locks, &sorted);
     if (result != FCT_OK) return result;
+    fct_simplify_def own = *def;
+    own.locks = sorted.locks;
     fct_simplifier *s;
-    result = fct_simplifier_create(env, &sorted, def, &s);
+    result = fct_simplifier_create(env, &sorted.mesh, &own, &s);
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = run_simplifier(s, places, out, stats != NULL, &found);
+    if (result == FCT_OK) result = run_simplifier(s, sorted.places, out, stats != NULL, &found);
     fct_simplifier_destroy(s);
     fct_simplify_release_sorted(env, &sorted);
-    fct_release(env, places);
     if (result == FCT_OK && stats) *stats = found;
     return result;
 }

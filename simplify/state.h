@@ -35,6 +35,7 @@ typedef struct fct_channel {
     enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD } source;
     uint32_t component;
     double factor;
+    double unit;         /* the difference of value * factor that a whole range makes */
     double lower, upper; /* range of value * factor in the input; results are clamped to it */
 } fct_channel;
 
@@ -47,7 +48,7 @@ typedef struct fct_remaining {
 } fct_remaining;
 
 /* What holds a point besides its planes. */
-enum { HOLD_PLANES, HOLD_LINE, HOLD_POINT };
+enum { HOLD_PLANES, HOLD_LINE, HOLD_POINT, HOLD_LOCK };
 
 /* What holds a point of a boundary, a border or a seam (cost/constraint.h). */
 typedef struct fct_constraint {
@@ -117,7 +118,7 @@ typedef struct fct_simplifier {
     uint32_t *class_parents;
     uint32_t class_count;
 
-    /* NULL if boundary_weight is 0. */
+    /* NULL if boundary_weight is 0 and nothing is locked. */
     uint32_t *constraint_of; /* per point: its constraint; FCT_NONE if nothing holds it */
     fct_constraint *constraints;
     fct_line *lines;

@@ -23,9 +23,11 @@ enum {
     KEY_MAX_ERROR,
     KEY_ATTRIBUTES,
     KEY_PLACEMENT,
+    KEY_WEIGHTS,
     KEY_BOUNDARY,
     KEY_FEATURE,
     KEY_REGULARIZE,
+    KEY_LOCK_BORDER,
     KEY_TOPOLOGY,
     KEY_REFIT
 };
@@ -39,15 +41,19 @@ static const struct argp_option simplify_options_table[] = {
      "planes of the faces and of the boundary (default: no limit)",
      0},
     {"attributes", KEY_ATTRIBUTES, "LIST", 0,
-     "The attributes that count in the error, with optional weights, such as color=.1,uv=.1,normal=.01; "
-     "none: only the "
-     "shape counts. Default: all attributes of the mesh, with the weights of this example",
+     "The attributes that count in the error, with optional weights, such as color=.02,uv=.1,normal=.01; "
+     "none: "
+     "only the shape counts. Default: all attributes of the mesh; uv and normal have the weights of this "
+     "example, "
+     "color has 2 / sqrt(faces of the result), at most .1",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
      "midpoint) or subset "
      "(either end)",
      0},
+    {"weights", KEY_WEIGHTS, "HOW", 0,
+     "How much a face weighs at its corners: area (default), angle or uniform (the same for all faces)", 0},
     {"boundary", KEY_BOUNDARY, "W", 0,
      "How many times the squared distance of boundaries and borders from their place counts, relative to "
      "that of "
@@ -59,6 +65,8 @@ static const struct argp_option simplify_options_table[] = {
      0},
     {"regularize", KEY_REGULARIZE, "G", 0,
      "Weight of the distance to the edge's midpoint, 0 to 1 (default 1e-9)", 0},
+    {"lock-border", KEY_LOCK_BORDER, NULL, 0,
+     "Keep the vertices of open boundaries, so that tiles still fit exactly", 0},
     {"keep-topology", KEY_TOPOLOGY, NULL, 0, "Refuse contractions that change the topology", 0},
     {"refit", KEY_REFIT, "N", 0, "Passes that fit the vertices to the input afterwards, 0 to 100 (default 2)",
      0},
@@ -88,6 +96,7 @@ static error_t parse_attributes(simplify_options *o, char *list, struct argp_sta
 
 static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
+    static const char *const weightings[] = {"area", "angle", "uniform", NULL}; /* in the order of the enum */
     static const fct_placement values[] = {FCT_PLACE_OPTIMAL, FCT_PLACE_SEGMENT, FCT_PLACE_ENDS,
                                            FCT_PLACE_SUBSET};
     simplify_options *o = state->input;
@@ -111,12 +120,19 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         error = tool_parse_choice(state, "--placement", text, placements, &index);
         o->def.placement = values[index];
         return error;
+    case KEY_WEIGHTS:
+        error = tool_parse_choice(state, "--weights", text, weightings, &index);
+        o->def.weighting = (fct_weighting)index;
+        return error;
     case KEY_BOUNDARY:
         return tool_parse_real(state, "--boundary", text, 0, 1e12, &o->def.boundary_weight);
     case KEY_FEATURE:
         return tool_parse_real(state, "--feature-threshold", text, 0, INFINITY, &o->def.feature_threshold);
     case KEY_REGULARIZE:
         return tool_parse_real(state, "--regularize", text, 0, 1, &o->def.regularization);
+    case KEY_LOCK_BORDER:
+        o->def.lock_border = true;
+        return 0;
     case KEY_TOPOLOGY:
         o->def.keep_topology = true;
         return 0;

@@ -21,6 +21,14 @@ typedef enum fct_placement {
     FCT_PLACE_SUBSET   /* the better of both ends, with its attributes */
 } fct_placement;
 
+/* How much a face weighs in the quadric of a corner (Garland 1999, section 3.4.1). ANGLE and UNIFORM are
+ * scaled so that all weights add up to the area. They depend on the tessellation, AREA does not. */
+typedef enum fct_weighting {
+    FCT_WEIGHT_AREA,   /* a third of its area */
+    FCT_WEIGHT_ANGLE,  /* the angle at the corner */
+    FCT_WEIGHT_UNIFORM /* the same for all faces */
+} fct_weighting;
+
 typedef enum fct_stop {
     FCT_STOP_FACES,    /* the face count is at most target_faces */
     FCT_STOP_ERROR,    /* every possible contraction has a larger error than max_error */
@@ -33,6 +41,11 @@ typedef enum fct_stop {
  * the 2nd to the 98th percentile, but at least 1/20 of the full range. A weight above 0 makes the attribute a
  * part of the error. With weight 0 it does not count in the error and is interpolated, but its seams are
  * still held in place. A weight has no effect if the mesh does not have the attribute. */
+/* Only for color_weight: 2 / sqrt(faces) of the result, at most .1; without target_faces the result has about
+ * as many faces as the longest side of the bounds has lengths of max_error. So colours weigh less in larger
+ * scenes and finer results. */
+#define FCT_WEIGHT_AUTO (-1.)
+
 typedef struct fct_simplify_def {
     uint32_t size;
     uint32_t target_faces; /* stop at this count or below; default 0 */
@@ -41,7 +54,8 @@ typedef struct fct_simplify_def {
      * of the boundary (without boundary_weight). Attributes have no part in it. */
     double max_error;
     fct_placement placement; /* default OPTIMAL */
-    double color_weight;     /* default .1 */
+    fct_weighting weighting; /* default AREA */
+    double color_weight;     /* default FCT_WEIGHT_AUTO */
     double texcoord_weight;  /* default .1 */
     double normal_weight;    /* default .01 */
     /* Squared distances of boundaries, borders and seams from their place (3.6) count this times as much as
@@ -57,7 +71,11 @@ typedef struct fct_simplify_def {
     double regularization;
     uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions; default 2.
                               None are made with SUBSET, whose vertices are those of the input */
-    bool keep_topology;    /* refuse contractions that fail the link condition; default false */
+    /* vertex_count bytes, or NULL. A vertex whose byte is not 0 keeps its position and attributes exactly and
+     * is not contracted away. Other vertices at its place that are joined with it are locked too. */
+    const uint8_t *locks;
+    bool lock_border;   /* lock the vertices of open boundaries; default false */
+    bool keep_topology; /* refuse contractions that fail the link condition; default false */
     /* Refuse contractions that make a bad face or edge: a face that folds over, loses its area or gets the
      * corners of another, or an edge of more than two faces; default true. */
     bool check_foldover;

@@ -8,6 +8,11 @@
 #define COLOR_TAIL  50  /* each tail holds at most one value in 50 */
 #define LEAST_RANGE .05 /* of the full range */
 
+/* The automatic weight of colours for n faces is COLOR_LENGTHS / sqrt(n), at most MOST_COLOR: it falls with
+ * the lengths of the edges. Measured on the museum, the Cornell box and painted models: docs/notes. */
+#define COLOR_LENGTHS 2.
+#define MOST_COLOR    .1
+
 /* Normals have components from -1 to 1: a factor of 1/2 gives them a range of 1. */
 #define NORMAL_FACTOR .5
 
@@ -34,6 +39,7 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
             channel->lower = fct_min(channel->lower, value), channel->upper = fct_max(channel->upper, value);
         }
         if (count == 0) channel->lower = channel->upper = 0;
+        channel->unit = source == CHANNEL_COLOR ? 1 : channel->upper - channel->lower;
     }
 }
 
@@ -79,9 +85,9 @@ void fct_simplify_channels(fct_simplifier *s) {
     const fct_mesh *mesh = s->mesh;
     const fct_simplify_def *def = s->def;
     for (int steering = 1; steering >= 0; --steering) {
-        if (mesh->colors && (def->color_weight > 0) == steering) {
+        if (mesh->colors && (def->color_weight != 0) == steering) {
             double range = find_color_range(mesh->colors, 3 * (size_t)mesh->vertex_count);
-            add_channels(s, CHANNEL_COLOR, 3, (steering ? def->color_weight : 1) / (range > 0 ? range : 1));
+            add_channels(s, CHANNEL_COLOR, 3, 1 / (range > 0 ? range : 1));
         }
         if (mesh->texcoords && (def->texcoord_weight > 0) == steering) {
             double range = find_texcoord_range(mesh->texcoords, 3 * (size_t)mesh->face_count);
@@ -94,8 +100,28 @@ void fct_simplify_channels(fct_simplifier *s) {
     }
 }
 
+/* The weight of colours. max_error allows about extent / max_error faces. */
+static double find_color_weight(const fct_simplifier *s) {
+    const fct_simplify_def *def = s->def;
+    if (def->color_weight != FCT_WEIGHT_AUTO) return def->color_weight;
+    double faces = fct_max(def->target_faces, s->extent / def->max_error);
+    faces = fct_max(fct_min(faces, s->mesh->face_count), 1);
+    return fct_min(COLOR_LENGTHS / sqrt(faces), MOST_COLOR);
+}
+
+static void weigh_colors(fct_simplifier *s) {
+    double weight = find_color_weight(s);
+    for (uint32_t i = 0; i < s->steering; ++i) {
+        fct_channel *channel = &s->channels[i];
+        if (channel->source == CHANNEL_COLOR)
+            channel->factor *= weight, channel->unit *= weight, channel->lower *= weight,
+                channel->upper *= weight;
+    }
+}
+
 fct_result fct_simplify_attributes(fct_simplifier *s) {
     if (!s->channel_count) return FCT_OK;
+    weigh_colors(s);
     s->attributes = fct_allocate_zero(s->env, s->wedge_count, s->channel_count * sizeof *s->attributes);
     if (!s->attributes) return fct_fail_memory(s->env, "attributes");
     for (uint32_t i = 0; i < s->channel_count; ++i) {

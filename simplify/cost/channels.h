@@ -9,10 +9,11 @@
 
 #include "simplify/state.h"
 
-/* Fills channels, channel_count and steering from the arrays of the mesh and the weights of the def. */
+/* Fills channels, channel_count and steering from the arrays of the mesh and the weights of the def; without
+ * the weight of colours. */
 void fct_simplify_channels(fct_simplifier *s);
-/* Allocates `attributes` and fills it with the scaled values of every wedge. Needs the topology. Errors:
- * MEMORY. */
+/* Multiplies the colours by their weight, then allocates `attributes` and fills it with the scaled values of
+ * every wedge. Needs the topology. Errors: MEMORY. */
 fct_result fct_simplify_attributes(fct_simplifier *s);
 
 #endif

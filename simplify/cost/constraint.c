@@ -5,13 +5,15 @@
  * 2. Each face at a held edge adds a plane to both ends: through the edge, perpendicular to the face,
  *    weighted by the strength and the length of the edge.
  * 3. lines.c finds the straight parts of the held curves.
+ * 4. Locks replace the other rules of a point.
  * Faces without area add nothing. Cost: linear in the corners.
  */
 #include "simplify/cost/constraint.h"
 
+#include "simplify/cost/groups.h"
 #include "simplify/cost/lines.h"
 
-/* Squared difference of two wedges' attributes, at most 1. Each channel is divided by its range. */
+/* Squared difference of two wedges' attributes, at most 1. Each channel is divided by its unit. */
 static double squared_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
     if (w == u) return 0;
     double sum = 0;
@@ -19,8 +21,7 @@ static double squared_gap(const fct_simplifier *s, uint32_t w, uint32_t u) {
         const fct_channel *channel = &s->channels[i];
         double d =
             s->attributes[(size_t)s->channel_count * w + i] - s->attributes[(size_t)s->channel_count * u + i];
-        double range = channel->upper - channel->lower;
-        if (range > 0) sum += d * d / (range * range);
+        if (channel->unit > 0) sum += d * d / (channel->unit * channel->unit);
     }
     return sum < 1 ? sum : 1;
 }
@@ -46,16 +47,34 @@ static void find_strengths(const fct_simplifier *s, float *strength, uint32_t *f
     }
 }
 
-/* Numbers the points at held edges. Returns their count. */
-static uint32_t number_held_points(fct_simplifier *s, const float *strength) {
-    uint32_t count = 0;
+static bool edge_is_locked(const fct_simplifier *s, uint32_t e) {
+    return s->def->lock_border && s->edge_flags[e] & EDGE_BOUNDARY;
+}
+
+static bool vertex_is_locked(const fct_simplifier *s, uint32_t v) {
+    return s->def->locks && s->def->locks[v] && s->point_of[v] != FCT_NONE;
+}
+
+static void number_point(fct_simplifier *s, uint32_t point) {
+    if (s->constraint_of[point] == FCT_NONE) s->constraint_of[point] = s->constraint_count++;
+}
+
+/* Numbers the points at held edges and those that are locked. */
+static void number_held_points(fct_simplifier *s, const float *strength) {
     memset(s->constraint_of, 0xff, s->point_count * sizeof *s->constraint_of);
     for (uint32_t e = 0; e < s->edge_count; ++e)
-        for (int k = 0; k < 2 && strength[e] > 0; ++k) {
-            uint32_t *at = &s->constraint_of[s->edges[e].ends[k]];
-            if (*at == FCT_NONE) *at = count++;
-        }
-    return count;
+        for (int k = 0; k < 2 && (strength[e] > 0 || edge_is_locked(s, e)); ++k)
+            number_point(s, s->edges[e].ends[k]);
+    for (uint32_t v = 0; v < s->mesh->vertex_count; ++v)
+        if (vertex_is_locked(s, v)) number_point(s, s->point_of[v]);
+}
+
+static void lock_points(fct_simplifier *s) {
+    for (uint32_t e = 0; e < s->edge_count; ++e)
+        for (int k = 0; k < 2 && edge_is_locked(s, e); ++k)
+            s->constraints[s->constraint_of[s->edges[e].ends[k]]].hold = HOLD_LOCK;
+    for (uint32_t v = 0; v < s->mesh->vertex_count; ++v)
+        if (vertex_is_locked(s, v)) s->constraints[s->constraint_of[s->point_of[v]]].hold = HOLD_LOCK;
 }
 
 /* Adds the planes through the held sides of face f to the points at both ends (3.6). */
@@ -79,7 +98,8 @@ static void add_planes(fct_simplifier *s, uint32_t f, const float *strength) {
 }
 
 fct_result fct_simplify_constraints(fct_simplifier *s) {
-    if (!(s->def->boundary_weight > 0)) return FCT_OK;
+    bool held = s->def->boundary_weight > 0;
+    if (!held && !s->def->locks && !s->def->lock_border) return FCT_OK;
     float *strength = NULL;
     uint32_t *first_sides = NULL;
     const fct_array scratch[] = {FCT_ARRAY(strength, s->edge_count),
@@ -91,8 +111,11 @@ fct_result fct_simplify_constraints(fct_simplifier *s) {
         result = fct_fail_memory(s->env, "constraints");
         goto done;
     }
-    find_strengths(s, strength, first_sides);
-    s->constraint_count = number_held_points(s, strength);
+    if (held)
+        find_strengths(s, strength, first_sides);
+    else
+        memset(strength, 0, s->edge_count * sizeof *strength);
+    number_held_points(s, strength);
     s->constraints = fct_allocate_zero(s->env, s->constraint_count, sizeof *s->constraints);
     if (!s->constraints) {
         result = fct_fail_memory(s->env, "constraints");
@@ -101,6 +124,7 @@ fct_result fct_simplify_constraints(fct_simplifier *s) {
     for (uint32_t f = 0; f < s->mesh->face_count; ++f)
         if (!corner_dead(s, 3 * f)) add_planes(s, f, strength);
     result = fct_simplify_find_lines(s, strength);
+    if (result == FCT_OK) lock_points(s);
 done:
     fct_release_all(s->env, scratch, FCT_LENGTH(scratch));
     return result;
@@ -112,7 +136,8 @@ static bool lies_on_line(const fct_simplifier *s, v3 p, uint32_t line) {
     return v3_norm2(rest) <= s->least_height * s->least_height;
 }
 
-/* 1. A point that stays and one that nothing but planes holds: the first wins.
+/* 0. A locked point and another: the first wins. Two locked points: neither end is allowed.
+ * 1. A point that stays and one that nothing but planes holds: the first wins.
  * 2. Two points of one line: the line. A point of a line and one that stays on this line: the second.
  * 3. Else both are broken. */
 static void join_holds(const fct_simplifier *s, const fct_constraint *a, const fct_constraint *b, v3 pa,
@@ -121,6 +146,11 @@ static void join_holds(const fct_simplifier *s, const fct_constraint *a, const f
     out->held.hold = HOLD_PLANES, out->held.line = FCT_NONE;
     out->ends[0] = out->ends[1] = true;
     if (ha == HOLD_PLANES && hb == HOLD_PLANES) return;
+    if (ha == HOLD_LOCK || hb == HOLD_LOCK) {
+        out->held.hold = HOLD_LOCK;
+        out->ends[0] = hb != HOLD_LOCK, out->ends[1] = ha != HOLD_LOCK;
+        return;
+    }
     bool first = hb == HOLD_PLANES || (ha == HOLD_POINT && hb == HOLD_LINE && lies_on_line(s, pa, b->line));
     bool second = ha == HOLD_PLANES || (hb == HOLD_POINT && ha == HOLD_LINE && lies_on_line(s, pb, a->line));
     bool both = ha == HOLD_LINE && hb == HOLD_LINE && a->line == b->line;
@@ -144,4 +174,56 @@ void fct_constraint_merge(fct_simplifier *s, uint32_t a, uint32_t b) {
     if (!fct_constraint_join(s, a, b, &joint)) return;
     if (s->constraint_of[a] == FCT_NONE) s->constraint_of[a] = s->constraint_of[b];
     s->constraints[s->constraint_of[a]] = joint.held;
+}
+
+/* The corners of `wedge` (all at `point`, without attributes) that the faces between a and b have. */
+static uint32_t count_vanishing(fct_simplifier *s, uint32_t a, uint32_t count_b, uint32_t point,
+                                uint32_t wedge) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < count_b; ++i) {
+        uint32_t f = s->ring_b[i] - s->ring_b[i] % 3;
+        const uint32_t *t = s->triangles + f;
+        if (t[0] != a && t[1] != a && t[2] != a) continue;
+        for (uint32_t k = 0; k < 3; ++k) count += t[k] == point && corner_wedge(s, f + k) == wedge;
+    }
+    return count;
+}
+
+static uint32_t count_uses(const fct_simplifier *s, uint32_t wedge) {
+    return s->corner_wedges ? s->wedge_uses[wedge] : point_at(s, wedge)->valence;
+}
+
+/* Whether each group of wedges with one of the locked point keeps a face. */
+static bool keeps_groups(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
+    fct_groups g = {.wedge_count = 2, .group_count = 1, .wedges = {a, b}, .second = {false, true}};
+    if (s->corner_wedges && !fct_groups_find(s, a, b, &g)) return false;
+    for (uint32_t group = 0; group < g.group_count; ++group) {
+        uint32_t left = 0;
+        bool locked = false;
+        for (uint32_t i = 0; i < g.wedge_count; ++i) {
+            if (g.group_of[i] != group) continue;
+            uint32_t point = g.second[i] ? b : a;
+            locked |= point_is_locked(s, point);
+            left += count_uses(s, g.wedges[i]) - count_vanishing(s, a, count_b, point, g.wedges[i]);
+        }
+        if (locked && left == 0) return false;
+    }
+    return true;
+}
+
+bool fct_constraint_keeps_locked(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b, bool body) {
+    if (!s->constraint_of) return true;
+    for (uint32_t i = 0; i < count_b; ++i) {
+        uint32_t f = s->ring_b[i] - s->ring_b[i] % 3;
+        const uint32_t *t = s->triangles + f;
+        if (!body && t[0] != a && t[1] != a && t[2] != a) continue;
+        for (uint32_t k = 0; k < 3; ++k) {
+            if (!point_is_locked(s, t[k])) continue;
+            if (body) return false;
+            if (t[k] == a || t[k] == b) continue;
+            uint32_t w = corner_wedge(s, f + k);
+            if (count_uses(s, w) == count_vanishing(s, a, count_b, t[k], w)) return false;
+        }
+    }
+    return body || (!point_is_locked(s, a) && !point_is_locked(s, b)) || keeps_groups(s, a, b, count_b);
 }

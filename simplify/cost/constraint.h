@@ -23,16 +23,24 @@ static inline const fct_constraint *constraint_at(const fct_simplifier *s, uint3
     return i == FCT_NONE ? NULL : &s->constraints[i];
 }
 
+static inline bool point_is_locked(const fct_simplifier *s, uint32_t point) {
+    const fct_constraint *held = constraint_at(s, point);
+    return held && held->hold == HOLD_LOCK;
+}
+
 /* The constraint of the point that replaces a and b. */
 typedef struct fct_joint {
     fct_constraint held;
-    bool ends[2]; /* the new point may be at a, at b */
+    bool ends[2]; /* the new point may be at a, at b; neither if both are locked */
 } fct_joint;
 
 /* False if nothing holds a or b. */
 bool fct_constraint_join(const fct_simplifier *s, uint32_t a, uint32_t b, fct_joint *out);
 /* Gives point a the joint constraint of a and b, which are contracted to it. */
 void fct_constraint_merge(fct_simplifier *s, uint32_t a, uint32_t b);
+/* Whether every vertex of a locked point keeps a face if a and b are contracted. body: all their faces
+ * vanish. ring_b holds the count_b corners of b. */
+bool fct_constraint_keeps_locked(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b, bool body);
 /* The factor of `planes` beside the quadric of faces with this area. */
 static inline double constraint_weight(const fct_simplifier *s, const fct_constraint *held, double area) {
     return held->planes[10] > 0 ? s->def->boundary_weight * area / held->planes[10] : 0;

@@ -25,7 +25,7 @@ static double find_group_ridge(const fct_simplifier *s, const double *q) {
 void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uint32_t group,
                           const fct_candidate *candidate, v3 pa, v3 pb, double *attributes) {
     const double *first = fct_groups_end(s, groups, group, 0), *second = fct_groups_end(s, groups, group, 1);
-    if (s->def->placement == FCT_PLACE_SUBSET) {
+    if (s->def->placement == FCT_PLACE_SUBSET || candidate->locked) {
         memcpy(attributes, candidate->end == 0 ? first : second, s->channel_count * sizeof *attributes);
         return;
     }
@@ -126,7 +126,7 @@ static void place_point(const fct_simplifier *s, const double *r, const fct_join
                         bool ends_only, fct_candidate *out) {
     if (joint && joint->held.hold == HOLD_LINE)
         place_on_line(s, r, joint, a, b, ends_only, out);
-    else if (joint && joint->held.hold == HOLD_POINT) {
+    else if (joint && joint->held.hold >= HOLD_POINT) {
         v3 at = joint->ends[0] ? a : b;
         *out = (fct_candidate){.at = at, .end = joint->ends[1], .error = quadric_at(r, at)};
     } else
@@ -186,12 +186,20 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
                    v3_dot(g, delta) - ridge * reach2;
     out->at = v3_add(middle, delta);
     out->end = 2;
+    out->locked = false;
     out->error = error > 0 ? error : 0;
     out->distance2 = out->error;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);
     out->key = out->error + ridge * (reach2 + .25 * length2);
     return true;
+}
+
+/* The wedges of a group at one end of the edge. */
+static uint32_t count_at_end(const fct_groups *g, uint32_t group, uint32_t end) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < g->wedge_count; ++i) count += g->group_of[i] == group && g->second[i] == end;
+    return count;
 }
 
 bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_candidate *out) {
@@ -213,15 +221,24 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     double weight = held ? constraint_weight(s, &joint.held, r[10]) : 0;
     for (int k = 0; k < 10 && held; ++k) r[k] += weight * joint.held.planes[k];
     if (held && ((hub_a && !joint.ends[0]) || (hub_b && !joint.ends[1]))) return false;
+    bool locked = held && joint.held.hold == HOLD_LOCK;
+    if (locked && !joint.ends[0] && !joint.ends[1]) return false;
+    if (locked && s->corner_wedges && !s->steering && !fct_groups_find(s, a, b, &g)) return false;
+    /* Each group keeps one locked wedge: none is joined with another, and no vertex of the other end joins.
+     */
+    for (uint32_t i = 0; locked && s->corner_wedges && i < g.group_count; ++i)
+        if (count_at_end(&g, i, joint.ends[1]) != 1) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
-    else if (s->steering && s->def->placement == FCT_PLACE_SUBSET)
+    else if (s->steering && (locked || s->def->placement == FCT_PLACE_SUBSET))
         place_subset(s, &g, sums, held ? &joint : NULL, weight, pa, pb, out);
     else
         place_point(s, r, held ? &joint : NULL, pa, pb, ends_only, out);
     if (!(out->error > 0)) out->error = 0;
+    out->locked = locked;
     out->distance2 = quadric_at(first->quadric, out->at) + quadric_at(second->quadric, out->at);
-    if (held) out->distance2 += weight / s->def->boundary_weight * quadric_at(joint.held.planes, out->at);
+    if (weight > 0)
+        out->distance2 += weight / s->def->boundary_weight * quadric_at(joint.held.planes, out->at);
     if (!(out->distance2 > 0)) out->distance2 = 0;
     out->area = r[10];
     memcpy(out->resistance, r, sizeof out->resistance);

@@ -8,6 +8,7 @@ typedef struct fct_candidate {
     v3 at;
     uint32_t end;     /* 0 or 1 if `at` is that end of the edge, else 2 */
     double error;     /* Q(at) with the best attributes, at least 0 */
+    bool locked;      /* the end is locked: its attributes stay */
     double distance2; /* squared distance from the faces and held curves, times `area`, without attributes */
     double area;      /* of the faces that the quadric sums */
     double resistance[6]; /* A of the position's quadric: xx xy xz yy yz zz */
@@ -15,8 +16,8 @@ typedef struct fct_candidate {
 } fct_candidate;
 
 /* The candidate for contracting the edge a-b, by the policy def->placement. ends_only: try only both ends and
- * the midpoint. A hub does not move: it is the result. False if the edge has too many wedges, or if
- * the constraint of the other end does not allow this. */
+ * the midpoint. A hub does not move: it is the result. False if the edge has too many wedges, if a
+ * constraint does not allow this, or if a group has not exactly one wedge of a locked end. */
 bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_candidate *out);
 /* The best attributes (channel_count) of a group for the candidate, clamped to the input's range. pa, pb: the
  * ends' positions. Channels that do not steer are interpolated along the edge. */

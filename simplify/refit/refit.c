@@ -141,7 +141,7 @@ static v3 find_step(const fct_refit *r, uint32_t point) {
     const fct_constraint *held = constraint_at(s, point);
     double *q = r->systems[point];
     if (!held) return v3_scale(solve_damped(q), STEP);
-    if (held->hold == HOLD_POINT) return (v3){0, 0, 0};
+    if (held->hold >= HOLD_POINT) return (v3){0, 0, 0};
     if (held->hold == HOLD_LINE) {
         v3 d = s->lines[held->line].direction;
         double curvature = sym3_form(q, d, d) + DAMPING * (q[0] + q[3] + q[5]);
@@ -210,10 +210,15 @@ static void move_points(fct_refit *r) {
     }
 }
 
-/* Each attribute takes the full step, the mean residual, clamped to the input's range. */
+/* Each attribute takes the full step, the mean residual, clamped to the input's range. Those of locked points
+ * stay. */
 static void move_attributes(fct_refit *r) {
     fct_simplifier *s = r->s;
     uint32_t n = s->channel_count;
+    for (uint32_t p = 0; p < s->point_count && n && s->constraint_of; ++p)
+        for (uint32_t w = s->first_wedges[p];
+             point_at(s, p)->valence > 0 && point_is_locked(s, p) && w != FCT_NONE; w = s->next_wedges[w])
+            r->weights[w] = 0;
     for (uint32_t w = 0; w < s->wedge_count && n; ++w) {
         if (!(r->weights[w] > 0)) continue;
         for (uint32_t i = 0; i < n; ++i) {

@@ -85,7 +85,8 @@ static void fill_sorted(const fct_mesh *mesh, const uint32_t *vertex_places, con
     out->material_names = mesh->material_names;
 }
 
-fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, fct_mesh *out, uint32_t **places) {
+fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, const uint8_t *locks,
+                             fct_sorted *out) {
     uint32_t vertices = mesh->vertex_count, *vertex_places, *starts;
     uint64_t *items;
     unsigned kinds =
@@ -94,27 +95,29 @@ fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, fct_mesh 
         (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     const fct_array scratch[] = {FCT_ARRAY(items, vertices), FCT_ARRAY(vertex_places, vertices),
                                  FCT_ARRAY(starts, (size_t)vertices + 1)};
-    *out = (fct_mesh){0};
-    *places = NULL;
+    *out = (fct_sorted){0};
+    const fct_array results[] = {FCT_ARRAY(out->places, mesh->face_count),
+                                 FCT_ARRAY_IF(locks, out->locks, vertices)};
     fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "sorted vertices");
     if (result != FCT_OK) return result;
-    *places = fct_allocate(env, mesh->face_count, sizeof **places);
-    result = *places ? sort_vertices(env, mesh, items) : fct_fail_memory(env, "sorted faces");
-    if (result == FCT_OK) result = fct_mesh_create(env, vertices, mesh->face_count, kinds, out);
+    result = fct_allocate_all(env, results, FCT_LENGTH(results), "sorted faces");
+    if (result == FCT_OK) result = sort_vertices(env, mesh, items);
+    if (result == FCT_OK) result = fct_mesh_create(env, vertices, mesh->face_count, kinds, &out->mesh);
     if (result == FCT_OK) {
         for (uint32_t i = 0; i < vertices; ++i) vertex_places[(uint32_t)items[i]] = i;
-        sort_faces(mesh, vertex_places, starts, *places);
-        fill_sorted(mesh, vertex_places, *places, out);
-    } else {
-        fct_release(env, *places);
-        *places = NULL;
-    }
+        for (uint32_t v = 0; v < vertices && locks; ++v) out->locks[vertex_places[v]] = locks[v];
+        sort_faces(mesh, vertex_places, starts, out->places);
+        fill_sorted(mesh, vertex_places, out->places, &out->mesh);
+    } else
+        fct_release_all(env, results, FCT_LENGTH(results));
     fct_release_all(env, scratch, FCT_LENGTH(scratch));
     return result;
 }
 
-void fct_simplify_release_sorted(const fct_env *env, fct_mesh *sorted) {
-    sorted->material_names = NULL;
-    sorted->material_count = 0;
-    fct_mesh_release(env, sorted);
+void fct_simplify_release_sorted(const fct_env *env, fct_sorted *sorted) {
+    sorted->mesh.material_names = NULL;
+    sorted->mesh.material_count = 0;
+    fct_mesh_release(env, &sorted->mesh);
+    fct_release(env, sorted->places);
+    fct_release(env, sorted->locks);
 }

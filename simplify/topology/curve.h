@@ -6,10 +6,15 @@
 #include "base/env.h"
 #include "facetree/mesh.h"
 
-/* The valid mesh with its vertices and faces sorted along the curve. `places` (face_count) receives the place
- * in *out of each face of the input; the caller releases it. *out borrows the material names: release it with
- * fct_simplify_release_sorted. Errors: MEMORY, with nothing to release. */
-fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, fct_mesh *out, uint32_t **places);
-void fct_simplify_release_sorted(const fct_env *env, fct_mesh *sorted);
+typedef struct fct_sorted {
+    fct_mesh mesh;    /* borrows the material names */
+    uint32_t *places; /* per face of the input: its place in `mesh` */
+    uint8_t *locks;   /* per vertex of `mesh`; NULL without locks */
+} fct_sorted;
+
+/* Sorts the vertices and faces of a valid mesh along the curve, and the locks of its vertices (NULL: none).
+ * Errors: MEMORY, with nothing to release. */
+fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, const uint8_t *locks, fct_sorted *out);
+void fct_simplify_release_sorted(const fct_env *env, fct_sorted *sorted);
 
 #endif

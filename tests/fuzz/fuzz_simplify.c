@@ -211,7 +211,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         def.boundary_weight = weight(&b, def.boundary_weight);
         def.regularization = weight(&b, def.regularization), def.feature_threshold = weight(&b, .1);
     }
-    bool valid = fuzz_check_mesh(&env, &mesh) && def.max_error >= 0 && is_weight(def.color_weight) &&
+    bool valid = fuzz_check_mesh(&env, &mesh) && def.max_error >= 0 &&
+                 (is_weight(def.color_weight) || def.color_weight == FCT_WEIGHT_AUTO) &&
                  is_weight(def.texcoord_weight) && is_weight(def.normal_weight) &&
                  is_weight(def.boundary_weight) && is_weight(def.regularization) &&
                  def.feature_threshold >= 0;

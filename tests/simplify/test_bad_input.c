@@ -261,7 +261,7 @@ static void bad_attributes_and_options_are_refused(void **state) {
     sphere.colors[17] = 0;
     fct_simplify_def wrong[5];
     for (int i = 0; i < 5; ++i) wrong[i] = def;
-    wrong[0].max_error = NAN, wrong[1].color_weight = -1, wrong[2].boundary_weight = INFINITY;
+    wrong[0].max_error = NAN, wrong[1].color_weight = -2, wrong[2].boundary_weight = INFINITY;
     wrong[3].size = 4, wrong[4].regularization = NAN;
     for (int i = 0; i < 5; ++i) {
         r.text[0] = 0;

@@ -218,6 +218,18 @@ holds "$(value e_max_ab) < .1"
 expect 0 simplify sphere.off --max-error .01 -o fine.obj --json
 check "it stops at the error" test "$(value stopped_because)" = error
 holds "$(value max_cost) <= .01 && $(value faces_after) < 960"
+expect 0 simplify grid.off --faces 40 --lock-border -o fixed.off
+expect 0 info fixed.off --json
+holds "$(value faces) <= 40 && $(value boundary_edges) == 32"
+expect 0 simplify grid.off --faces 40 -o free.off
+expect 0 info free.off --json
+holds "$(value boundary_edges) < 32"
+for weights in area angle uniform; do
+    expect 0 simplify sphere.off --faces 200 --weights $weights -o $weights.off
+    expect 0 compare sphere.off $weights.off --json
+    holds "$(value e_max) < .1"
+done
+check "weights change the result" test "$(cat area.off angle.off uniform.off | sort -u | wc -l)" -gt "$(sort -u area.off | wc -l)"
 expect 65 simplify sphere.off --faces 10 --attributes color -o x.ply
 says "expected the attribute color"
 expect 0 simplify - --faces 20 -o - <small.ply

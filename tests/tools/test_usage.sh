@@ -127,6 +127,8 @@ expect 64 simplify cube.off -o x.ply --faces 4 --attributes smell
 says "expected color, uv or normal, found 'smell'"
 expect 64 simplify cube.off -o x.ply --faces 4 --attributes color=much
 expect 64 simplify cube.off -o x.ply --faces 4 --placement best
+expect 64 simplify cube.off -o x.ply --faces 4 --weights heavy
+says "expected area, angle or uniform, found 'heavy'"
 expect 64 simplify cube.off -o x.doc --faces 4
 for later in --primitive=face --pairs=1 --progressive=x.fpm --resume=x; do
     expect 64 simplify cube.off -o x.ply --faces 4 "$later"

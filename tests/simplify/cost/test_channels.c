@@ -38,6 +38,7 @@ static void colors_scale_by_the_middle_of_their_range(void **state) {
         for (int i = 0; i < 3; ++i) {
             const fct_channel *channel = &s->channels[i];
             assert_ratio(channel->factor, .3 / cases[k].range, .006);
+            assert_ratio(channel->unit, .3, 1e-12);
             assert_ratio(channel->lower, channel->factor * reds[0], 1e-12);
             assert_ratio(channel->upper, channel->factor * reds[COUNT - 1], 1e-12);
         }
@@ -57,6 +58,38 @@ static void equal_colors_count_by_their_weight(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* The bounds are 2999 units long, and the range of the colours is .96. */
+static void the_automatic_weight_falls_with_the_faces(void **state) {
+    (void)state;
+    enum { COUNT = 3000 };
+    static float reds[COUNT];
+    for (uint32_t v = 0; v < COUNT; ++v) reds[v] = (v + .5f) / COUNT;
+    const struct {
+        uint32_t target_faces;
+        double max_error, weight;
+    } cases[] = {{900, INFINITY, 2. / 30},  {400, INFINITY, .1},         {100, INFINITY, .1},
+                 {0, 2999. / 625, 2. / 25}, {900, 2999. / 625, 2. / 30}, {625, 2999. / 900, 2. / 30},
+                 {0, INFINITY, .1},         {0, 0, 2 / sqrt(1000)},      {5000, INFINITY, 2 / sqrt(1000)}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        fct_mesh mesh;
+        fct_simplify_def def;
+        fct_simplifier *s = open_colored(&mesh, reds, COUNT, .3, &def);
+        fct_simplifier_destroy(s);
+        def = fct_simplify_def_default();
+        def.target_faces = cases[k].target_faces, def.max_error = cases[k].max_error;
+        s = open_simplifier(&env, &mesh, &def);
+        assert_int_equal(s->steering, 3);
+        for (int i = 0; i < 3; ++i) {
+            assert_ratio(s->channels[i].factor, cases[k].weight / .96, .006);
+            assert_ratio(s->channels[i].unit, cases[k].weight, 1e-12);
+            assert_ratio(s->channels[i].upper, s->channels[i].factor * reds[COUNT - 1], 1e-12);
+            assert_ratio(s->channels[i].lower, s->channels[i].factor * reds[0], 1e-12);
+        }
+        fct_simplifier_destroy(s);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 static double raw_range(const fct_mesh *mesh, const fct_channel *channel, double *low, double *high) {
     *low = INFINITY, *high = -INFINITY;
     for (uint32_t c = 0; c < 3 * mesh->face_count; ++c) {
@@ -72,6 +105,8 @@ static void check_limits(const fct_simplifier *s) {
         raw_range(s->mesh, &s->channels[i], &low, &high);
         assert_close(s->channels[i].lower, s->channels[i].factor * low, 1e-15);
         assert_close(s->channels[i].upper, s->channels[i].factor * high, 1e-15);
+        if (s->channels[i].source != CHANNEL_COLOR)
+            assert_close(s->channels[i].unit, s->channels[i].factor * (high - low), 1e-15);
     }
 }
 
@@ -138,6 +173,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(colors_scale_by_the_middle_of_their_range),
+        cmocka_unit_test(the_automatic_weight_falls_with_the_faces),
         cmocka_unit_test(equal_colors_count_by_their_weight),
         cmocka_unit_test(attributes_of_weight_zero_come_last),
         cmocka_unit_test(wedges_hold_the_scaled_values_of_their_corners),

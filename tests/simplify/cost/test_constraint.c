@@ -22,6 +22,8 @@ static double gap_between(const fct_simplifier *s, uint32_t c, uint32_t d) {
             low = fmin(low, value), high = fmax(high, value);
         }
         double difference = raw_value(s->mesh, &s->channels[i], c) - raw_value(s->mesh, &s->channels[i], d);
+        if (s->channels[i].source == CHANNEL_COLOR) /* the range that scales the colours */
+            low = 0, high = s->channels[i].unit / s->channels[i].factor;
         if (high > low) sum += difference * difference / ((high - low) * (high - low));
     }
     return fmin(sum, 1);

@@ -3,7 +3,31 @@
 
 static fct_env env;
 
-/* The sum over the corners of one wedge at the vector v: a third of each face's area times the squared
+static double side_length(const fct_simplifier *s, uint32_t c, uint32_t d) {
+    return v3_norm(
+        v3_sub(scaled_vertex(s->mesh, s->mesh->triangles[d]), scaled_vertex(s->mesh, s->mesh->triangles[c])));
+}
+
+/* Heron's area and the law of cosines. */
+static double face_area(const fct_simplifier *s, uint32_t f) {
+    double a = side_length(s, 3 * f, 3 * f + 1), b = side_length(s, 3 * f + 1, 3 * f + 2);
+    double c = side_length(s, 3 * f + 2, 3 * f), h = .5 * (a + b + c);
+    return sqrt(fmax(h * (h - a) * (h - b) * (h - c), 0));
+}
+
+static double corner_weight(const fct_simplifier *s, uint32_t c) {
+    uint32_t f = c - c % 3, x = f + (c + 1) % 3, y = f + (c + 2) % 3, count = 0;
+    double area = face_area(s, c / 3), sum = 0;
+    if (area < 1e-12) return 0;
+    if (s->def->weighting == FCT_WEIGHT_AREA) return area / 3;
+    for (uint32_t g = 0; g < s->mesh->face_count; ++g)
+        if (face_area(s, g) >= 1e-12) sum += face_area(s, g), ++count;
+    if (s->def->weighting == FCT_WEIGHT_UNIFORM) return sum / (3 * count);
+    double a = side_length(s, c, x), b = side_length(s, c, y), d = side_length(s, x, y);
+    return sum * acos((a * a + b * b - d * d) / (2 * a * b)) / (3.141592653589793 * count);
+}
+
+/* The sum over the corners of one wedge at the vector v: the weight of each corner times the squared
  * distance from its plane. */
 static double direct_sum(const fct_simplifier *s, uint32_t wedge, const double *v) {
     const fct_mesh *mesh = s->mesh;
@@ -17,20 +41,15 @@ static double direct_sum(const fct_simplifier *s, uint32_t wedge, const double *
         for (int k = 0; k < 3; ++k) corner[k] = (v3){x[k][0], x[k][1], x[k][2]};
         double area = .5 * v3_norm(v3_cross(v3_sub(corner[1], corner[0]), v3_sub(corner[2], corner[0])));
         if (area == 0) continue;
-        sum += area / 3 * squared_distance((int)(3 + s->steering), x[0], x[1], x[2], v);
+        sum += corner_weight(s, c) * squared_distance((int)(3 + s->steering), x[0], x[1], x[2], v);
     }
     return sum;
 }
 
 static double wedge_area(const fct_simplifier *s, uint32_t wedge) {
     double area = 0;
-    for (uint32_t c = 0; c < 3 * s->mesh->face_count; ++c) {
-        if ((s->corner_wedges ? s->corner_wedges[c] : s->triangles[c]) != wedge) continue;
-        v3 a = scaled_vertex(s->mesh, s->mesh->triangles[3 * (c / 3)]);
-        v3 b = scaled_vertex(s->mesh, s->mesh->triangles[3 * (c / 3) + 1]);
-        v3 d = scaled_vertex(s->mesh, s->mesh->triangles[3 * (c / 3) + 2]);
-        area += v3_norm(v3_cross(v3_sub(b, a), v3_sub(d, a))) / 6;
-    }
+    for (uint32_t c = 0; c < 3 * s->mesh->face_count; ++c)
+        if ((s->corner_wedges ? s->corner_wedges[c] : s->triangles[c]) == wedge) area += corner_weight(s, c);
     return area;
 }
 
@@ -62,9 +81,10 @@ static void quadrics_are_direct_sums(void **state) {
                                FCT_MESH_COLORS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS,
                                ALL_ARRAYS};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
-        for (int kind = 0; kind < 2; ++kind) {
+        for (int kind = 0; kind < 4; ++kind) {
             fct_mesh mesh = make_sheet(&env, arrays[i], 11 + i);
             fct_simplify_def def = fct_simplify_def_default();
+            def.weighting = kind < 2 ? FCT_WEIGHT_AREA : kind == 2 ? FCT_WEIGHT_ANGLE : FCT_WEIGHT_UNIFORM;
             if (kind == 1) def.color_weight = .7, def.texcoord_weight = .3, def.normal_weight = 0;
             check_wedges(&mesh, &def);
             fct_mesh_release(&env, &mesh);
@@ -81,7 +101,10 @@ static void duplicates_and_slivers(void **state) {
     memcpy(mesh.positions, p, sizeof p);
     memcpy(mesh.triangles, t, sizeof t);
     fct_simplify_def def = fct_simplify_def_default();
-    check_wedges(&mesh, &def);
+    for (int k = FCT_WEIGHT_AREA; k <= FCT_WEIGHT_UNIFORM; ++k) {
+        def.weighting = (fct_weighting)k;
+        check_wedges(&mesh, &def);
+    }
     fct_mesh_release(&env, &mesh);
 }
 
