@@ -16,8 +16,8 @@
 /* Share of the variance of a vertex that those around it have at least: in the dark, the light is no measure.
  */
 #define OWN_SHARE .1
-/* Chi-square per degree of freedom above which a fit changes the light less, in proportion. */
-#define MOST_MISFIT 3.
+/* Chi-square per degree of freedom above which a fit changes the light less, with the square of the ratio. */
+#define MOST_MISFIT 6.
 /* A fit takes vertices within one edge, and another one those within two. The first 64 are enough. */
 enum { RINGS = 2, MOST_GROUP = 64 };
 /* Passes: each reaches one edge further. */
@@ -242,7 +242,7 @@ static void smooth_vertex(const smoothing *s, uint32_t v, float *out) {
         for (uint32_t i = last; i < count; ++i) add_to_fit(s, axes, v, group[i], &sums);
         first = last;
         const double misfit = solve_fit(&sums, change),
-                     share = misfit > MOST_MISFIT ? MOST_MISFIT / misfit : 1;
+                     ratio = misfit > MOST_MISFIT ? MOST_MISFIT / misfit : 1, share = ratio * ratio;
         for (int k = 0; k < 3; ++k) all[k] += share * (change[k] - all[k]);
     }
     for (int k = 0; k < 3; ++k) out[k] = (float)fct_max((double)s->light[3 * (size_t)v + k] + all[k], 0);

@@ -22,7 +22,7 @@ fct_result fct_light_smooth(const fct_env *env, const fct_surface *surface, cons
  * known variances: those of the sights, (.5 % of the light)^2, and a tenth of that of the vertex to smooth.
  * Twice, by weighted least squares, a linear function over the plane is fitted to the light around a vertex:
  * that of its neighbours and its own, and that of all vertices within two edges (at most 64). The light of
- * the vertex moves towards the value of each function, by the share min(1, 3 / M), M: chi-square per degree
+ * the vertex moves towards the value of each function, by the share min(1, 6 / M)^2, M: chi-square per degree
  * of freedom, n - 3 for n vertices. So noise disappears along the border of a shadow, and a change of light
  * that is larger than the noise stays. Light is per vertex x 3; a vertex without variance keeps it. Errors:
  * MEMORY. */

@@ -258,8 +258,9 @@ static int fit_twice(const fct_surface *s, const fct_sight *sights, const float 
         double plane[3];
         grow_marks(&s->mesh, marks);
         const double misfit = fit_directly(s, sights, light, v, marks, plane);
-        for (int k = 0; k < 3 && misfit < INFINITY; ++k) out[k] += fmin(3 / misfit, 1) * (plane[k] - out[k]);
-        taken += misfit <= 3;
+        for (int k = 0; k < 3 && misfit < INFINITY; ++k)
+            out[k] += pow(fmin(6 / misfit, 1), 2) * (plane[k] - out[k]);
+        taken += misfit <= 6;
     }
     free(marks);
     return taken;
