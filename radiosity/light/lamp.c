@@ -108,8 +108,7 @@ static uint32_t count_wanted_rays(const query *q, double visible, uint32_t sent,
     return rays;
 }
 
-/* Adds the variance of light of `power` whose visible fraction f comes from rays of which some were blocked,
- * or may have been: where a lamp is in doubt, rays that agree miss a small part of it.
+/* Adds the variance of light of `power` whose visible fraction f comes from rays of which some were blocked.
  * deviation: the standard error of f over sqrt(f (1 - f)). */
 static void add_variance(query *q, double power, double visible, uint32_t sent, double deviation) {
     const double fraction = (visible * sent + .5) / (sent + 1), error = deviation * power;
@@ -151,8 +150,7 @@ static double measure_visible_fraction(query *q, const fct_lamp *lamp, const fct
         goal = count_wanted_rays(q, all > 0 ? seen / all : .5, sent, all > 0 ? power / q->scale : 1);
     }
     const double visible = all > 0 ? seen / all : 0;
-    if (all > 0 && ((seen > 0 && seen < all) || q->doubt & slot))
-        add_variance(q, power, visible, sent, STRATIFIED / sqrt(sent * sqrt(sent)));
+    if (seen > 0 && seen < all) add_variance(q, power, visible, sent, STRATIFIED / sqrt(sent * sqrt(sent)));
     return visible;
 }
 

@@ -32,8 +32,7 @@ bool fct_lamps_sampled(const fct_lamps *lamps, uint32_t instance);
  * minor lamps, which share their rays. */
 typedef struct fct_sight {
     uint32_t open, blocked; /* some ray reached the lamp; something blocked some ray */
-    float variance;         /* of the light that the rays gave, summed over channels; 0 if they agree
-                             * and nothing is in doubt */
+    float variance;         /* of the light that the rays gave, summed over channels; 0 if they agree */
 } fct_sight;
 static inline uint32_t fct_sight_mixed(fct_sight s) {
     return s.open & s.blocked;

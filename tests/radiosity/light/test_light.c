@@ -167,8 +167,7 @@ static double see_lamp(eye *q, const fct_lamp *lamp, const fct_receiver *rec, co
         if (fixed || (all > 0 && (seen == 0 || seen == all))) break;
         goal = count_rays(q, base, all > 0 ? seen / all : .5, sent, all > 0 ? power / scale : 1);
     }
-    if (all > 0 && ((seen > 0 && seen < all) || q->doubt >> slot & 1))
-        add_variance(q, power, seen / all, sent, .36 / pow(sent, 1.5));
+    if (seen > 0 && seen < all) add_variance(q, power, seen / all, sent, .36 / pow(sent, 1.5));
     return all > 0 ? seen / all : 0;
 }
 
