@@ -18,12 +18,14 @@
 fct_result fct_light_smooth(const fct_env *env, const fct_surface *surface, const uint8_t *covered,
                             float *light);
 
-/* Reduces the noise of shadow rays in wide penumbrae. The direct light of a flat vertex and of its flat
- * neighbours, all of them not covered, has known variances: those of the sights, and (.5 % of the light)^2.
- * If a linear function over the plane explains the light within these, by chi-square per degree of freedom
- * of at most 2.5, the vertex receives its value, by weighted least squares. So a change of light that is
- * larger than the noise stays as it is. An edge of two faces counts twice, and so does the vertex itself.
- * Light is per vertex x 3; a vertex without variance keeps it. Errors: MEMORY. */
+/* Reduces the noise of shadow rays in penumbrae. The direct light of flat vertices that are not covered has
+ * known variances: those of the sights, (.5 % of the light)^2, and a tenth of that of the vertex to smooth.
+ * Twice, by weighted least squares, a linear function over the plane is fitted to the light around a vertex:
+ * that of its neighbours and its own, and that of all vertices within two edges (at most 64). The light of
+ * the vertex moves towards the value of each function, by the share min(1, 6 / M)^2, M: chi-square per degree
+ * of freedom, n - 3 for n vertices. So noise disappears along the border of a shadow, and a change of light
+ * that is larger than the noise stays. Light is per vertex x 3; a vertex without variance keeps it. Errors:
+ * MEMORY. */
 fct_result fct_direct_smooth(const fct_env *env, const fct_surface *surface, const uint8_t *covered,
                              const fct_sight *sights, float *light);
 
