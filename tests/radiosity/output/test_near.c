@@ -82,9 +82,9 @@ static void far_hits_take_the_stored_light(void **state) {
     double rays, radius = 0;
     for (size_t i = 0; i < g.set.count; ++i)
         if (g.set.items[i].instance == 0) radius = g.set.items[i].radius;
-    assert_near(mean_light(&g, .0505 * radius, false, true, 8, &rays), 7, 0);
+    assert_near(mean_light(&g, .0305 * radius, false, true, 8, &rays), 7, 0);
     assert_near(rays, 0, 0);
-    assert_true(mean_light(&g, .0495 * radius, false, true, 8, &rays) < 2);
+    assert_true(mean_light(&g, .0295 * radius, false, true, 8, &rays) < 2);
     assert_near(mean_light(&g, .01, false, false, 8, &rays), 7, 0);
     assert_near(rays, 0, 0);
     end_gap(&g);
