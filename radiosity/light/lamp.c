@@ -33,7 +33,7 @@
 #define BRIGHT_SHARE .2
 /* Wanted standard error of a lamp's light as a share of the receiver's light, times the first rays per lamp.
  */
-#define RAY_ERROR .018
+#define RAY_ERROR .02
 /* The standard error of a visible fraction f from n stratified rays is about .6 sqrt(f (1 - f)) / n^(3/4). */
 #define STRATIFIED .6
 /* An emitter above this share of the scene's area, if bent, is not a lamp (see fct_lamps_sampled). */
@@ -276,6 +276,39 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
     if (rays) *rays += q.rays;
     if (sight) *sight = q.sight;
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
+}
+
+/* Chooses a lamp in proportion to the estimates; NULL without light. *chance: its probability. */
+static const fct_lamp *choose_lamp(const query *q, double u, double *chance) {
+    double sum = 0, below = 0;
+    for (uint32_t i = 0; i < q->lamps->count; ++i) sum += estimate_lamp(q, q->lamps->lamps + i);
+    for (uint32_t i = 0; i < q->lamps->count; ++i) {
+        const double share = estimate_lamp(q, q->lamps->lamps + i);
+        below += share;
+        *chance = share / sum;
+        if (u * sum < below) return q->lamps->lamps + i;
+    }
+    return NULL;
+}
+
+void fct_lamps_sample(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
+                      const double normal[3], double offset, uint64_t seed, double irradiance[3],
+                      uint64_t *rays) {
+    query q = {.lamps = lamps, .scene = scene, .point = point, .normal = normal};
+    fct_random random = {seed};
+    fct_cut cut;
+    double chance;
+    irradiance[0] = irradiance[1] = irradiance[2] = 0;
+    const fct_lamp *lamp = choose_lamp(&q, fct_random_next(&random), &chance);
+    if (!lamp) return;
+    for (int k = 0; k < 3; ++k) q.origin[k] = (float)fct_round(point[k] + offset * normal[k]);
+    const fct_receiver rec = fct_lamp_receiver(lamp, point, normal);
+    fct_lamp_cut(lamp, &rec, &cut);
+    const double u = fct_random_next(&random), v = fct_random_next(&random);
+    const fct_lamp_point y = fct_cut_point(lamp, &rec, &cut, u, v);
+    if (y.weight > 0 && point_is_visible(&q, lamp, y.y))
+        for (int k = 0; k < 3; ++k) irradiance[k] = y.weight / chance * lamp->emission[k];
+    *rays += q.rays;
 }
 
 uint32_t fct_lamps_count(const fct_lamps *lamps) {

@@ -49,7 +49,7 @@ typedef struct fct_lamp_goal {
 void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const double normal[3],
                           double irradiance[3]);
 /* The same with shadows. Rays start at point + offset * normal. Each lamp receives base_rays rays (0: no
- * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 1.8 % /
+ * shadows). Where they disagree, more follow, up to 64, until the standard error of its light is 2 % /
  * base_rays * slack of the receiver's light. Without a goal (NULL) nothing is in doubt, slack is 1, and the
  * lamps alone are the receiver's light. Minor lamps share their rays. Equal values of item_seed give equal
  * rays. *rays (may be NULL) grows by the number of rays. Any number of threads may call. Returns the visible
@@ -63,5 +63,10 @@ void fct_lamps_unoccluded(const fct_lamps *lamps, const double point[3], const d
 double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
                         const double normal[3], double offset, uint64_t item_seed, uint32_t base_rays,
                         const fct_lamp_goal *goal, fct_sight *sight, double irradiance[3], uint64_t *rays);
+/* An unbiased estimate of the same from at most one shadow ray, to a lamp chosen in proportion to its
+ * estimated light. It is noisy, but cheap with many lamps. *rays grows. */
+void fct_lamps_sample(const fct_lamps *lamps, const fct_scene *scene, const double point[3],
+                      const double normal[3], double offset, uint64_t seed, double irradiance[3],
+                      uint64_t *rays);
 
 #endif

@@ -17,6 +17,9 @@
 #define TURN_REACH .7
 /* An anchor sends rays * (1 + k / 2) rays, with k = log2 of its group's size, at most MOST_DOUBLINGS. */
 #define MOST_DOUBLINGS 8
+/* On bent surfaces an anchor sends at least this times `rays`. A blend has fewer anchors there, because
+ * others turn away, and the light of a porous statue differs from pit to pit. */
+#define BENT_FACTOR 2
 /* Relative difference of distances up to which a ray has hit the point at which it aims. */
 #define SAME_POINT 1e-3
 enum { GROUP_GRAIN = 4, VERTEX_GRAIN = 64 }; /* groups, and vertices, per chunk */
@@ -46,16 +49,20 @@ typedef struct grouping {
 typedef struct gather_sums {
     double weight, inverse, light[3];
     v3 vector[3];
+    uint64_t rays;
 } gather_sums;
 
-static void add_ray(const fct_source *source, v3 n, v3 d, const fct_found *found, double weight,
-                    gather_sums *sums) {
+static void add_ray(const fct_source *source, v3 n, const float origin[3], const float direction[3],
+                    const fct_found *found, double weight, uint64_t seed, gather_sums *sums) {
+    const v3 d = v3_load(direction);
+    double radiosity[3];
+    fct_near_light(source, found, origin, direction, seed, radiosity, &sums->rays);
     const double lift = weight / fct_max(v3_dot(d, n), LEAST_COSINE);
     sums->weight += weight;
     if (found->distance > 0) sums->inverse += weight / fct_min(found->distance, source->longest);
     for (int c = 0; c < 3; ++c) {
-        sums->light[c] += weight * found->radiosity[c];
-        sums->vector[c] = v3_mad(sums->vector[c], lift * found->radiosity[c], d);
+        sums->light[c] += weight * radiosity[c];
+        sums->vector[c] = v3_mad(sums->vector[c], lift * radiosity[c], d);
     }
 }
 
@@ -70,7 +77,8 @@ static double weigh_ray(const fct_guide *guide, const fct_found *found, double c
 
 /* Sends a ray to a point of a source. */
 static void aim_ray(const fct_source *source, const fct_guide *guide, v3 n, const float origin[3], double t,
-                    const double place[2], uint32_t cosines, uint32_t aimed, gather_sums *sums) {
+                    const double place[2], uint32_t cosines, uint32_t aimed, uint64_t seed,
+                    gather_sums *sums) {
     const uint32_t leaf = fct_guide_pick(guide, &t);
     fct_element_point point;
     float direction[3];
@@ -83,11 +91,12 @@ static void aim_ray(const fct_source *source, const fct_guide *guide, v3 n, cons
     v3_store(direction, d);
     const fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
     if (found.leaf != leaf || fabs(found.distance - distance) > SAME_POINT * distance) return;
-    add_ray(source, n, d, &found, weigh_ray(guide, &found, cosine, cosines, aimed), sums);
+    add_ray(source, n, origin, direction, &found, weigh_ray(guide, &found, cosine, cosines, aimed), seed,
+            sums);
 }
 
-void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
-                       fct_anchor *a) {
+uint64_t fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
+                           fct_anchor *a) {
     const v3 n = v3_load(a->normal);
     const uint32_t aimed = guide ? rays / 3 : 0, cosines = rays - aimed;
     gather_sums sums = {0};
@@ -99,13 +108,14 @@ void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_
         const v3 d = fct_cosine_direction(n, plane[0], plane[1]);
         v3_store(direction, d);
         const fct_found found = fct_transport_look(source->set, source->stored, origin, direction);
-        add_ray(source, n, d, &found, weigh_ray(guide, &found, v3_dot(d, n), cosines, aimed), &sums);
+        add_ray(source, n, origin, direction, &found, weigh_ray(guide, &found, v3_dot(d, n), cosines, aimed),
+                fct_hash3(seed, k, 1), &sums);
     }
     for (uint32_t k = 0; k < aimed; ++k) {
         double plane[2];
         fct_plane_point(k, fct_hash(seed), plane);
         const double t = (k + fct_uniform(fct_hash2(seed, k))) / aimed;
-        aim_ray(source, guide, n, origin, t, plane, cosines, aimed, &sums);
+        aim_ray(source, guide, n, origin, t, plane, cosines, aimed, fct_hash3(seed, k, 2), &sums);
     }
     a->reach = sums.inverse > 0 ? (float)(sums.weight / sums.inverse) : INFINITY;
     for (int c = 0; c < 3; ++c) {
@@ -113,6 +123,7 @@ void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_
         const v3 along = v3_mad(sums.vector[c], -v3_dot(sums.vector[c], n), n);
         v3_store(a->gradient[c], v3_scale(along, 1 / sums.weight));
     }
+    return rays + sums.rays;
 }
 
 /* The vertex nearest to the group's mean: least |p - mean p|^2 (2 - n . mean n). */
@@ -158,7 +169,7 @@ static bool group_is_too_wide(const grouping *g, const group *k, const fct_ancho
 }
 
 /* Gathers at the middle vertex of a group. Returns the number of rays. */
-static uint32_t gather_group(const grouping *g, fct_guide *guide, const group *k, fct_anchor *a) {
+static uint64_t gather_group(const grouping *g, fct_guide *guide, const group *k, fct_anchor *a) {
     const fct_surface *s = g->surface;
     uint32_t size = k->end - k->begin, v = k->middle, doublings = 0;
     memcpy(a->position, s->sample_points + 3 * (size_t)v, sizeof a->position);
@@ -166,16 +177,18 @@ static uint32_t gather_group(const grouping *g, fct_guide *guide, const group *k
     a->offset = s->offsets[v];
     while (doublings < MOST_DOUBLINGS && size >> doublings > 1) ++doublings;
     uint32_t count = g->def->rays + g->def->rays * doublings / 2;
+    if (!s->flat[v] && count < BENT_FACTOR * g->def->rays) count = BENT_FACTOR * g->def->rays;
     if (guide) {
         const v3 p = v3_load(a->position);
         const uint32_t leaf =
             fct_elements_locate_point(g->source->set, g->def->instance, g->def->side < 0, s->places[v], p);
         if (!fct_guide_aim(guide, leaf, p, v3_load(a->normal))) guide = NULL;
     }
-    fct_anchor_gather(g->source, guide, count, fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count), a);
+    const uint64_t seed = fct_hash3(g->def->seed, v, (uint64_t)s->mesh.vertex_count);
+    const uint64_t rays = fct_anchor_gather(g->source, guide, count, seed, a);
     double least = SHORTEST_REACH * sqrt(s->areas[v]);
     a->reach = (float)fct_min(fct_max(a->reach, least), g->source->longest);
-    return count;
+    return rays;
 }
 
 static void find_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {

@@ -10,24 +10,16 @@
 #define FCT_RADIOSITY_ANCHOR_H
 
 #include "radiosity/output/anchor_tree.h"
-#include "radiosity/solve/guide.h"
+#include "radiosity/output/near.h"
 #include "radiosity/surface/surface.h"
 
-/* The stored solution that gather rays look up. */
-typedef struct fct_source {
-    const fct_elements *set;
-    const fct_guides *guides; /* NULL: cosine-distributed rays alone */
-    const float *stored;      /* as in fct_transport */
-    double longest;           /* hits farther away, and misses, count as if at this distance; also the longest
-                                 reach. One far hit makes no wall smooth */
-} fct_source;
-
 typedef struct fct_anchors_def {
-    uint32_t rays;     /* least number per anchor; anchors of large groups send up to five times as many */
-    double tolerance;  /* of distance / reach + sqrt(1 - n . n'), within a group */
-    double side;       /* 1: front of the surface; -1: back */
-    uint32_t instance; /* of the surface */
-    uint32_t first;    /* lower vertices need no anchor of their own */
+    uint32_t rays;          /* least number per anchor, on bent surfaces twice that; anchors of large groups
+                               send up to five times as many */
+    double tolerance;       /* of distance / reach + sqrt(1 - n . n'), within a group */
+    double side;            /* 1: front of the surface; -1: back */
+    uint32_t instance;      /* of the surface */
+    uint32_t first;         /* lower vertices need no anchor of their own */
     const uint8_t *covered; /* per vertex: it needs no light. NULL: none is covered */
     const float *nearest;   /* per vertex: distance to some surface in front of it, which limits how far away
                                its anchor may be. NULL: infinity */
@@ -48,8 +40,9 @@ fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, cons
  * guide, a third of them (rounded down) go to points of its sources, with the density p_g per area; p_c = d .
  * n c' / (pi r^2) is that of the others, and w = p_c / (n_c p_c + n_g p_g), the balance heuristic of Veach
  * and Guibas. A ray that does not reach its point has w = 0. The sum of all w has the mean 1; division by it
- * keeps rows at 1, so a furnace is exact. */
-void fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
-                       fct_anchor *anchor);
+ * keeps rows at 1, so a furnace is exact. Near hits take the light at their point (near.h). Returns the
+ * number of all rays. */
+uint64_t fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
+                           fct_anchor *anchor);
 
 #endif

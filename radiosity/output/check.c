@@ -120,8 +120,7 @@ static void gather_spot(const checking *k, spot *p, fct_guide *guide, uint64_t s
     const fct_source source = fct_solution_source(s);
     fct_solution_direct(s, p->at.position, p->at.normal, p->at.offset, seed, LAMP_RAYS, NULL, NULL, light,
                         rays);
-    fct_anchor_gather(&source, guide, GATHER_RAYS, fct_hash(seed), &p->at);
-    *rays += GATHER_RAYS;
+    *rays += fct_anchor_gather(&source, guide, GATHER_RAYS, fct_hash(seed), &p->at);
     for (int c = 0; c < 3; ++c) light[c] += p->at.irradiance[c];
 }
 

@@ -101,8 +101,7 @@ static void gather_at_site(const fct_solution *s, const fct_site *site, const fl
     memcpy(a.position, site->point, sizeof a.position);
     memcpy(a.normal, normal, sizeof a.normal);
     const fct_source source = fct_solution_source(s);
-    fct_anchor_gather(&source, NULL, gather_rays, fct_hash(seed), &a);
-    *rays += gather_rays;
+    *rays += fct_anchor_gather(&source, NULL, gather_rays, fct_hash(seed), &a);
     for (int c = 0; c < 3; ++c) irradiance[c] += a.irradiance[c];
 }
 

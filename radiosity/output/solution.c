@@ -22,7 +22,7 @@ fct_shading fct_solution_shading(const fct_solution *s, uint32_t instance, bool 
 }
 
 fct_source fct_solution_source(const fct_solution *s) {
-    return (fct_source){&s->elements, &s->guides, s->transport.stored, s->longest_reach};
+    return (fct_source){&s->elements, &s->guides, s->transport.stored, s->longest_reach, s->lamps};
 }
 
 void fct_solution_radiosity(const fct_solution *s, uint32_t instance, const float reflectance[3],

@@ -46,7 +46,8 @@ fct_found fct_transport_look(const fct_elements *set, const float *stored, const
     uint32_t leaf = fct_elements_locate(set, hit.instance, back, hit.place, hit.u, hit.v);
     if (leaf == FCT_NONE)
         return (fct_found){.radiosity = black, .leaf = FCT_NONE, .distance = hit.t, .black = true};
-    return (fct_found){stored + 3 * (size_t)leaf, leaf, hit.t, fabs(cosine), false};
+    const v3 normal = v3_scale(v3_load(hit.normal), cosine > 0 ? -1 : 1);
+    return (fct_found){stored + 3 * (size_t)leaf, leaf, hit.t, fabs(cosine), false, normal};
 }
 
 typedef struct gathering {

@@ -46,6 +46,7 @@ typedef struct fct_found {
     double distance;        /* infinity on a miss */
     double cosine;          /* of the hit surface's normal with the way back */
     bool black;             /* the back of a one-sided material */
+    v3 normal;              /* unit, of the hit surface, on the ray's side; with a leaf only */
 } fct_found;
 /* Traces a ray and looks up the stored radiosity of the leaf that it hits. */
 fct_found fct_transport_look(const fct_elements *set, const float *stored, const float origin[3],

@@ -127,7 +127,7 @@ static void furnaces_are_even(void **state) {
     assert_true(m.vertex_count > 2 * ball.vertex_count);
     double sum = 0;
     for (size_t i = 0; i < 3 * (size_t)m.vertex_count; ++i) {
-        assert_true(fabs((double)m.irradiance[i] - 2) < .02 * 2); /* the noise of the solution */
+        assert_true(fabs((double)m.irradiance[i] - 2) < .03 * 2); /* the noise of the solution */
         sum += (double)m.irradiance[i];
     }
     assert_true(fabs(sum / (3. * m.vertex_count) - 2) < .005 * 2);

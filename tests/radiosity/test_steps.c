@@ -569,8 +569,7 @@ static void bakes_equal_their_steps(void **state) {
                 memcpy(a.position, site.point, 12), memcpy(a.normal, n, 12);
                 uint32_t count = (uint32_t)(1024 * fmax(s.fineness, 1));
                 const fct_source source = fct_solution_source(&s);
-                fct_anchor_gather(&source, NULL, count, fct_hash(seed), &a);
-                probe_rays += count;
+                probe_rays += fct_anchor_gather(&source, NULL, count, fct_hash(seed), &a);
                 for (int c = 0; c < 3; ++c) e[c] += (double)a.irradiance[c];
             }
             assert_true(probes[k].instance == site.instance && probes[k].face == site.face);

@@ -119,12 +119,12 @@ static void add_variance(eye *q, double power, double visible, uint32_t sent, do
     q->variance += power * power * square * f * (1 - f);
 }
 
-/* Rays for a standard error of 1.8 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
+/* Rays for a standard error of 2 % / base * slack of the light from a lamp of this share: .6 sqrt(f (1 -
  * f)) / n^(3/4) with one more ray that is half visible, in steps of 4 up to 64. */
 static uint32_t count_rays(const eye *q, uint32_t base, double visible, uint32_t sent, double share) {
     const double f = (visible * sent + .5) / (sent + 1), error = .6 * sqrt(f * (1 - f)) * share;
     uint32_t n = 4;
-    while (n < 64 && error / pow(n, .75) > .018 / base * q->slack) n += 4;
+    while (n < 64 && error / pow(n, .75) > .02 / base * q->slack) n += 4;
     return n;
 }
 
@@ -228,11 +228,11 @@ static double light_hall(eye *q, const double point[3], const double normal[3], 
     }
     if (light[0] + light[1] + light[2] > 0) {
         double all[3], seen[3];
-        /* Enough for an error of 1.8 % / base * slack of the light if each ray has a standard error of 1/2; 4
+        /* Enough for an error of 2 % / base * slack of the light if each ray has a standard error of 1/2; 4
          * to 16.
          */
         const uint32_t enough =
-            (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .018 * base / q->slack, 2), 4), 16);
+            (uint32_t)fmin(fmax(pow(.5 * minor_sum / scale / .02 * base / q->slack, 2), 4), 16);
         const bool doubt = q->doubt >> 31 && base < enough && !fixed;
         bool mixed = see_minor_lamps(q, recs, shares, minor, minor_sum, base, q->doubt >> 31, all, seen);
         uint32_t sent = base;
@@ -326,10 +326,40 @@ static void rays_end_before_the_lamp(void **state) {
     }
 }
 
+/* The mean of single rays is the light of many rays, per channel, over receivers in all halls. */
+static void single_rays_are_unbiased(void **state) {
+    (void)state;
+    double one[3] = {0, 0, 0}, many[3] = {0, 0, 0};
+    for (uint64_t seed = 0; seed < 3; ++seed) {
+        hall h = make_hall(seed);
+        for (uint64_t i = 0; i < 20; ++i) {
+            const double point[3] = {8 * pick(seed, i, 43) - 4, 8 * pick(seed, i, 44) - 4,
+                                     3 * pick(seed, i, 45) - 2},
+                         normal[3] = {0, 0, 1};
+            uint64_t rays = 0;
+            double e[3];
+            fct_lamps_direct(h.lamps, h.scene, point, normal, .01, i, 256 | FCT_LAMPS_FIXED, NULL, NULL, e,
+                             NULL);
+            for (int c = 0; c < 3; ++c) many[c] += e[c];
+            for (uint64_t k = 0; k < 400; ++k) {
+                fct_lamps_sample(h.lamps, h.scene, point, normal, .01, fct_hash2(i, k), e, &rays);
+                for (int c = 0; c < 3; ++c) one[c] += e[c] / 400;
+            }
+            assert_in_range(rays, 200, 400);
+        }
+        for (uint32_t k = 0; k < h.count; ++k) fct_lamp_release(&plain, &h.own[k]);
+        free(h.triangles.corners);
+        fct_lamps_destroy(h.lamps);
+        fct_scene_destroy(h.scene);
+    }
+    for (int c = 0; c < 3; ++c) assert_near(one[c], many[c], .03 * many[c]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(halls_are_lit_by_the_rules),
         cmocka_unit_test(rays_end_before_the_lamp),
+        cmocka_unit_test(single_rays_are_unbiased),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

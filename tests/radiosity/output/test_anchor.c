@@ -55,7 +55,7 @@ static void end_sky(sky *s) {
 static fct_anchor gather(const sky *s, v3 n) {
     fct_anchor a = {.offset = 1e-3F};
     v3_store(a.normal, n);
-    const fct_source source = {&s->set, NULL, s->stored, INFINITY};
+    const fct_source source = {&s->set, NULL, s->stored, INFINITY, NULL};
     fct_anchor_gather(&source, NULL, 8192, 3, &a);
     return a;
 }
@@ -336,7 +336,7 @@ static void groups_respect_the_tolerance(void **state) {
         const double tolerance = k == 0 ? .9 : .4;
         fct_anchors_def def = {.rays = 16, .tolerance = tolerance, .side = k == 2 ? -1 : 1, .seed = 1};
         fct_anchors t;
-        const fct_source source = {&s.set, NULL, s.stored, 20 * sqrt(3) / 8};
+        const fct_source source = {&s.set, NULL, s.stored, 20 * sqrt(3) / 8, NULL};
         t = (fct_anchors){0};
         assert_int_equal(fct_anchors_extend(&plain, &source, &f, &def, &t), FCT_OK);
         assert_true(t.rays >= 16 * t.count && t.rays <= 80 * t.count);

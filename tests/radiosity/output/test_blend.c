@@ -53,7 +53,7 @@ static void gathers_equal_their_rays(void **state) {
         for (uint64_t c = 0; c < 3; ++c) a.position[c] = (float)(pick(k, c, 2) - .5);
         v3_store(a.normal, v3_unit(v3_make(pick(k, 0, 3) - .5, pick(k, 1, 3) - .5, pick(k, 2, 3) - .5)));
         b = a;
-        const fct_source source = {&r.set, NULL, r.stored, k % 2 ? .4 : INFINITY};
+        const fct_source source = {&r.set, NULL, r.stored, k % 2 ? .4 : INFINITY, NULL};
         fct_anchor_gather(&source, NULL, 50 + (uint32_t)k, k, &a);
         gather_plainly(&r, source.longest, 50 + (uint32_t)k, k, &b);
         assert_same_anchor(&a, &b);
@@ -103,6 +103,7 @@ static void follow_group(maker *m, const uint32_t *vertices, uint32_t count) {
         ++m->again;
     } else {
         uint32_t rays = m->def.rays + m->def.rays * size / 2;
+        if (!f->flat[middle] && rays < 2 * m->def.rays) rays = 2 * m->def.rays;
         gather_plainly(m->r, m->longest, rays, fct_hash3(m->def.seed, middle, f->mesh.vertex_count), &a);
         a.reach = (float)fmin(fmax(a.reach, 1.5 * sqrt(f->areas[middle])), m->longest);
         ++m->count, m->rays += rays;
@@ -178,7 +179,7 @@ static void groups_follow_the_rules(void **state) {
             upper = v3_make(fmax(upper.x, x.x), fmax(upper.y, x.y), fmax(upper.z, x.z));
         }
         m.longest = v3_norm(v3_sub(upper, lower)) / 8;
-        const fct_source source = {&r.set, NULL, r.stored, m.longest};
+        const fct_source source = {&r.set, NULL, r.stored, m.longest, NULL};
         float *nearest = malloc(f.mesh.vertex_count * sizeof *nearest);
         uint8_t *covered = malloc(f.mesh.vertex_count);
         for (uint32_t v = 0; v < f.mesh.vertex_count; ++v)
@@ -253,7 +254,7 @@ static void extensions_follow_the_rules(void **state) {
         fct_anchors t, known;
         maker m = {.r = &r, .f = &f, .found = &t, .def = {.rays = 17, .tolerance = .9, .seed = seed}};
         m.def.side = seed % 2 ? -1 : 1, m.longest = 3;
-        const fct_source source = {&r.set, NULL, r.stored, m.longest};
+        const fct_source source = {&r.set, NULL, r.stored, m.longest, NULL};
         const uint32_t all = f.mesh.vertex_count, first = all / 3;
         uint8_t *covered = calloc(all, 1);
         for (uint32_t v = 0; v < all; ++v) covered[v] = v >= first || v % 2;

@@ -204,7 +204,7 @@ static void guided_gathers_equal_their_rays(void **state) {
         fct_element_point p;
         fct_anchor a, b;
         const uint32_t leaf = find_receiver(&x, k, &p);
-        const fct_source source = {&x.r.set, &x.guides, x.r.stored, k % 2 ? .4 : INFINITY};
+        const fct_source source = {&x.r.set, &x.guides, x.r.stored, k % 2 ? .4 : INFINITY, NULL};
         place_anchor(&p, &a);
         b = a;
         if (!fct_guide_aim(&guide, leaf, v3_load(p.position), v3_load(p.normal))) continue;
@@ -231,7 +231,7 @@ static void guided_gathers_are_unbiased(void **state) {
     double plain_variance = 0, guided_variance = 0;
     make_linked(8, true, &x);
     assert_int_equal(fct_guide_create(&x.guides, &guide), FCT_OK);
-    const fct_source source = {&x.r.set, &x.guides, x.r.stored, INFINITY};
+    const fct_source source = {&x.r.set, &x.guides, x.r.stored, INFINITY, NULL};
     for (uint64_t k = 0; k < 12; ++k) {
         fct_element_point p;
         fct_anchor truth, a;
@@ -272,7 +272,7 @@ static void anchors_aim_from_their_side(void **state) {
     const fct_elements *set = &x.r.set;
     assert_int_equal(fct_guide_create(&x.guides, &guide), FCT_OK);
     assert_int_equal(fct_surface_build(&plain, SHADE(x.r.scene, x.r.ball), 10, &f), FCT_OK);
-    const fct_source source = {set, &x.guides, x.r.stored, 1};
+    const fct_source source = {set, &x.guides, x.r.stored, 1, NULL};
     const fct_anchors_def def = {.rays = 24, .tolerance = .4, .side = -1, .instance = x.r.ball, .seed = 7};
     anchors = (fct_anchors){0};
     assert_int_equal(fct_anchors_extend(&plain, &source, &f, &def, &anchors), FCT_OK);
