@@ -392,6 +392,7 @@ static fct_result allocate_progressive(builder *b) {
                                 FCT_ARRAY(m->positions, 3 * nodes),
                                 FCT_ARRAY(m->values, nodes * m->value_count),
                                 FCT_ARRAY(m->corners, b->moved_count),
+                                FCT_ARRAY_ZERO(m->nodes, b->handle_count),
                                 FCT_ARRAY(m->triangles, 3 * faces),
                                 FCT_ARRAY_IF(mesh->materials, m->materials, faces),
                                 FCT_ARRAY_IF(mesh->face_colors, m->face_colors, 3 * faces)};

@@ -27,14 +27,14 @@ void fct_progressive_backward(fct_progressive *m) {
 
 fct_result fct_progressive_begin(fct_progressive *m) {
     const fct_array arrays[] = {
-        FCT_ARRAY_ZERO(m->nodes, m->handle_count), FCT_ARRAY(m->vertices, m->handle_count),
+        FCT_ARRAY(m->vertices, m->handle_count),
         FCT_ARRAY(m->point_vertices, m->texcoord == FCT_NONE ? 0 : m->point_count)};
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a progressive mesh");
     if (result != FCT_OK) return result;
     memset(m->vertices, 0xff, m->handle_count * sizeof *m->vertices);
     if (m->texcoord != FCT_NONE) memset(m->point_vertices, 0xff, m->point_count * sizeof *m->point_vertices);
-    m->level = 0;
-    fct_progressive_forward(m);
+    while (m->level < 1) fct_progressive_forward(m);
+    while (m->level > 1) fct_progressive_backward(m);
     return FCT_OK;
 }
 

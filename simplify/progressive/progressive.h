@@ -55,7 +55,7 @@ struct fct_progressive {
 /* One more step of splits (or of the base mesh), or one less. */
 void fct_progressive_forward(fct_progressive *m);
 void fct_progressive_backward(fct_progressive *m);
-/* Allocates the arrays per handle and point, and does step 0. Errors: MEMORY. */
+/* Allocates the scratch arrays, and goes to the coarsest level. Errors: MEMORY. */
 fct_result fct_progressive_begin(fct_progressive *m);
 
 #endif
