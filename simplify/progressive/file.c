@@ -254,23 +254,28 @@ static fct_result read_file(file_reader *r, fct_progressive *m) {
     return result == FCT_OK ? fct_progressive_begin(m) : result;
 }
 
+fct_result fct_progressive_read(const fct_env *env, const char *name, const unsigned char *data, size_t size,
+                                fct_progressive **out) {
+    *out = NULL;
+    fct_progressive *m = fct_allocate_zero(env, 1, sizeof *m);
+    if (!m) return fct_fail_memory(env, "a progressive mesh");
+    m->env = env;
+    file_reader r = {.env = env, .name = name, .at = data, .end = data + size};
+    fct_result result = read_file(&r, m);
+    if (result == FCT_OK)
+        *out = m;
+    else
+        fct_progressive_destroy(m);
+    return result;
+}
+
 fct_result fct_progressive_load(const fct_env *env, const char *path, fct_progressive **out) {
     *out = NULL;
     fct_file file;
     fct_result result = fct_file_open(env, path, &file);
     if (result != FCT_OK) return result;
-    fct_progressive *m = fct_allocate_zero(env, 1, sizeof *m);
-    if (m) {
-        m->env = env;
-        file_reader r = {.env = env, .name = !strcmp(path, "-") ? "standard input" : path};
-        r.at = file.data, r.end = file.data + file.size;
-        result = read_file(&r, m);
-    } else
-        result = fct_fail_memory(env, "a progressive mesh");
+    const char *name = !strcmp(path, "-") ? "standard input" : path;
+    result = fct_progressive_read(env, name, file.data, file.size, out);
     fct_file_close(env, &file);
-    if (result == FCT_OK)
-        *out = m;
-    else
-        fct_progressive_destroy(m);
     return result;
 }

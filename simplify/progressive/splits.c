@@ -83,9 +83,11 @@ static void code_position(fct_splits *k, int context, const float guess[3], floa
 static uint32_t add_point(fct_splits *k, uint32_t point, int context, const float guess[3], const float *at) {
     uint32_t name = k->point_count;
     stream_point made = {FCT_NONE, FCT_NONE, 0, {0, 0, 0}};
+    float near[3]; /* a copy, because `guess` may be one of `points`, which moves */
+    memcpy(near, guess, sizeof near);
     if (!k->names && (!check_count(k, (size_t)name + 1) || !GROW(k, k->points, k->room.list, name + 1))) return 0;
     if (at) memcpy(made.at, at, sizeof made.at);
-    code_position(k, context, guess, made.at);
+    code_position(k, context, near, made.at);
     k->points[name] = made;
     if (k->names) k->names[point] = name;
     ++k->point_count;

@@ -1,5 +1,6 @@
 /* Progressive mesh files: what is saved is loaded; small; readable from the front; damage is found. */
 #include "levels.h"
+#include "mend_levels.h"
 
 static fct_env env;
 static recorder heard;
@@ -148,6 +149,42 @@ static void damage_is_found(void **state) {
     fct_mesh_release(&env, &torus);
 }
 
+static void require(bool condition, const char *what) {
+    if (!condition) fail_msg("%s", what);
+}
+
+/* Streams with right checksums and wrong contents: an error or valid levels. */
+static void malformed_streams_are_harmless(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 4; ++kind) {
+        fct_mesh torus = make_torus(&env, 6, kind & 1, kind & 2);
+        fct_progressive *made = progressive_of(&env, &torus, fct_simplify_def_default(), 20);
+        assert_int_equal(fct_progressive_save(made, "whole.fpm"), FCT_OK);
+        size_t size;
+        uint32_t read = 0, seed = 1;
+        unsigned char *bytes = read_bytes("whole.fpm", &size), *copy = malloc(size);
+        for (int i = 0; i < 300; ++i) {
+            memcpy(copy, bytes, size);
+            for (int k = 0; k < 1 + i % 3; ++k) {
+                seed = seed * 1664525u + 1013904223u;
+                copy[MEND_HEAD + (seed >> 8) % (size - MEND_HEAD)] ^= (unsigned char)(1 << (seed >> 4) % 8);
+            }
+            mend_levels(copy, size);
+            heard = (recorder){0};
+            if (mend_try_levels(&env, copy, size, require))
+                ++read;
+            else
+                assert_true(strstr(heard.text, "a file: ") == heard.text);
+        }
+        assert_true(read < 290);
+        mend_levels(bytes, size);
+        assert_true(mend_try_levels(&env, bytes, size, require));
+        free(bytes), free(copy);
+        fct_progressive_destroy(made);
+        fct_mesh_release(&env, &torus);
+    }
+}
+
 static void files_are_smaller_than_binary_plys(void **state) {
     (void)state;
     fct_mesh meshes[] = {make_sphere(&env, 60), make_grid(&env, 60), make_torus(&env, 40, false, false),
@@ -170,6 +207,6 @@ int main(void) {
     env.message_user = &heard;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(loads_what_was_saved), cmocka_unit_test(truncated_files_give_coarse_levels),
-        cmocka_unit_test(damage_is_found), cmocka_unit_test(files_are_smaller_than_binary_plys)};
+        cmocka_unit_test(damage_is_found), cmocka_unit_test(malformed_streams_are_harmless), cmocka_unit_test(files_are_smaller_than_binary_plys)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
