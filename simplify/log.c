@@ -25,7 +25,8 @@ static fct_result grow_wedges(fct_simplifier *s, size_t more) {
     fct_log *log = s->log;
     size_t needed = log->wedge_count + more;
     if (needed > FCT_NONE) return fct_fail_memory(s->env, "a log of more than 2^32 wedges");
-    fct_result result = fct_grow(s->env, (void **)&log->wedges, &log->wedge_capacity, needed, sizeof *log->wedges);
+    fct_result result =
+        fct_grow(s->env, (void **)&log->wedges, &log->wedge_capacity, needed, sizeof *log->wedges);
     return result != FCT_OK ? result
                             : fct_grow(s->env, (void **)&log->values, &log->value_capacity,
                                        needed * s->channel_count, sizeof *log->values);
@@ -57,8 +58,8 @@ void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) 
         (fct_record){.kept = a, .gone = b, .key = key, .first_wedge = (uint32_t)log->wedge_count};
 }
 
-/* Writes the attributes of a wedge. Wedges of one class share a vertex, so they get equal colours and normals:
- * those of the first one. */
+/* Writes the attributes of a wedge. Wedges of one class share a vertex, so they get equal colours and
+ * normals: those of the first one. */
 static void write_wedge(fct_simplifier *s, const fct_record *record, uint32_t wedge, float *to) {
     const fct_log *log = s->log;
     const double *from = s->attributes + (size_t)s->channel_count * wedge;
@@ -85,7 +86,8 @@ void fct_log_end(fct_simplifier *s, double error) {
     ++log->count;
 }
 
-fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t points, uint32_t wedges, fct_log **out) {
+fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t points, uint32_t wedges,
+                         fct_log **out) {
     *out = NULL;
     if (!s->log) return FCT_OK;
     if (!s->channel_count) wedges = 0;
@@ -120,7 +122,8 @@ fct_result fct_log_join(fct_simplifier *s, fct_log *logs, uint32_t blocks) {
         if (from->wedge_count) {
             size_t n = s->channel_count;
             memcpy(to->wedges + to->wedge_count, from->wedges, from->wedge_count * sizeof *to->wedges);
-            memcpy(to->values + n * to->wedge_count, from->values, n * from->wedge_count * sizeof *to->values);
+            memcpy(to->values + n * to->wedge_count, from->values,
+                   n * from->wedge_count * sizeof *to->values);
             to->wedge_count += from->wedge_count;
         }
     }

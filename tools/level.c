@@ -18,8 +18,8 @@ enum { KEY_FACES = TOOL_KEY, KEY_RATIO, KEY_MAX_ERROR };
 
 static const struct argp_option level_options_table[] = {
     {"faces", KEY_FACES, "N", 0, "The finest level of at most N faces", 0},
-    {"ratio", KEY_RATIO, "R", 0, "The finest level of at most R times the faces of the finest one, above 0 and at most 1",
-     0},
+    {"ratio", KEY_RATIO, "R", 0,
+     "The finest level of at most R times the faces of the finest one, above 0 and at most 1", 0},
     {"max-error", KEY_MAX_ERROR, "E", 0,
      "The coarsest level without a contraction whose error is above E, in the mesh's unit, as "
      "'facetree simplify' measures it",
@@ -64,7 +64,8 @@ static void choose_level(tool *t, const level_options *o, fct_progressive *progr
     uint32_t found = fct_progressive_go(progressive, wanted);
     if (found > wanted) tool_warn(t, "the coarsest level has %u faces, %u were asked for", found, wanted);
     if (wanted > info.most_faces && info.most_faces < info.total_faces)
-        tool_warn(t, "the file was truncated: the finest level has %u faces, %u were asked for", found, wanted);
+        tool_warn(t, "the file was truncated: the finest level has %u faces, %u were asked for", found,
+                  wanted);
 }
 
 static int run_level(tool *t, void *options) {
@@ -83,14 +84,16 @@ static int run_level(tool *t, void *options) {
     if (code == TOOL_DONE) code = tool_save_mesh(t, t->output, &mesh, 1);
     if (code == TOOL_DONE) {
         double total = tool_seconds() - t->start;
-        tool_say(t, "%u of %u faces, largest error %.3g, %.2f s", mesh.face_count, info.total_faces, info.error, total);
-        code = tool_json(
-            t, json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:{s:f, s:f, s:f, s:f}, s:I}", "faces",
-                         (json_int_t)mesh.face_count, "vertices", (json_int_t)mesh.vertex_count, "least_faces",
-                         (json_int_t)info.least_faces, "most_faces", (json_int_t)info.most_faces, "total_faces",
-                         (json_int_t)info.total_faces, "splits", (json_int_t)info.split_count, "max_cost",
-                         info.error, "seconds", "read", read, "level", found - read, "write", total - found,
-                         "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
+        tool_say(t, "%u of %u faces, largest error %.3g, %.2f s", mesh.face_count, info.total_faces,
+                 info.error, total);
+        code = tool_json(t, json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:{s:f, s:f, s:f, s:f}, s:I}",
+                                      "faces", (json_int_t)mesh.face_count, "vertices",
+                                      (json_int_t)mesh.vertex_count, "least_faces",
+                                      (json_int_t)info.least_faces, "most_faces", (json_int_t)info.most_faces,
+                                      "total_faces", (json_int_t)info.total_faces, "splits",
+                                      (json_int_t)info.split_count, "max_cost", info.error, "seconds", "read",
+                                      read, "level", found - read, "write", total - found, "total", total,
+                                      "peak_bytes", (json_int_t)tool_peak_bytes()));
     }
     fct_mesh_release(&t->env, &mesh);
     fct_progressive_destroy(progressive);
@@ -103,13 +106,16 @@ int tool_level(int argc, char **argv) {
         .name = "level",
         .synopsis = "IN.fpm -o OUT",
         .summary = "write a level of a progressive mesh",
-        .text = "IN is a progressive mesh, which 'facetree simplify --progressive' writes; OUT is a mesh. A level is "
-                "the "
-                "result of 'facetree simplify --refit 0', and the finest level has the faces of the input. Of a "
-                "truncated file the coarse levels can be read.\n\n"
-                "JSON keys: faces, vertices, least_faces and most_faces (of the levels that were read), total_faces "
-                "(of the finest level), splits, max_cost (the largest error of a contraction), "
-                "seconds{read, level, write, total}, peak_bytes.",
+        .text =
+            "IN is a progressive mesh, which 'facetree simplify --progressive' writes; OUT is a mesh. A "
+            "level is "
+            "the "
+            "result of 'facetree simplify --refit 0', and the finest level has the faces of the input. Of a "
+            "truncated file the coarse levels can be read.\n\n"
+            "JSON keys: faces, vertices, least_faces and most_faces (of the levels that were read), "
+            "total_faces "
+            "(of the finest level), splits, max_cost (the largest error of a contraction), "
+            "seconds{read, level, write, total}, peak_bytes.",
         .examples = "  facetree level bunny.fpm --faces 5000 -o small.ply\n"
                     "  facetree level bunny.fpm --ratio .5 -o half.glb",
         .options = level_options_table,

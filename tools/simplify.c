@@ -1,4 +1,5 @@
-/* tools/simplify.c: facetree simplify: fewer triangles with the same shape and colours; progressive meshes. */
+/* tools/simplify.c: facetree simplify: fewer triangles with the same shape and colours; progressive meshes.
+ */
 #include "tools/commands.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@
 typedef struct simplify_options {
     fct_simplify_def def;
     bool faces_given, error_given, attributes_given;
-    double ratio;      /* 0: not given */
+    double ratio; /* 0: not given */
     const char *progressive;
     double weights[3]; /* of color, uv, normal; negative: the default; NAN: not in the list */
 } simplify_options;

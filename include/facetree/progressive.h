@@ -45,10 +45,10 @@ FCT_API void fct_progressive_destroy(fct_progressive *progressive);
 typedef struct fct_progressive_info {
     uint32_t least_faces, most_faces; /* of the coarsest level, and of the finest one that was read */
     uint32_t split_count;             /* number of levels, less one */
-    uint32_t total_faces;             /* of the finest level; more than most_faces if the file was truncated */
-    uint32_t faces;                   /* of the current level */
-    double error; /* the largest error of a contraction that the current level has, as fct_simplify_def.max_error
-                     measures it */
+    uint32_t total_faces; /* of the finest level; more than most_faces if the file was truncated */
+    uint32_t faces;       /* of the current level */
+    double error;         /* the largest error of a contraction that the current level has, as
+                             fct_simplify_def.max_error         measures it */
 } fct_progressive_info;
 FCT_API void fct_progressive_inspect(const fct_progressive *progressive, fct_progressive_info *out);
 
@@ -62,12 +62,13 @@ FCT_API uint32_t fct_progressive_go_error(fct_progressive *progressive, double e
 /* The mesh of the current level. Cost: proportional to its size. Errors: MEMORY. */
 FCT_API fct_result fct_progressive_mesh(fct_progressive *progressive, fct_mesh *out);
 /* A geomorph between the current level and the coarser one that fct_progressive_go would choose for `faces`:
- * the faces of the current level, with vertices at (1 - t) a + t b, where b is the vertex of the current level
- * and a the vertex of the coarser level that it belongs to. Attributes follow likewise, and normals get unit
- * length. t is in [0, 1]. At 0 the surface is that of the coarser level. A body that the coarser level does not
- * have keeps its place. Cost: proportional to the size of the current level, plus the splits in between.
- * Errors: DATA (t), MEMORY. */
-FCT_API fct_result fct_progressive_morph(fct_progressive *progressive, uint32_t faces, double t, fct_mesh *out);
+ * the faces of the current level, with vertices at (1 - t) a + t b, where b is the vertex of the current
+ * level and a the vertex of the coarser level that it belongs to. Attributes follow likewise, and normals get
+ * unit length. t is in [0, 1]. At 0 the surface is that of the coarser level. A body that the coarser level
+ * does not have keeps its place. Cost: proportional to the size of the current level, plus the splits in
+ * between. Errors: DATA (t), MEMORY. */
+FCT_API fct_result fct_progressive_morph(fct_progressive *progressive, uint32_t faces, double t,
+                                         fct_mesh *out);
 
 #ifdef __cplusplus
 }

@@ -3,10 +3,10 @@
  * 1. Sort the records by their keys, so that levels in the middle of a sweep are even.
  * 2. Repeat the contractions on the faces of the input. Each one ends nodes and faces. They are listed, with
  *    the corners that move away from the ended nodes.
- * 3. What remains is the base mesh. Write the lists in reverse: the items of the last contraction follow those
- *    of the base mesh.
- * Handles are wedges of the simplifier (without attributes: points). When wedges merge, that of the kept point
- * stays, so that few corners move. Cost: linear, plus the rings of vanished points.
+ * 3. What remains is the base mesh. Write the lists in reverse: the items of the last contraction follow
+ * those of the base mesh. Handles are wedges of the simplifier (without attributes: points). When wedges
+ * merge, that of the kept point stays, so that few corners move. Cost: linear, plus the rings of vanished
+ * points.
  */
 #include "simplify/progressive/build.h"
 
@@ -49,7 +49,7 @@ typedef struct builder {
     uint32_t *removed, removed_count; /* faces */
     uint32_t *moved;                  /* corners */
     size_t moved_count, moved_capacity;
-    uint32_t ring[2 * SIMPLIFY_HUB], ring_count; /* the corners of the point that goes */
+    uint32_t ring[2 * SIMPLIFY_HUB], ring_count;      /* the corners of the point that goes */
     uint32_t old[4 * SIMPLIFY_MAX_WEDGES], old_count; /* the handles at both points */
 } builder;
 
@@ -196,7 +196,8 @@ static fct_result end_node(builder *b, uint32_t handle, uint32_t parent, const f
     size_t first = b->moved_count;
     fct_result result = FCT_OK;
     for (uint32_t i = 0; i < b->ring_count && to != handle && result == FCT_OK; ++i)
-        if (b->handles[b->ring[i]] == handle && !b->dead[b->ring[i] / 3]) result = move_corner(b, b->ring[i], to);
+        if (b->handles[b->ring[i]] == handle && !b->dead[b->ring[i] / 3])
+            result = move_corner(b, b->ring[i], to);
     bool kept = to != handle && b->handle_points[handle] == r->kept;
     for (uint32_t c = kept ? b->first_corners[r->kept] : FCT_NONE; c != FCT_NONE && result == FCT_OK;
          c = b->next_corners[c])
@@ -341,7 +342,8 @@ static void write_face(builder *b, uint32_t f, uint32_t to) {
     memcpy(m->triangles + 3 * (size_t)to, b->handles + 3 * (size_t)f, 3 * sizeof *m->triangles);
     if (m->materials) m->materials[to] = mesh->materials[f];
     if (m->face_colors)
-        memcpy(m->face_colors + 3 * (size_t)to, mesh->face_colors + 3 * (size_t)f, 3 * sizeof *m->face_colors);
+        memcpy(m->face_colors + 3 * (size_t)to, mesh->face_colors + 3 * (size_t)f,
+               3 * sizeof *m->face_colors);
 }
 
 /* Writes the base mesh: the nodes and faces that are left. */
@@ -420,7 +422,8 @@ static fct_result write_progressive(builder *b) {
                                 FCT_ARRAY(numbers, b->node_count)};
     fct_result result = allocate_progressive(b);
     if (result == FCT_OK) result = copy_names(b->s->mesh, m);
-    if (result == FCT_OK) result = fct_allocate_all(b->s->env, arrays, FCT_LENGTH(arrays), "numbers of nodes");
+    if (result == FCT_OK)
+        result = fct_allocate_all(b->s->env, arrays, FCT_LENGTH(arrays), "numbers of nodes");
     if (result != FCT_OK) return result;
     memset(numbers, 0xff, b->node_count * sizeof *numbers);
     m->step_count = b->step_count + 1;

@@ -5,10 +5,10 @@
 
 enum {
     PROBABILITY_BITS = 12,
-    RATE = 5,                /* a model moves by 1/32 of its distance to the bit */
-    CLASS_BITS = 6,          /* of a count of bits, 0 to 32 */
-    CHUNK_BITS = 16,         /* of a uniform value at once, so that range / total stays large */
-    LAST_SHIFTS = 5          /* four move `low` out, one more the pending byte */
+    RATE = 5,        /* a model moves by 1/32 of its distance to the bit */
+    CLASS_BITS = 6,  /* of a count of bits, 0 to 32 */
+    CHUNK_BITS = 16, /* of a uniform value at once, so that range / total stays large */
+    LAST_SHIFTS = 5  /* four move `low` out, one more the pending byte */
 };
 #define LEAST_RANGE ((uint32_t)1 << 24)
 
@@ -17,8 +17,7 @@ void fct_models_begin(fct_model *models, size_t count) {
 }
 
 static void put_byte(fct_coder *c, unsigned char byte) {
-    if (c->result == FCT_OK)
-        c->result = fct_grow(c->env, (void **)&c->bytes, &c->capacity, c->count + 1, 1);
+    if (c->result == FCT_OK) c->result = fct_grow(c->env, (void **)&c->bytes, &c->capacity, c->count + 1, 1);
     if (c->result == FCT_OK) c->bytes[c->count++] = byte;
 }
 
@@ -119,7 +118,8 @@ uint32_t fct_code_uniform(fct_coder *c, uint32_t total, uint32_t value) {
 uint32_t fct_code_number(fct_coder *c, fct_number_models *models, uint32_t value) {
     uint32_t bits = 0, node = 1;
     while (bits < 32 && value >> bits) ++bits;
-    for (int i = CLASS_BITS; i-- > 0;) node = 2 * node | fct_code_bit(c, &models->classes[node], bits >> i & 1);
+    for (int i = CLASS_BITS; i-- > 0;)
+        node = 2 * node | fct_code_bit(c, &models->classes[node], bits >> i & 1);
     bits = node - CODER_CLASSES;
     if (bits > 32) bits = 32; /* only in a damaged stream */
     if (bits <= 1) return bits;

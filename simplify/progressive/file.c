@@ -19,7 +19,14 @@ enum {
     MOST_BLOCK = 4096, /* splits of a block */
 };
 
-enum { HAS_COLORS = 1, HAS_NORMALS = 2, HAS_TEXCOORDS = 4, HAS_FACE_COLORS = 8, HAS_MATERIALS = 16, HAS_NAMES = 32 };
+enum {
+    HAS_COLORS = 1,
+    HAS_NORMALS = 2,
+    HAS_TEXCOORDS = 4,
+    HAS_FACE_COLORS = 8,
+    HAS_MATERIALS = 16,
+    HAS_NAMES = 32
+};
 
 typedef struct file_head {
     unsigned char magic[8];
@@ -41,7 +48,10 @@ static const unsigned char magic[8] = {0x89, 'F', 'P', 'M', '\r', '\n', 0x1a, '\
 
 /* The steps of a block that begins with `step`. */
 static uint32_t find_block_steps(uint32_t step, uint32_t step_count, uint32_t before) {
-    uint32_t steps = step == 0 ? 1 : step == 1 ? FIRST_BLOCK : 2 * before < MOST_BLOCK ? 2 * before : MOST_BLOCK;
+    uint32_t steps = step == 0                 ? 1
+                     : step == 1               ? FIRST_BLOCK
+                     : 2 * before < MOST_BLOCK ? 2 * before
+                                               : MOST_BLOCK;
     return steps < step_count - step ? steps : step_count - step;
 }
 
@@ -64,7 +74,8 @@ static fct_result write_head(const fct_progressive *m, FILE *stream) {
                  (m->materials ? HAS_MATERIALS : 0) | (m->material_names ? HAS_NAMES : 0);
     memcpy(head.origin, m->origin, sizeof head.origin);
     size_t size = 0;
-    for (uint32_t i = 0; m->material_names && i < m->material_count; ++i) size += strlen(m->material_names[i]) + 1;
+    for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
+        size += strlen(m->material_names[i]) + 1;
     if (size > UINT32_MAX) return fct_fail_memory(m->env, "material names");
     char *names = fct_allocate(m->env, size, 1), *to = names;
     if (!names) return fct_fail_memory(m->env, "material names");
@@ -131,8 +142,9 @@ static const char *find_head_fault(const file_head *head, const unsigned char *d
     if (head->version != VERSION) return "another version of the format";
     if (head->names_size > size - sizeof *head) return "truncated in the head";
     if (head->checksum != hash_head(head, (const char *)data + sizeof *head)) return "damaged head";
-    if (head->face_count >= INT32_MAX || head->split_count >= INT32_MAX || head->base_faces > head->face_count ||
-        head->flags >= 2 * HAS_NAMES || head->material_count >= INT32_MAX)
+    if (head->face_count >= INT32_MAX || head->split_count >= INT32_MAX ||
+        head->base_faces > head->face_count || head->flags >= 2 * HAS_NAMES ||
+        head->material_count >= INT32_MAX)
         return "counts or flags out of range";
     if ((head->flags & HAS_NAMES) && head->material_count > head->names_size) return "names are missing";
     for (int i = 0; i < 3; ++i)
@@ -199,16 +211,18 @@ static fct_result read_block(file_reader *r, uint32_t steps, bool *truncated) {
 
 static fct_result check_counts(const file_reader *r, bool truncated) {
     const fct_progressive *m = r->k->m;
-    if (m->step_count == 0) return fct_fail(r->env, FCT_ERROR_DATA, "%s: truncated in the base mesh", r->name);
+    if (m->step_count == 0)
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: truncated in the base mesh", r->name);
     if (m->step_faces[1] != r->head.base_faces || m->face_count > r->head.face_count ||
         (!truncated && m->face_count != r->head.face_count))
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: %" PRIu32 " faces, expected %" PRIu32, r->name, m->face_count,
-                        r->head.face_count);
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: %" PRIu32 " faces, expected %" PRIu32, r->name,
+                        m->face_count, r->head.face_count);
     if (!truncated && r->at < r->end)
         return fct_fail(r->env, FCT_ERROR_DATA, "%s: something is appended", r->name);
     if (truncated)
-        fct_note(r->env, FCT_MESSAGE_WARNING, "%s: truncated: levels of up to %" PRIu32 " of %" PRIu32 " faces",
-                 r->name, m->face_count, r->head.face_count);
+        fct_note(r->env, FCT_MESSAGE_WARNING,
+                 "%s: truncated: levels of up to %" PRIu32 " of %" PRIu32 " faces", r->name, m->face_count,
+                 r->head.face_count);
     return FCT_OK;
 }
 
@@ -227,7 +241,8 @@ static fct_result read_blocks(file_reader *r) {
 static fct_result read_head(file_reader *r, fct_progressive *m) {
     size_t size = (size_t)(r->end - r->at);
     if (size < sizeof magic || memcmp(r->at, magic, sizeof magic))
-        return fct_fail(r->env, FCT_ERROR_DATA, "%s: no progressive mesh: it does not begin with its mark", r->name);
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: no progressive mesh: it does not begin with its mark",
+                        r->name);
     if (size < sizeof r->head) return fct_fail(r->env, FCT_ERROR_DATA, "%s: truncated in the head", r->name);
     memcpy(&r->head, r->at, sizeof r->head);
     const char *fault = find_head_fault(&r->head, r->at, size);

@@ -10,7 +10,8 @@ void fct_progressive_forward(fct_progressive *m) {
     for (uint32_t n = m->step_nodes[step]; n < m->step_nodes[step + 1]; ++n) {
         uint32_t h = m->handles[n];
         m->nodes[h] = n;
-        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i) m->triangles[m->corners[i]] = h;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
+            m->triangles[m->corners[i]] = h;
     }
 }
 
@@ -21,14 +22,14 @@ void fct_progressive_backward(fct_progressive *m) {
         if (parent == FCT_NONE) continue;
         uint32_t h = m->handles[parent];
         m->nodes[h] = parent;
-        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i) m->triangles[m->corners[i]] = h;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
+            m->triangles[m->corners[i]] = h;
     }
 }
 
 fct_result fct_progressive_begin(fct_progressive *m) {
-    const fct_array arrays[] = {
-        FCT_ARRAY(m->vertices, m->handle_count),
-        FCT_ARRAY(m->point_vertices, m->texcoord == FCT_NONE ? 0 : m->point_count)};
+    const fct_array arrays[] = {FCT_ARRAY(m->vertices, m->handle_count),
+                                FCT_ARRAY(m->point_vertices, m->texcoord == FCT_NONE ? 0 : m->point_count)};
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a progressive mesh");
     if (result != FCT_OK) return result;
     memset(m->vertices, 0xff, m->handle_count * sizeof *m->vertices);
@@ -42,9 +43,9 @@ void fct_progressive_destroy(fct_progressive *m) {
     if (!m) return;
     for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
         fct_release(m->env, m->material_names[i]);
-    void *arrays[] = {m->material_names, m->step_nodes, m->step_faces, m->errors,    m->parents,
-                      m->handles,        m->points,     m->corners,    m->positions, m->first_corners,
-                      m->values,         m->triangles,  m->materials,  m->nodes,     m->face_colors,
+    void *arrays[] = {m->material_names, m->step_nodes,    m->step_faces, m->errors,    m->parents,
+                      m->handles,        m->points,        m->corners,    m->positions, m->first_corners,
+                      m->values,         m->triangles,     m->materials,  m->nodes,     m->face_colors,
                       m->vertices,       m->point_vertices};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(m->env, arrays[i]);
     fct_release(m->env, m);

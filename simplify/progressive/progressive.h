@@ -1,14 +1,14 @@
 /* simplify/progressive/progressive.h: the data of a progressive mesh.
  *
- *     corner --> handle --> node       Node: one version of a wedge (state.h): position and attributes at some
- *                                      levels. Nodes never change. The parent of a node is the node that
- *                 node (parent)        replaces it in the coarser level.
- *                /             \       Handle: what corners refer to; it has one node at each level. So a split
- *             node             node    only changes the corners that go to the new point.
+ *     corner --> handle --> node       Node: one version of a wedge (state.h): position and attributes at
+ * some levels. Nodes never change. The parent of a node is the node that node (parent)        replaces it in
+ * the coarser level. /             \       Handle: what corners refer to; it has one node at each level. So a
+ * split node             node    only changes the corners that go to the new point.
  *
  * Step 0 adds the base mesh. Each further step is a vertex split: it adds nodes and faces and moves corners
  * to the handles of new nodes. The items of all arrays are in the order of the steps. So the faces of a level
- * are the first ones, and node n exists at the levels after step s if n < step_nodes[s + 1] and no child does.
+ * are the first ones, and node n exists at the levels after step s if n < step_nodes[s + 1] and no child
+ * does.
  */
 #ifndef FCT_SIMPLIFY_PROGRESSIVE_H
 #define FCT_SIMPLIFY_PROGRESSIVE_H
@@ -32,7 +32,8 @@ struct fct_progressive {
 
     /* Per step; step_nodes and step_faces have one more entry. */
     uint32_t *step_nodes, *step_faces; /* the first node and face of each step */
-    float *errors; /* of the contraction that the step undoes, and of all before it: the largest. Not of step 0 */
+    float *errors; /* of the contraction that the step undoes, and of all before it: the largest. Not of step
+                      0 */
     /* Per node; first_corners has one more entry. */
     uint32_t *parents; /* FCT_NONE: the point is new */
     uint32_t *handles;
@@ -42,7 +43,8 @@ struct fct_progressive {
     float *values;           /* x value_count */
     uint32_t *corners;
     /* Per face. */
-    uint32_t *triangles; /* x 3, handles at the current level; for faces of finer levels those at their birth */
+    uint32_t
+        *triangles; /* x 3, handles at the current level; for faces of finer levels those at their birth */
     uint32_t *materials; /* NULL: absent */
     float *face_colors;  /* x 3, NULL: absent */
     /* Per handle. */

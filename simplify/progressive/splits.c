@@ -85,7 +85,8 @@ static uint32_t add_point(fct_splits *k, uint32_t point, int context, const floa
     stream_point made = {FCT_NONE, FCT_NONE, 0, {0, 0, 0}};
     float near[3]; /* a copy, because `guess` may be one of `points`, which moves */
     memcpy(near, guess, sizeof near);
-    if (!k->names && (!check_count(k, (size_t)name + 1) || !GROW(k, k->points, k->room.list, name + 1))) return 0;
+    if (!k->names && (!check_count(k, (size_t)name + 1) || !GROW(k, k->points, k->room.list, name + 1)))
+        return 0;
     if (at) memcpy(made.at, at, sizeof made.at);
     code_position(k, context, near, made.at);
     k->points[name] = made;
@@ -96,8 +97,9 @@ static uint32_t add_point(fct_splits *k, uint32_t point, int context, const floa
 
 enum { ATTRIBUTES = 3 };
 
-/* Fills in the guess of the values of a node whose parent has `parent` (FCT_NONE: none), and the context of each
- * attribute: 0: as the parent; 1: opposite to the node at the other end; 2: as another node of this end. */
+/* Fills in the guess of the values of a node whose parent has `parent` (FCT_NONE: none), and the context of
+ * each attribute: 0: as the parent; 1: opposite to the node at the other end; 2: as another node of this end.
+ */
 static void guess_values(const fct_splits *k, uint32_t parent, uint32_t group, bool second, float *guess,
                          int contexts[PROGRESSIVE_VALUES]) {
     const fct_progressive *m = k->m;
@@ -134,7 +136,8 @@ static uint32_t code_node(fct_splits *k, uint32_t node, uint32_t parent, uint32_
     if (!k->names) {
         node = m->node_count;
         if (!check_count(k, (size_t)node + 1) || !GROW(k, m->parents, k->room.parents, node + 1) ||
-            !GROW(k, m->handles, k->room.handles, node + 1) || !GROW(k, m->points, k->room.points, node + 1) ||
+            !GROW(k, m->handles, k->room.handles, node + 1) ||
+            !GROW(k, m->points, k->room.points, node + 1) ||
             !GROW(k, m->first_corners, k->room.first_corners, (size_t)node + 2) ||
             !GROW(k, m->positions, k->room.positions, 3 * ((size_t)node + 1)) ||
             !GROW(k, m->values, k->room.values, n * ((size_t)node + 1)))
@@ -149,7 +152,8 @@ static uint32_t code_node(fct_splits *k, uint32_t node, uint32_t parent, uint32_
     if (n) guess_values(k, parent, group, point == k->born, guess, contexts);
     for (size_t i = 0; i < n; ++i) {
         float *value = &m->values[n * node + i];
-        float coded = fct_code_float(&k->coder, &k->models.value[contexts[i]][i], guess[i], k->names ? *value : 0);
+        float coded =
+            fct_code_float(&k->coder, &k->models.value[contexts[i]][i], guess[i], k->names ? *value : 0);
         if (!isfinite(coded)) fail_stream(k);
         if (!k->names) *value = coded;
     }
@@ -229,8 +233,7 @@ static void apply_ring(fct_splits *k) {
         uint32_t keeper = FCT_NONE;
         for (uint32_t i = 0; i < k->member_count; ++i) {
             const stream_member *x = &k->members[i];
-            if (x->group == k->groups[g] &&
-                (keeper == FCT_NONE || (k->members[keeper].second && !x->second)))
+            if (x->group == k->groups[g] && (keeper == FCT_NONE || (k->members[keeper].second && !x->second)))
                 keeper = i;
         }
         give_handle(k, k->members[keeper].node, k->groups[g]);
@@ -240,7 +243,8 @@ static void apply_ring(fct_splits *k) {
         if (h == FCT_NONE) h = give_handle(k, node, FCT_NONE);
         m->first_corners[node] = m->corner_count;
         for (uint32_t r = 0; r < k->ring_count && h != k->members[i].group; ++r) {
-            if (k->ring[r].member != i || !GROW(k, m->corners, k->room.corners, m->corner_count + 1)) continue;
+            if (k->ring[r].member != i || !GROW(k, m->corners, k->room.corners, m->corner_count + 1))
+                continue;
             m->corners[m->corner_count++] = k->ring[r].corner;
             m->triangles[k->ring[r].corner] = h;
         }
@@ -322,7 +326,8 @@ static void code_end_corner(fct_splits *k, size_t c, bool second) {
         if (k->members[i].node == wanted) place = count;
         found[count++] = i;
     }
-    bool made = count == 0 || (m->value_count && fct_code_bit(&k->coder, &k->models.new_member, place == FCT_NONE));
+    bool made =
+        count == 0 || (m->value_count && fct_code_bit(&k->coder, &k->models.new_member, place == FCT_NONE));
     if (!made) {
         uint32_t i = found[fct_code_uniform(&k->coder, count, place)];
         if (!k->names) m->triangles[c] = m->handles[k->members[i].node];
@@ -334,8 +339,7 @@ static void code_end_corner(fct_splits *k, size_t c, bool second) {
     group = fct_code_uniform(&k->coder, k->group_count, group);
     if (!k->names) parent = k->group_parents[group];
     uint32_t member = add_member(k, wanted, parent, FCT_NONE, second);
-    if (k->result == FCT_OK && !k->names)
-        m->triangles[c] = give_handle(k, k->members[member].node, FCT_NONE);
+    if (k->result == FCT_OK && !k->names) m->triangles[c] = give_handle(k, k->members[member].node, FCT_NONE);
 }
 
 /* Codes the handle of corner c of a new face at a point that other faces may use. */
@@ -384,7 +388,8 @@ static uint32_t code_point(fct_splits *k, size_t c) {
         return add_point(k, point, 2, guess, k->names ? m->positions + 3 * (size_t)node : NULL);
     }
     uint32_t last = k->point_count - 1;
-    uint32_t distance = fct_code_number(&k->coder, &k->models.distance, k->names ? last - k->names[point] : 0);
+    uint32_t distance =
+        fct_code_number(&k->coder, &k->models.distance, k->names ? last - k->names[point] : 0);
     if (distance > last) fail_stream(k);
     return k->result == FCT_OK ? last - distance : 0;
 }
@@ -396,7 +401,8 @@ static uint32_t code_apex(fct_splits *k, size_t c, uint32_t *guess) {
     for (uint32_t i = 0; i < k->neighbour_count && k->names; ++i)
         if (k->neighbours[i] == wanted) place = i;
     bool listed = place < k->neighbour_count;
-    if (!k->neighbour_count || !fct_code_bit(&k->coder, &k->models.neighbour, listed)) return code_point(k, c);
+    if (!k->neighbour_count || !fct_code_bit(&k->coder, &k->models.neighbour, listed))
+        return code_point(k, c);
     place = fct_code_uniform(&k->coder, k->neighbour_count, place);
     *guess = k->neighbour_faces[place];
     return k->neighbours[place];
@@ -417,9 +423,11 @@ static void code_look(fct_splits *k, uint32_t f, uint32_t guess) {
     static const float black[3] = {0, 0, 0};
     float *own = m->face_colors + 3 * (size_t)f;
     const float *other = f ? m->face_colors + 3 * (size_t)guess : black;
-    bool differs = fct_code_bit(&k->coder, &k->models.face_color, k->names && memcmp(own, other, sizeof black));
+    bool differs =
+        fct_code_bit(&k->coder, &k->models.face_color, k->names && memcmp(own, other, sizeof black));
     for (int i = 0; i < 3; ++i) {
-        own[i] = differs ? fct_code_float(&k->coder, &k->models.color, other[i], k->names ? own[i] : 0) : other[i];
+        own[i] =
+            differs ? fct_code_float(&k->coder, &k->models.color, other[i], k->names ? own[i] : 0) : other[i];
         if (!isfinite(own[i])) fail_stream(k);
     }
 }

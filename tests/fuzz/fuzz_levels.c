@@ -1,4 +1,5 @@
-/* Whatever the bytes are, with corrected checksums: an error, or a progressive mesh whose levels are meshes. */
+/* Whatever the bytes are, with corrected checksums: an error, or a progressive mesh whose levels are meshes.
+ */
 #include "fuzz/fuzz.h"
 #include "simplify/mend_levels.h"
 

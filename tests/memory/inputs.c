@@ -75,7 +75,8 @@ static void write_inputs(void) {
     fct_simplify_def def = fct_simplify_def_default();
     fct_progressive *progressive;
     fct_mesh simple;
-    assert_int_equal(fct_simplify_progressive(&inputs.env, &inputs.sheet, &def, &simple, NULL, &progressive), FCT_OK);
+    assert_int_equal(fct_simplify_progressive(&inputs.env, &inputs.sheet, &def, &simple, NULL, &progressive),
+                     FCT_OK);
     assert_int_equal(fct_progressive_save(progressive, IN "sheet.fpm"), FCT_OK);
     fct_progressive_destroy(progressive);
     fct_mesh_release(&inputs.env, &simple);

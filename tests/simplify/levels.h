@@ -5,9 +5,9 @@
 #include "facetree/progressive.h"
 #include "shapes.h"
 
-/* A face as floats: per corner position, texture coordinates, colour and normal; then face colour and material.
- * With texture coordinates the colours and normals of corners are left out: a vertex on a seam has several
- * wedges, and fct_simplify writes the last one, but a progressive mesh the first one. */
+/* A face as floats: per corner position, texture coordinates, colour and normal; then face colour and
+ * material. With texture coordinates the colours and normals of corners are left out: a vertex on a seam has
+ * several wedges, and fct_simplify writes the last one, but a progressive mesh the first one. */
 enum { FACE_WORDS = 37 };
 
 static inline void describe_face(const fct_mesh *mesh, uint32_t f, float *to) {
@@ -54,7 +54,8 @@ static inline bool same_mesh(const fct_mesh *a, const fct_mesh *b) {
     return v == b->vertex_count && f == b->face_count && same_array(a->positions, b->positions, 12 * v) &&
            same_array(a->triangles, b->triangles, 12 * f) && same_array(a->colors, b->colors, 12 * v) &&
            same_array(a->normals, b->normals, 12 * v) && same_array(a->texcoords, b->texcoords, 24 * f) &&
-           same_array(a->face_colors, b->face_colors, 12 * f) && same_array(a->materials, b->materials, 4 * f);
+           same_array(a->face_colors, b->face_colors, 12 * f) &&
+           same_array(a->materials, b->materials, 4 * f);
 }
 
 /* The progressive mesh of a simplification to `faces` without refit. */
@@ -86,8 +87,8 @@ static inline fct_mesh level_mesh(fct_progressive *progressive, uint32_t faces) 
 static inline fct_mesh make_torus(const fct_env *env, uint32_t n, bool hard, bool seams) {
     fct_mesh mesh;
     uint32_t m = 2 * n, squares = n * m;
-    unsigned kinds = FCT_MESH_COLORS | FCT_MESH_NORMALS | (seams ? FCT_MESH_TEXCOORDS : 0) | FCT_MESH_MATERIALS |
-                     FCT_MESH_FACE_COLORS;
+    unsigned kinds = FCT_MESH_COLORS | FCT_MESH_NORMALS | (seams ? FCT_MESH_TEXCOORDS : 0) |
+                     FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS;
     assert_int_equal(fct_mesh_create(env, hard ? 4 * squares : squares, 2 * squares, kinds, &mesh), FCT_OK);
     static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
     for (uint32_t q = 0; q < squares; ++q)
@@ -112,7 +113,8 @@ static inline fct_mesh make_torus(const fct_env *env, uint32_t n, bool hard, boo
         }
     for (uint32_t f = 0; f < 2 * squares; ++f) {
         mesh.materials[f] = f / 2 % m < n;
-        for (uint32_t k = 0; k < 3; ++k) mesh.face_colors[3 * f + k] = f / 2 / m < n / 2 ? .8f : .1f * (float)k;
+        for (uint32_t k = 0; k < 3; ++k)
+            mesh.face_colors[3 * f + k] = f / 2 / m < n / 2 ? .8f : .1f * (float)k;
     }
     mesh.material_count = 2;
     mesh.origin[1] = 1000;

@@ -9,7 +9,14 @@
 
 #include "simplify/progressive/progressive.h"
 
-enum { MEND_HEAD = 72, MEND_HEAD_SUM = 16, MEND_NAMES = 24, MEND_BLOCK = 16, MEND_BLOCK_SIZE = 4, MEND_BLOCK_SUM = 8 };
+enum {
+    MEND_HEAD = 72,
+    MEND_HEAD_SUM = 16,
+    MEND_NAMES = 24,
+    MEND_BLOCK = 16,
+    MEND_BLOCK_SIZE = 4,
+    MEND_BLOCK_SUM = 8
+};
 
 /* Corrects the checksums, because otherwise every change would fail there. */
 static inline void mend_levels(uint8_t *data, size_t size) {

@@ -70,8 +70,11 @@ static void check_round_trip(const fct_mesh *mesh, uint32_t faces) {
 
 static void loads_what_was_saved(void **state) {
     (void)state;
-    fct_mesh meshes[] = {make_sphere(&env, 20), make_grid(&env, 20), make_cube(&env, 8),
-                         make_torus(&env, 12, false, false), make_torus(&env, 12, false, true),
+    fct_mesh meshes[] = {make_sphere(&env, 20),
+                         make_grid(&env, 20),
+                         make_cube(&env, 8),
+                         make_torus(&env, 12, false, false),
+                         make_torus(&env, 12, false, true),
                          make_torus(&env, 12, true, true)};
     for (size_t i = 0; i < FCT_LENGTH(meshes); ++i) {
         check_round_trip(&meshes[i], 0);
@@ -106,7 +109,8 @@ static void truncated_files_give_coarse_levels(void **state) {
         fct_progressive_info info;
         fct_progressive_inspect(read, &info);
         assert_int_equal(info.total_faces, torus.face_count);
-        assert_in_range(info.most_faces, last > info.least_faces ? last : info.least_faces, torus.face_count - 1);
+        assert_in_range(info.most_faces, last > info.least_faces ? last : info.least_faces,
+                        torus.face_count - 1);
         last = info.most_faces;
         fct_mesh x = level_mesh(read, FCT_NONE), y = level_mesh(made, last);
         assert_true(same_mesh(&x, &y));
@@ -207,6 +211,7 @@ int main(void) {
     env.message_user = &heard;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(loads_what_was_saved), cmocka_unit_test(truncated_files_give_coarse_levels),
-        cmocka_unit_test(damage_is_found), cmocka_unit_test(malformed_streams_are_harmless), cmocka_unit_test(files_are_smaller_than_binary_plys)};
+        cmocka_unit_test(damage_is_found), cmocka_unit_test(malformed_streams_are_harmless),
+        cmocka_unit_test(files_are_smaller_than_binary_plys)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
