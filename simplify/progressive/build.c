@@ -375,7 +375,7 @@ static void write_step(builder *b, uint32_t i, uint32_t *face_places, uint32_t *
         write_face(b, b->removed[face], m->face_count - 1);
     }
     uint32_t step = b->step_count - i;
-    m->errors[step] = b->steps[i].error;
+    m->errors[step] = i ? b->steps[i - 1].error : 0;
     m->step_nodes[step + 1] = m->node_count, m->step_faces[step + 1] = m->face_count;
 }
 
@@ -428,6 +428,7 @@ static fct_result write_progressive(builder *b) {
     memset(numbers, 0xff, b->node_count * sizeof *numbers);
     m->step_count = b->step_count + 1;
     m->step_nodes[0] = m->step_faces[0] = 0;
+    m->errors[0] = b->step_count ? b->steps[b->step_count - 1].error : 0;
     write_base(b, face_places, numbers);
     for (uint32_t i = b->step_count; i-- > 0;) write_step(b, i, face_places, numbers);
     m->first_corners[m->node_count] = m->corner_count;

@@ -51,17 +51,13 @@ void fct_progressive_destroy(fct_progressive *m) {
     fct_release(m->env, m);
 }
 
-static float find_level_error(const fct_progressive *m, uint32_t level) {
-    return level < m->step_count ? m->errors[level] : 0;
-}
-
 void fct_progressive_inspect(const fct_progressive *m, fct_progressive_info *out) {
     *out = (fct_progressive_info){.least_faces = m->step_faces[1],
                                   .most_faces = m->face_count,
                                   .split_count = m->step_count - 1,
                                   .total_faces = m->total_faces,
                                   .faces = m->step_faces[m->level],
-                                  .error = (double)find_level_error(m, m->level)};
+                                  .error = (double)m->errors[m->level - 1]};
 }
 
 /* The finest level of at most `faces` faces, or 1. */
@@ -91,7 +87,7 @@ uint32_t fct_progressive_go_error(fct_progressive *m, double error) {
     uint32_t low = 1, high = m->step_count;
     while (low < high) {
         uint32_t middle = low + (high - low) / 2;
-        if ((double)find_level_error(m, middle) <= error)
+        if ((double)m->errors[middle - 1] <= error)
             high = middle;
         else
             low = middle + 1;

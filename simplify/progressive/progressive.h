@@ -32,8 +32,7 @@ struct fct_progressive {
 
     /* Per step; step_nodes and step_faces have one more entry. */
     uint32_t *step_nodes, *step_faces; /* the first node and face of each step */
-    float *errors; /* of the contraction that the step undoes, and of all before it: the largest. Not of step
-                      0 */
+    float *errors; /* of the level after the step: the largest of a contraction that it has */
     /* Per node; first_corners has one more entry. */
     uint32_t *parents; /* FCT_NONE: the point is new */
     uint32_t *handles;

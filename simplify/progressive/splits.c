@@ -504,10 +504,10 @@ static void code_split(fct_splits *k, uint32_t step) {
         }
 }
 
-/* Codes the error: at most that of the step before. */
+/* Codes the error of the level: at most that of the level before. */
 static void code_error(fct_splits *k, uint32_t step) {
     fct_progressive *m = k->m;
-    float before = step > 1 ? m->errors[step - 1] : INFINITY;
+    float before = step > 0 ? m->errors[step - 1] : INFINITY;
     uint32_t drop = fct_float_bits(before) - (k->names ? fct_float_bits(m->errors[step]) : 0);
     drop = fct_code_number(&k->coder, &k->models.error, drop);
     if (drop > fct_float_bits(before)) fail_stream(k);
@@ -523,10 +523,10 @@ fct_result fct_splits_step(fct_splits *k) {
         return k->result;
     code_split(k, step);
     uint32_t first = k->names ? m->step_faces[step] : m->face_count;
-    if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0, m->errors[0] = 0;
+    if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
     if (k->result == FCT_OK) count = fct_code_number(&k->coder, &k->models.faces, count);
     for (uint32_t i = 0; i < count && !stopped(k); ++i) code_face(k, first + i);
-    if (!stopped(k) && step > 0) code_error(k, step);
+    if (!stopped(k)) code_error(k, step);
     if (stopped(k)) return k->result;
     ++k->step;
     if (k->names) return FCT_OK;
