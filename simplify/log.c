@@ -47,7 +47,6 @@ static uint16_t find_highest_key(const fct_simplifier *s, uint32_t corner, uint1
 void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
     fct_log *log = s->log;
     uint16_t key = (uint16_t)s->queue->current;
-    if (log->keys[a] > key) key = log->keys[a];
     for (uint32_t i = 0; i < count_b; ++i) key = find_highest_key(s, s->ring_b[i], key);
     /* A hub does not move, so the faces at it that b does not share stay as they are. */
     if (point_at(s, a)->valence <= SIMPLIFY_HUB)

@@ -110,9 +110,12 @@ static uint32_t code_chunk(fct_coder *c, uint32_t total, uint32_t value) {
 uint32_t fct_code_uniform(fct_coder *c, uint32_t total, uint32_t value) {
     if (total <= 1) return 0;
     if (total <= 1u << CHUNK_BITS) return code_chunk(c, total, value);
-    uint32_t last = total - 1, high = code_chunk(c, (last >> CHUNK_BITS) + 1, value >> CHUNK_BITS);
-    uint32_t low_total = high == last >> CHUNK_BITS ? (last & 0xffff) + 1 : 1u << CHUNK_BITS;
-    return high << CHUNK_BITS | code_chunk(c, low_total, value & 0xffff);
+    uint32_t last = total - 1, shift = 0;
+    while (last >> shift >> CHUNK_BITS) ++shift;
+    uint32_t low_bits = (1u << shift) - 1;
+    uint32_t high = code_chunk(c, (last >> shift) + 1, value >> shift);
+    uint32_t low_total = high == last >> shift ? (last & low_bits) + 1 : low_bits + 1;
+    return high << shift | code_chunk(c, low_total, value & low_bits);
 }
 
 uint32_t fct_code_number(fct_coder *c, fct_number_models *models, uint32_t value) {

@@ -54,7 +54,13 @@ static inline bool mend_try_levels(const fct_env *env, const uint8_t *data, size
         if (result != FCT_OK) continue; /* no memory */
         require(mesh.face_count == found && found <= faces, "a level has no more faces than asked for");
         require(i == 2 || fct_mesh_validate(env, &mesh) == FCT_OK, "a level is a valid mesh");
+        for (uint32_t f = 0; f < mesh.face_count && i != 2; ++f) {
+            const uint32_t *t = mesh.triangles + 3 * (size_t)f;
+            require(t[0] != t[1] && t[1] != t[2] && t[2] != t[0], "a face has three vertices");
+        }
         fct_mesh_release(env, &mesh);
+        fct_progressive_inspect(progressive, &info);
+        require(info.error >= 0, "an error is not negative");
     }
     fct_progressive_destroy(progressive);
     return true;

@@ -69,6 +69,27 @@ static void levels_do_not_depend_on_the_way(void **state) {
     fct_mesh_release(&env, &torus);
 }
 
+/* The level for an error: the coarsest one whose error is not larger, beside a search of all levels. */
+static void levels_are_found_by_their_error(void **state) {
+    (void)state;
+    fct_mesh sphere = make_sphere(&env, 14);
+    fct_progressive *progressive = progressive_of(&env, &sphere, fct_simplify_def_default(), 10);
+    fct_progressive_info info;
+    for (double error = .5; error > 1e-5; error /= 1.7) {
+        uint32_t coarsest = 0;
+        for (uint32_t faces = sphere.face_count; faces >= 10; --faces) {
+            fct_progressive_go(progressive, faces);
+            fct_progressive_inspect(progressive, &info);
+            if (info.error <= error) coarsest = info.faces;
+        }
+        assert_int_equal(fct_progressive_go_error(progressive, error), coarsest);
+    }
+    assert_int_equal(fct_progressive_go_error(progressive, INFINITY), 10);
+    assert_int_equal(fct_progressive_go_error(progressive, 0), sphere.face_count);
+    fct_progressive_destroy(progressive);
+    fct_mesh_release(&env, &sphere);
+}
+
 /* A mesh so large that it is contracted in blocks: the same levels for every number of threads, and as close
  * to the input as those of a simplification. */
 static void blocks_are_joined_in_order(void **state) {
@@ -135,9 +156,8 @@ static void bodies_vanish_and_come_back(void **state) {
 }
 
 /* Halfway between two levels, each vertex is in the middle between itself and its ancestor. */
-static void geomorphs_lead_from_level_to_level(void **state) {
-    (void)state;
-    fct_mesh torus = make_torus(&env, 12, false, true), parts[5], coarse, fine;
+static void check_geomorph(bool hard) {
+    fct_mesh torus = make_torus(&env, 12, hard, true), parts[5], coarse, fine;
     fct_progressive *progressive = progressive_of(&env, &torus, fct_simplify_def_default(), 60);
     coarse = level_mesh(progressive, 150);
     fine = level_mesh(progressive, 400);
@@ -177,11 +197,18 @@ static void geomorphs_lead_from_level_to_level(void **state) {
     fct_mesh_release(&env, &torus);
 }
 
+static void geomorphs_lead_from_level_to_level(void **state) {
+    (void)state;
+    check_geomorph(false);
+    check_geomorph(true);
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {cmocka_unit_test(levels_are_simplifications),
                                        cmocka_unit_test(attributes_follow),
                                        cmocka_unit_test(levels_do_not_depend_on_the_way),
+                                       cmocka_unit_test(levels_are_found_by_their_error),
                                        cmocka_unit_test(blocks_are_joined_in_order),
                                        cmocka_unit_test(bodies_vanish_and_come_back),
                                        cmocka_unit_test(geomorphs_lead_from_level_to_level)};
