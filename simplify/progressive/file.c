@@ -126,13 +126,22 @@ static fct_result write_file(void *user, FILE *stream) {
     return result;
 }
 
-fct_result fct_progressive_save(fct_progressive *m, const char *path) {
+/* Writes to the path, or else to the stream, from the coarsest level on, and returns to the current one. */
+static fct_result write_from_base(fct_progressive *m, const char *path, FILE *stream) {
     uint32_t level = m->level;
     while (m->level > 1) fct_progressive_backward(m);
-    fct_result result = fct_file_write_atomic(m->env, path, write_file, m);
+    fct_result result = path ? fct_file_write_atomic(m->env, path, write_file, m) : write_file(m, stream);
     while (m->level > level) fct_progressive_backward(m);
     while (m->level < level) fct_progressive_forward(m);
     return result;
+}
+
+fct_result fct_progressive_write(fct_progressive *m, FILE *stream) {
+    return write_from_base(m, NULL, stream);
+}
+
+fct_result fct_progressive_save(fct_progressive *m, const char *path) {
+    return write_from_base(m, path, NULL);
 }
 
 /* ---- Reading ---- */

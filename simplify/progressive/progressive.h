@@ -13,6 +13,8 @@
 #ifndef FCT_SIMPLIFY_PROGRESSIVE_H
 #define FCT_SIMPLIFY_PROGRESSIVE_H
 
+#include <stdio.h>
+
 #include "base/env.h"
 #include "facetree/progressive.h"
 
@@ -58,6 +60,8 @@ void fct_progressive_forward(fct_progressive *m);
 void fct_progressive_backward(fct_progressive *m);
 /* Allocates the scratch arrays, and goes to the coarsest level. Errors: MEMORY. */
 fct_result fct_progressive_begin(fct_progressive *m);
+/* Writes a file to a stream; the caller checks the stream. Errors: MEMORY, CANCELLED. */
+fct_result fct_progressive_write(fct_progressive *m, FILE *stream);
 /* Reads a file from memory; `name` begins the messages. Errors: as fct_progressive_load. */
 fct_result fct_progressive_read(const fct_env *env, const char *name, const unsigned char *data, size_t size,
                                 fct_progressive **out);
