@@ -3,6 +3,7 @@
 #include "simplify/collapse.h"
 
 #include "simplify/cost/constraint.h"
+#include "simplify/log.h"
 
 /* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
 #define RETIRED_RIDGE 1e-12
@@ -73,6 +74,7 @@ static void remove_face(fct_simplifier *s, uint32_t c, uint32_t a) {
 static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candidate *candidate, uint32_t a,
                          v3 first, v3 second) {
     double values[SIMPLIFY_MAX_WEDGES][SIMPLIFY_MAX_CHANNELS];
+    s->wedge_room -= g->group_count;
     for (uint32_t i = 0; i < g->group_count; ++i)
         fct_place_attributes(s, g, i, candidate, first, second, values[i]);
     s->first_wedges[a] = FCT_NONE;
@@ -131,6 +133,7 @@ static void move_corners(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t cou
 }
 
 void fct_simplify_remove_faces(fct_simplifier *s, uint32_t point) {
+    if (s->log) s->log->records[s->log->count - 1].body = true;
     for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         if (corner_dead(s, c)) continue;
         for (uint32_t k = 0; k < 3; ++k) count_corner_out(s, c - c % 3 + k);
@@ -145,6 +148,7 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     fct_groups g;
     v3 first = point_position(s, ends[0]), second = point_position(s, ends[1]);
     if (s->corner_wedges) fct_groups_find(s, ends[0], ends[1], &g);
+    if (s->log) fct_log_begin(s, a, b, count_b);
     uint32_t source = candidate->end < 2 ? point_at(s, ends[candidate->end])->source : FCT_NONE;
     move_corners(s, a, b, count_b);
     point_at(s, a)->source = source;
@@ -152,4 +156,5 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     add_quadric(point_at(s, a)->quadric, point_at(s, b)->quadric, POSITION_QUADRIC);
     fct_constraint_merge(s, a, b);
     point_at(s, a)->at = candidate->at;
+    if (s->log) fct_log_end(s, fct_candidate_error(candidate));
 }

@@ -16,6 +16,7 @@
 #include "simplify/collapse.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/loss.h"
+#include "simplify/log.h"
 #include "simplify/sweep.h"
 #include "simplify/topology/link.h"
 #include "simplify/topology/remain.h"
@@ -170,7 +171,8 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
 
 /* The loop of a block in a sweep. */
 static void contract_block(fct_simplifier *s) {
-    for (uint32_t e; s->live_faces > s->least_faces && (e = queue_pop(s->queue)) != FCT_NONE;)
+    for (uint32_t e; s->live_faces > s->least_faces && s->wedge_room >= SIMPLIFY_MAX_WEDGES &&
+                     (e = queue_pop(s->queue)) != FCT_NONE;)
         if (s->edges[e].state == EDGE_QUEUED) process_edge(s, e);
 }
 
@@ -190,6 +192,7 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
         uint32_t e = queue_pop(s->queue);
         if (e == FCT_NONE) break;
         if (s->edges[e].state != EDGE_QUEUED) continue;
+        if (s->log && (result = fct_log_reserve(s)) != FCT_OK) return result;
         if (!process_edge(s, e) || ++contractions % PROGRESS_PERIOD) continue;
         double goal = (double)before - s->def->target_faces;
         result = fct_progress(s->env, "contract", (before - s->live_faces) / goal);

@@ -9,15 +9,6 @@ static uint32_t find_vertex_key(fct_simplifier *s, uint32_t c) {
     return fct_sets_find(s->class_parents, s->wedge_classes[corner_wedge(s, c)]);
 }
 
-/* A point that never moved keeps the bits of its input vertex. */
-static void write_position(const fct_simplifier *s, uint32_t point, float *out) {
-    if (point_at(s, point)->source != FCT_NONE) {
-        memcpy(out, s->mesh->positions + 3 * (size_t)point_at(s, point)->source, 3 * sizeof *out);
-        return;
-    }
-    store_written(s, point_position(s, point), out);
-}
-
 /* Writes the attributes of a live corner's wedge: c in the input, `corner` and its vertex v in the output.
  * Wedges that share a vertex differ only in texture coordinates, apart from rounding; the last one written
  * counts. */
@@ -99,7 +90,7 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
         for (uint32_t k = 0; k < 3; ++k) {
             uint32_t c = 3 * f + k, v = numbers[find_vertex_key(s, c)];
             out->triangles[3 * (size_t)to + k] = v;
-            write_position(s, s->triangles[c], out->positions + 3 * (size_t)v);
+            write_point(s, s->triangles[c], out->positions + 3 * (size_t)v);
             if (s->channel_count) write_attributes(s, out, 3 * to + k, c, v);
             if (out->normals && !point_is_locked(s, s->triangles[c]))
                 normalize_normal(out->normals + 3 * (size_t)v);

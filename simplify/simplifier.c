@@ -4,6 +4,7 @@
 #include "simplify/cost/channels.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/fundamental.h"
+#include "simplify/log.h"
 #include "simplify/topology/topology.h"
 
 static fct_result fill_simplifier(fct_simplifier *s) {
@@ -32,6 +33,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->wedge_classes, s->class_parents, s->link_marks,    s->side_marks,   s->refused,
                       s->constraint_of, s->constraints,   s->lines,         s->scratches};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
+    fct_log_destroy(s->env, s->log);
     fct_release(s->env, s);
 }
 

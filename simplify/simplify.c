@@ -3,11 +3,14 @@
  * 1. Sort the input along a curve (topology/curve.c).
  * 2. Create points, wedges, edges and quadrics (simplifier.c).
  * 3. Contract edges until a stop (contract.c, sweep.c).
- * 4. Refit the remaining points (refit.c).
- * 5. Write the output mesh (output.c).
+ * 4. If asked for, build the progressive mesh of the log (log.c, progressive/build.c).
+ * 5. Refit the remaining points (refit.c).
+ * 6. Write the output mesh (output.c).
  */
 #include "simplify/contract.h"
+#include "simplify/log.h"
 #include "simplify/output.h"
+#include "simplify/progressive/build.h"
 #include "simplify/refit/refit.h"
 #include "simplify/simplifier.h"
 #include "simplify/topology/curve.h"
@@ -75,12 +78,22 @@ static void report_fit(const fct_simplifier *s, const fct_fit *fit, fct_simplify
     stats->texcoord_rms = sqrt(sums[CHANNEL_TEXCOORD]);
 }
 
+/* Contracts a mesh, and builds its progressive mesh if that is not NULL. */
+static fct_result run_contractions(fct_simplifier *s, fct_stop *stop, fct_progressive **progressive) {
+    fct_result result = progressive ? fct_log_create(s) : FCT_OK;
+    if (result == FCT_OK) result = fct_simplify_contract(s, stop);
+    if (result == FCT_OK && progressive) result = fct_progressive_build(s, progressive);
+    fct_log_destroy(s->env, s->log);
+    s->log = NULL;
+    return result;
+}
+
 /* Contracts, refits and writes a sorted mesh. */
 static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out, bool measure,
-                                 fct_simplify_stats *stats) {
+                                 fct_simplify_stats *stats, fct_progressive **progressive) {
     double start = fct_seconds();
     fct_fit fit = {0};
-    fct_result result = fct_simplify_contract(s, &stats->stopped_because);
+    fct_result result = run_contractions(s, &stats->stopped_because, progressive);
     double contracted = fct_seconds();
     stats->seconds_contract = contracted - start;
     bool changed = s->live_faces < s->face_count;
@@ -94,8 +107,9 @@ static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_
     return result;
 }
 
-fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def, fct_mesh *out,
-                        fct_simplify_stats *stats) {
+/* progressive may be NULL. */
+static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                           fct_mesh *out, fct_simplify_stats *stats, fct_progressive **progressive) {
     *out = (fct_mesh){0};
     fct_result result = check_input(env, mesh, def);
     if (result != FCT_OK) return result;
@@ -109,9 +123,24 @@ fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simp
     fct_simplifier *s;
     result = fct_simplifier_create(env, &sorted.mesh, &own, &s);
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = run_simplifier(s, sorted.places, out, stats != NULL, &found);
+    if (result == FCT_OK) result = run_simplifier(s, sorted.places, out, stats != NULL, &found, progressive);
     fct_simplifier_destroy(s);
     fct_simplify_release_sorted(env, &sorted);
     if (result == FCT_OK && stats) *stats = found;
+    return result;
+}
+
+fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def, fct_mesh *out,
+                        fct_simplify_stats *stats) {
+    return simplify(env, mesh, def, out, stats, NULL);
+}
+
+fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                                    fct_mesh *out, fct_simplify_stats *stats, fct_progressive **progressive) {
+    *progressive = NULL;
+    fct_result result = simplify(env, mesh, def, out, stats, progressive);
+    if (result == FCT_OK) return FCT_OK;
+    fct_progressive_destroy(*progressive);
+    *progressive = NULL;
     return result;
 }

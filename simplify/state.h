@@ -14,6 +14,7 @@
 #define FCT_SIMPLIFY_STATE_H
 
 #include <float.h>
+#include <string.h>
 
 #include "base/env.h"
 #include "base/math/vec.h"
@@ -134,6 +135,7 @@ typedef struct fct_simplifier {
     /* In a sweep (sweep.h), a copy of the simplifier works on one block of points. */
     const uint32_t *blocks;      /* per point: its block; NULL outside of sweeps */
     uint32_t block, least_faces; /* the block, and live_faces at which it stops */
+    uint32_t wedge_room;         /* the wedges that contractions of the block may still write */
     double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
     uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
     uint32_t *link_marks; /* per point; only with keep_topology */
@@ -141,6 +143,7 @@ typedef struct fct_simplifier {
     fct_side_mark *side_marks; /* per point */
     uint32_t side_epoch;
     double max_error2; /* largest squared error of a contraction that was made */
+    struct fct_log *log; /* log.h; NULL: nothing is recorded */
 } fct_simplifier;
 
 static inline void use_scratch(fct_simplifier *s, fct_scratch *scratch) {
@@ -180,6 +183,14 @@ static inline void store_written(const fct_simplifier *s, v3 at, float out[3]) {
     const double most = (double)FLT_MAX;
     v3_store(out, (v3){fct_max(-most, fct_min(p.x, most)), fct_max(-most, fct_min(p.y, most)),
                        fct_max(-most, fct_min(p.z, most))});
+}
+/* The floats of a point's position. A point that never moved keeps the bits of its input vertex. */
+static inline void write_point(const fct_simplifier *s, uint32_t point, float out[3]) {
+    uint32_t source = point_at(s, point)->source;
+    if (source != FCT_NONE)
+        memcpy(out, s->mesh->positions + 3 * (size_t)source, 3 * sizeof *out);
+    else
+        store_written(s, point_position(s, point), out);
 }
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
     return s->corner_wedges ? fct_sets_find(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];

@@ -10,11 +10,13 @@
 #include "simplify/sweep.h"
 
 #include "base/parallel.h"
+#include "simplify/log.h"
 
 enum {
     BLOCK_POINTS = 4096,
-    LEAST_EDGES = 8192, /* of a sweep */
-    LEAST_SHARE = 32,   /* sweeps go on while they contract this part of their edges */
+    LEAST_EDGES = 8192,             /* of a sweep */
+    LEAST_SHARE = 32,               /* sweeps go on while they contract this part of their edges */
+    MOST_WEDGES = 8 * BLOCK_POINTS, /* a block stops when it has written so many, so that a log has room */
 };
 
 typedef struct sweep {
@@ -28,6 +30,7 @@ typedef struct sweep {
     uint32_t *starts,
         *ordered;            /* the edges of block b are ordered[starts[b]] to ordered[starts[b + 1] - 1] */
     fct_simplifier *results; /* per block: the copy that worked on it */
+    fct_log *logs;           /* per block; NULL without a log */
 } sweep;
 
 /* Drops dead edges from the list, and returns the highest bucket up to which at most `most` edges are queued;
@@ -89,6 +92,8 @@ static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint3
         *s = *w->s;
         use_scratch(s, w->s->scratches + thread);
         s->blocks = w->blocks, s->block = (uint32_t)b;
+        s->wedge_room = MOST_WEDGES;
+        if (w->logs) s->log = &w->logs[b];
         queue_clear(s->queue, s->edges, w->limit);
         for (uint32_t i = w->starts[b + 1]; i-- > w->starts[b];)
             queue_push(s->queue, w->ordered[i], s->edges[w->ordered[i]].bucket);
@@ -106,6 +111,8 @@ static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
     choose_edges(w);
     w->results = fct_allocate(s->env, w->block_count, sizeof *w->results);
     if (!w->results) return fct_fail_memory(s->env, "blocks of points");
+    fct_result result = fct_log_split(s, w->block_count, BLOCK_POINTS, MOST_WEDGES, &w->logs);
+    if (result != FCT_OK) goto done;
     fct_parallel_for(s->env, w->block_count, 1, run_blocks, w);
     uint32_t before = s->live_faces;
     fct_simplifier all = *s;
@@ -117,9 +124,11 @@ static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
         if (r->link_epoch > all.link_epoch) all.link_epoch = r->link_epoch;
     }
     s->side_epoch = all.side_epoch, s->link_epoch = all.link_epoch;
-    fct_release(s->env, w->results);
     *contracted = (before - s->live_faces) / 2;
-    return FCT_OK;
+    result = fct_log_join(s, w->logs, w->block_count);
+done:
+    fct_release(s->env, w->results);
+    return result;
 }
 
 static fct_result run_sweeps(sweep *w) {

@@ -11,6 +11,7 @@ int tool_collide(int argc, char **argv);
 int tool_convert(int argc, char **argv);
 int tool_compare(int argc, char **argv);
 int tool_info(int argc, char **argv);
+int tool_level(int argc, char **argv);
 int tool_make(int argc, char **argv);
 int tool_meshlets(int argc, char **argv);
 int tool_partition(int argc, char **argv);

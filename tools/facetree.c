@@ -22,6 +22,7 @@ static const struct {
     {"collide", "find where two meshes touch, or how far apart they are", tool_collide},
     {"bake", "compute the radiosity of a scene as vertex colours", tool_bake},
     {"simplify", "reduce a mesh, keeping its shape and colours", tool_simplify},
+    {"level", "write a level of a progressive mesh", tool_level},
     {"convert", "write a mesh in another format", tool_convert},
     {"compare", "measure the distance between two meshes", tool_compare},
     {"render", "draw a mesh, a scene, its clusters or its boxes", tool_render},

@@ -1,4 +1,5 @@
-/* tools/simplify.c: facetree simplify: fewer triangles with the same shape and colours. */
+/* tools/simplify.c: facetree simplify: fewer triangles with the same shape and colours; progressive meshes.
+ */
 #include "tools/commands.h"
 
 #include <math.h>
@@ -13,7 +14,8 @@
 typedef struct simplify_options {
     fct_simplify_def def;
     bool faces_given, error_given, attributes_given;
-    double ratio;      /* 0: not given */
+    double ratio; /* 0: not given */
+    const char *progressive;
     double weights[3]; /* of color, uv, normal; negative: the default; NAN: not in the list */
 } simplify_options;
 
@@ -29,7 +31,8 @@ enum {
     KEY_REGULARIZE,
     KEY_LOCK_BORDER,
     KEY_TOPOLOGY,
-    KEY_REFIT
+    KEY_REFIT,
+    KEY_PROGRESSIVE
 };
 
 static const struct argp_option simplify_options_table[] = {
@@ -69,6 +72,10 @@ static const struct argp_option simplify_options_table[] = {
      "Keep the vertices of open boundaries, so that tiles still fit exactly", 0},
     {"keep-topology", KEY_TOPOLOGY, NULL, 0, "Refuse contractions that change the topology", 0},
     {"refit", KEY_REFIT, "N", 0, "Passes that fit the vertices to the input afterwards, 0 to 100 (default 2)",
+     0},
+    {"progressive", KEY_PROGRESSIVE, "FILE", 0,
+     "Also write a progressive mesh (.fpm): every level from the result, without refit, to the input. "
+     "'facetree level' reads it",
      0},
     {0}};
 
@@ -138,6 +145,9 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_REFIT:
         return tool_parse_count32(state, "--refit", text, 0, 100, &o->def.refit_passes);
+    case KEY_PROGRESSIVE:
+        o->progressive = text;
+        return 0;
     case ARGP_KEY_END:
         if (o->faces_given && o->ratio > 0)
             return tool_usage(state, "expected either --faces or --ratio, found both");
@@ -181,6 +191,25 @@ static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_sta
                   s->seconds_refit, "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
 }
 
+/* Checks the name of the progressive mesh before the work. */
+static int check_progressive(tool *t, const char *path) {
+    if (!path) return TOOL_DONE;
+    int code = tool_check_kind(t, path, "fpm", NULL);
+    if (code == TOOL_DONE && tool_same_output(path, t->output))
+        code = tool_fail(t, TOOL_USAGE, "%s: --progressive and -o are the same file", path);
+    return code == TOOL_DONE ? tool_check_output(t, path) : code;
+}
+
+static int simplify_mesh(tool *t, const simplify_options *o, const fct_mesh *mesh, fct_mesh *simple,
+                         fct_simplify_stats *stats) {
+    fct_progressive *progressive;
+    if (!o->progressive) return tool_result(t, fct_simplify(&t->env, mesh, &o->def, simple, stats));
+    int code = tool_result(t, fct_simplify_progressive(&t->env, mesh, &o->def, simple, stats, &progressive));
+    if (code == TOOL_DONE) code = tool_result(t, fct_progressive_save(progressive, o->progressive));
+    fct_progressive_destroy(progressive);
+    return code;
+}
+
 static int run_simplify(tool *t, void *options) {
     simplify_options *o = options;
     if (!o->faces_given && !(o->ratio > 0) && !o->error_given)
@@ -189,13 +218,15 @@ static int run_simplify(tool *t, void *options) {
     fct_gltf *gltf = NULL; /* the document that is kept, if both files are glTF */
     fct_simplify_stats stats;
     bool keeps = tool_is_gltf(t, t->inputs[0]) && tool_ends(t->output, "glb");
-    int code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
+    int code = check_progressive(t, o->progressive);
+    if (code != TOOL_DONE) return code;
+    code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     code = set_attribute_weights(t, o, &mesh);
-    if (code == TOOL_DONE) code = tool_result(t, fct_simplify(&t->env, &mesh, &o->def, &simple, &stats));
+    if (code == TOOL_DONE) code = simplify_mesh(t, o, &mesh, &simple, &stats);
     if (code == TOOL_DONE)
         code = gltf ? tool_save_gltf(t, gltf, t->output, &simple) : tool_save_mesh(t, t->output, &simple, 1);
     if (code == TOOL_DONE && stats.faces_after > o->def.target_faces &&
@@ -229,7 +260,8 @@ int tool_simplify(int argc, char **argv) {
                 "error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms (errors "
                 "of the result), seconds{init, contract, refit, total}, peak_bytes.",
         .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
-                    "  facetree simplify lit.glb --faces 10000 -o small.glb",
+                    "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
+                    "  facetree simplify bunny.obj --faces 200 -o small.ply --progressive bunny.fpm",
         .options = simplify_options_table,
         .parse = parse_simplify,
         .run = run_simplify,

@@ -9,6 +9,7 @@
 #include "facetree/dual.h"
 #include "facetree/mesh.h"
 #include "facetree/partition.h"
+#include "facetree/progressive.h"
 #include "facetree/radiosity.h"
 #include "facetree/scene.h"
 #include "facetree/simplify.h"

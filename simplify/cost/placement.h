@@ -15,6 +15,11 @@ typedef struct fct_candidate {
     double key;           /* error plus the energy of the regularisation; orders the queue */
 } fct_candidate;
 
+/* The error of the contraction in the unit cube, as fct_simplify_def.max_error measures it. */
+static inline double fct_candidate_error(const fct_candidate *c) {
+    return c->distance2 > 0 ? sqrt(c->distance2 / c->area) : 0;
+}
+
 /* The candidate for contracting the edge a-b, by the policy def->placement. ends_only: try only both ends and
  * the midpoint. A hub does not move: it is the result. False if the edge has too many wedges, if a
  * constraint does not allow this, or if a group has not exactly one wedge of a locked end. */

@@ -1,10 +1,11 @@
 /* Any mesh that the bytes describe, with any options: an error, or a simplified mesh that keeps the promises
- * of simplify.h. */
+ * of simplify.h, and a progressive mesh that keeps those of progressive.h. */
+#define _GNU_SOURCE
 #include <float.h>
 
 #include "base/math/vec.h"
-#include "facetree/simplify.h"
 #include "fuzz/fuzz_bytes.h"
+#include "simplify/progressive/progressive.h"
 
 /* Rounding to floats may turn a face whose height is fewer steps between floats. */
 #define COARSE 100
@@ -179,6 +180,49 @@ static void check(const fct_env *env, const fct_mesh *mesh, const fct_simplify_d
     fuzz_require(before.folded || before.coarse || !after.folded, "no face folds over");
 }
 
+/* The levels of a progressive mesh, also of one that was written and read. */
+static void check_levels(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                         const fct_mesh *out) {
+    fct_mesh same, x, y;
+    fct_progressive *made, *read = NULL;
+    fct_progressive_info info;
+    if (fct_simplify_progressive(env, mesh, def, &same, NULL, &made) != FCT_OK) return; /* no memory */
+    fuzz_require(same.face_count == out->face_count && same.vertex_count == out->vertex_count &&
+                     !memcmp(same.positions, out->positions, 12 * (size_t)out->vertex_count),
+                 "the log does not change the result");
+    fct_mesh_release(env, &same);
+    char *bytes = NULL;
+    size_t size = 0;
+    FILE *stream = open_memstream(&bytes, &size);
+    fct_result result = fct_progressive_write(made, stream);
+    fuzz_require(fclose(stream) == 0, "a stream in memory");
+    if (result == FCT_OK) result = fct_progressive_read(env, "bytes", (unsigned char *)bytes, size, &read);
+    fuzz_require(result == FCT_OK || result == FCT_ERROR_MEMORY, "what was written can be read");
+    free(bytes);
+    fct_progressive_inspect(made, &info);
+    fuzz_require(info.least_faces == out->face_count, "the base mesh is the result");
+    for (uint32_t i = 0; i < 6 && read; ++i) {
+        uint32_t faces = info.least_faces + (info.most_faces - info.least_faces) * (i * 4 % 6) / 5;
+        fuzz_require(fct_progressive_go(made, faces) == fct_progressive_go(read, faces), "the same levels");
+        if (fct_progressive_mesh(made, &x) != FCT_OK) break;
+        if (fct_progressive_mesh(read, &y) == FCT_OK) {
+            fuzz_require(fct_mesh_validate(env, &x) == FCT_OK, "a level is a mesh");
+            fuzz_require(x.vertex_count == y.vertex_count &&
+                             !memcmp(x.positions, y.positions, 12 * (size_t)x.vertex_count) &&
+                             !memcmp(x.triangles, y.triangles, 12 * (size_t)x.face_count) &&
+                             (!x.colors || !memcmp(x.colors, y.colors, 12 * (size_t)x.vertex_count)) &&
+                             (!x.normals || !memcmp(x.normals, y.normals, 12 * (size_t)x.vertex_count)) &&
+                             (!x.texcoords || !memcmp(x.texcoords, y.texcoords, 24 * (size_t)x.face_count)) &&
+                             (!x.materials || !memcmp(x.materials, y.materials, 4 * (size_t)x.face_count)),
+                         "the same bytes");
+            fct_mesh_release(env, &y);
+        }
+        fct_mesh_release(env, &x);
+    }
+    fct_progressive_destroy(made);
+    fct_progressive_destroy(read);
+}
+
 static double weight(fuzz_bytes *b, double usual) {
     uint32_t value = fuzz_byte(b);
     return value < 128 ? usual : value == 255 ? (double)fuzz_real(b) : (value - 128) * usual;
@@ -220,6 +264,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_require(result == (valid ? FCT_OK : FCT_ERROR_DATA), "valid input is simplified, and no other");
     fuzz_require(result == FCT_OK || (!out.positions && !out.triangles), "a failure leaves nothing behind");
     if (result == FCT_OK) check(&env, &mesh, &def, &out, &stats);
+    if (result == FCT_OK && size % 4 == 0) check_levels(&env, &mesh, &def, &out);
     fct_mesh_release(&env, &out);
     fct_mesh_release(&env, &mesh);
     fuzz_end();

@@ -1,4 +1,4 @@
-/* tests/memory/calls_mesh.c: calls of base.h, mesh.h, dual.h and simplify.h. */
+/* tests/memory/calls_mesh.c: calls of base.h, mesh.h, dual.h, simplify.h and progressive.h. */
 #include "tests/memory/calls.h"
 
 static fct_result check_simd(const fct_env *env) {
@@ -240,6 +240,62 @@ static fct_result simplify(const fct_env *env) {
     return finish_mesh(env, &mesh, STARVE(fct_simplify(env, &inputs.sheet, &def, &mesh, NULL)));
 }
 
+static fct_result simplify_progressive(const fct_env *env) {
+    fct_mesh mesh;
+    fct_progressive *progressive;
+    fct_simplify_def def = fct_simplify_def_default();
+    def.target_faces = 10;
+    fct_result result = STARVE(fct_simplify_progressive(env, &inputs.sheet, &def, &mesh, NULL, &progressive));
+    assert_int_equal(progressive == NULL, result != FCT_OK);
+    fct_progressive_destroy(progressive);
+    return finish_mesh(env, &mesh, result);
+}
+
+/* A progressive mesh of `env`. */
+static fct_progressive *make_progressive(const fct_env *env) {
+    fct_mesh mesh;
+    fct_progressive *progressive;
+    fct_simplify_def def = fct_simplify_def_default();
+    assert_int_equal(fct_simplify_progressive(env, &inputs.sheet, &def, &mesh, NULL, &progressive), FCT_OK);
+    fct_mesh_release(env, &mesh);
+    return progressive;
+}
+
+static fct_result save_progressive(const fct_env *env) {
+    fct_progressive *progressive = make_progressive(env);
+    fct_result result = STARVE(fct_progressive_save(progressive, OUT "mesh.fpm"));
+    fct_progressive_destroy(progressive);
+    return result;
+}
+
+static fct_result load_progressive(const fct_env *env) {
+    fct_progressive *progressive;
+    fct_result result = STARVE(fct_progressive_load(env, IN "sheet.fpm", &progressive));
+    assert_int_equal(progressive == NULL, result != FCT_OK);
+    fct_progressive_destroy(progressive);
+    return result;
+}
+
+static fct_result write_level(const fct_env *env) {
+    fct_mesh mesh;
+    fct_progressive *progressive = make_progressive(env);
+    fct_progressive_go(progressive, 10);
+    fct_result result = STARVE(fct_progressive_mesh(progressive, &mesh));
+    finish_mesh(env, &mesh, result);
+    fct_progressive_destroy(progressive);
+    return result;
+}
+
+static fct_result write_morph(const fct_env *env) {
+    fct_mesh mesh;
+    fct_progressive *progressive = make_progressive(env);
+    fct_progressive_go(progressive, 10);
+    fct_result result = STARVE(fct_progressive_morph(progressive, 4, .5, &mesh));
+    finish_mesh(env, &mesh, result);
+    fct_progressive_destroy(progressive);
+    return result;
+}
+
 const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_writer_open", "", open_writer, false},
                                   {"fct_writer_close", "", close_writer, false},
@@ -278,4 +334,9 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_inward_find", "", find_inward, false},
                                   {"fct_inward_flip", "", flip_inward, false},
                                   {"fct_simplify", "", simplify, false},
+                                  {"fct_simplify_progressive", "", simplify_progressive, false},
+                                  {"fct_progressive_save", "", save_progressive, false},
+                                  {"fct_progressive_load", "", load_progressive, false},
+                                  {"fct_progressive_mesh", "", write_level, false},
+                                  {"fct_progressive_morph", "", write_morph, false},
                                   {NULL, NULL, NULL, false}};

@@ -72,6 +72,14 @@ static void write_inputs(void) {
     assert_int_equal(fct_mesh_save(&inputs.env, IN "text.stl", &inputs.sheet, &text), FCT_OK);
     assert_int_equal(fct_mesh_save(&inputs.env, IN "ball.ply", &inputs.ball, NULL), FCT_OK);
     assert_int_equal(fct_tree_save(&inputs.env, inputs.tree, IN "sheet.fct"), FCT_OK);
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_progressive *progressive;
+    fct_mesh simple;
+    assert_int_equal(fct_simplify_progressive(&inputs.env, &inputs.sheet, &def, &simple, NULL, &progressive),
+                     FCT_OK);
+    assert_int_equal(fct_progressive_save(progressive, IN "sheet.fpm"), FCT_OK);
+    fct_progressive_destroy(progressive);
+    fct_mesh_release(&inputs.env, &simple);
     static const unsigned char corners[12] = {0, 0, 0, 0, 0, 0, 128, 63, 0, 0, 128, 63};
     FILE *file = fopen(IN "corner coordinates.bin", "wb"); /* (0 0 0), (1 0 0), (1 1 0) as floats */
     assert_non_null(file);

@@ -1,6 +1,6 @@
 # tests/tools/test_usage.sh: help, version, and every kind of wrong command line.
 source "$(dirname "$0")/support.sh"
-commands="bake boxes closest cluster collide compare convert info make partition raycast render simplify"
+commands="bake boxes closest cluster collide compare convert info level make partition raycast render simplify"
 
 expect 0 --version
 check "the version is printed" grep -qE '^facetree [0-9]+\.[0-9]+\.[0-9]+ \((baseline|avx2)\)$' out
@@ -37,7 +37,7 @@ says "did you mean 'cluster'?"
 expect 64 qwertzuiop
 says "'facetree help' lists them"
 expect 64 --nothing
-for later in relight form-factor level; do
+for later in relight form-factor; do
     expect 64 "$later" a b
     says "unknown command '$later'"
 done
@@ -130,7 +130,7 @@ expect 64 simplify cube.off -o x.ply --faces 4 --placement best
 expect 64 simplify cube.off -o x.ply --faces 4 --weights heavy
 says "expected area, angle or uniform, found 'heavy'"
 expect 64 simplify cube.off -o x.doc --faces 4
-for later in --primitive=face --pairs=1 --progressive=x.fpm --resume=x; do
+for later in --primitive=face --pairs=1 --resume=x; do
     expect 64 simplify cube.off -o x.ply --faces 4 "$later"
     says "unknown option"
 done

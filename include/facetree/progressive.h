@@ -1,0 +1,76 @@
+/* facetree/progressive.h: progressive meshes: every level of a simplification in one object and one file.
+ *
+ *     fct_simplify_progressive(&env, &mesh, &def, &small, NULL, &progressive);
+ *     fct_progressive_save(progressive, "mesh.fpm");
+ *     fct_progressive_go(progressive, 10000);
+ *     fct_progressive_mesh(progressive, &level);
+ *
+ * A progressive mesh is the reversed log of a simplification: a base mesh, and vertex splits that undo the
+ * contractions one by one (Garland, "Quadric-Based Polygonal Surface Simplification", CMU 1999, section
+ * 7.1.2). docs/progressive-file.md describes the file.
+ */
+#ifndef FACETREE_PROGRESSIVE_H
+#define FACETREE_PROGRESSIVE_H
+
+#include "facetree/simplify.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A progressive mesh at one of its levels. One thread at a time may use it. */
+typedef struct fct_progressive fct_progressive;
+
+/* fct_simplify, and the progressive mesh of its contractions, at its coarsest level (the base mesh).
+ *
+ * A level has the positions and attributes that the contractions gave: those of *out without the refit. The
+ * finest level is what the simplifier makes of the input before its first contraction: the same faces with
+ * the same positions; equal vertices are one; normals have unit length. Faces are in the order in which the
+ * splits add them, and the arrays source_faces and source_uv are left out. Every thread count gives the same
+ * bits. env must outlive *progressive. Errors: those of fct_simplify, with *progressive = NULL. */
+FCT_API fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh,
+                                            const fct_simplify_def *def, fct_mesh *out,
+                                            fct_simplify_stats *stats, fct_progressive **progressive);
+
+/* Writes a progressive mesh. Replaces the file as a whole. Does not change the level. Errors: OUTPUT, MEMORY,
+ * CANCELLED. */
+FCT_API fct_result fct_progressive_save(fct_progressive *progressive, const char *path);
+/* Reads a file, at its coarsest level. Of a file that ends too early, the complete blocks of splits are read,
+ * and a warning says so; an incomplete base mesh is an error. "-" is standard input. Errors: INPUT, DATA,
+ * MEMORY, CANCELLED. */
+FCT_API fct_result fct_progressive_load(const fct_env *env, const char *path, fct_progressive **out);
+/* NULL is allowed. */
+FCT_API void fct_progressive_destroy(fct_progressive *progressive);
+
+typedef struct fct_progressive_info {
+    uint32_t least_faces, most_faces; /* of the coarsest level, and of the finest one that was read */
+    uint32_t split_count;             /* number of levels, less one */
+    uint32_t total_faces; /* of the finest level; more than most_faces if the file was truncated */
+    uint32_t faces;       /* of the current level */
+    double error;         /* the largest error of a contraction that the current level has, as
+                             fct_simplify_def.max_error         measures it */
+} fct_progressive_info;
+FCT_API void fct_progressive_inspect(const fct_progressive *progressive, fct_progressive_info *out);
+
+/* Goes to the finest level of at most `faces` faces, or to the coarsest level if all have more. Returns the
+ * number of faces. Cost: proportional to the splits in between. */
+FCT_API uint32_t fct_progressive_go(fct_progressive *progressive, uint32_t faces);
+/* Goes to the coarsest level whose error is at most `error`, or to the finest level. Returns the number of
+ * faces. */
+FCT_API uint32_t fct_progressive_go_error(fct_progressive *progressive, double error);
+
+/* The mesh of the current level. Cost: proportional to its size. Errors: MEMORY. */
+FCT_API fct_result fct_progressive_mesh(fct_progressive *progressive, fct_mesh *out);
+/* A geomorph between the current level and the coarser one that fct_progressive_go would choose for `faces`:
+ * the faces of the current level, with vertices at (1 - t) a + t b, where b is the vertex of the current
+ * level and a the vertex of the coarser level that it belongs to. Attributes follow likewise, and normals get
+ * unit length. t is in [0, 1]. At 0 the surface is that of the coarser level. A body that the coarser level
+ * does not have keeps its place. Cost: proportional to the size of the current level, plus the splits in
+ * between. Errors: DATA (t), MEMORY. */
+FCT_API fct_result fct_progressive_morph(fct_progressive *progressive, uint32_t faces, double t,
+                                         fct_mesh *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,132 @@
+/* simplify/log.c: see log.h. Cost of a record: O(valence + wedges^2).
+ *
+ * Keys: the key of a contraction is the bucket of its cost, but at least the key of every earlier contraction
+ * that changed the faces around its ends. So a sort by key moves no contraction before one on which it
+ * depends. One queue for all edges gives buckets in ascending order, and then the sort changes nothing.
+ */
+#include "simplify/log.h"
+
+fct_result fct_log_create(fct_simplifier *s) {
+    fct_log *log = s->log = fct_allocate_zero(s->env, 1, sizeof *log);
+    if (!log) return fct_fail_memory(s->env, "a log");
+    const fct_array arrays[] = {FCT_ARRAY(log->records, s->point_count),
+                                FCT_ARRAY_ZERO(log->keys, s->point_count)};
+    return fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a log");
+}
+
+void fct_log_destroy(const fct_env *env, fct_log *log) {
+    if (!log) return;
+    void *arrays[] = {log->records, log->wedges, log->values, log->keys, log};
+    for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(env, arrays[i]);
+}
+
+/* Room for `more` wedges. */
+static fct_result grow_wedges(fct_simplifier *s, size_t more) {
+    fct_log *log = s->log;
+    size_t needed = log->wedge_count + more;
+    if (needed > FCT_NONE) return fct_fail_memory(s->env, "a log of more than 2^32 wedges");
+    fct_result result =
+        fct_grow(s->env, (void **)&log->wedges, &log->wedge_capacity, needed, sizeof *log->wedges);
+    return result != FCT_OK ? result
+                            : fct_grow(s->env, (void **)&log->values, &log->value_capacity,
+                                       needed * s->channel_count, sizeof *log->values);
+}
+
+fct_result fct_log_reserve(fct_simplifier *s) {
+    return s->channel_count ? grow_wedges(s, SIMPLIFY_MAX_WEDGES) : FCT_OK;
+}
+
+static uint16_t find_highest_key(const fct_simplifier *s, uint32_t corner, uint16_t key) {
+    for (uint32_t k = 0; k < 3; ++k) {
+        uint32_t p = s->triangles[corner - corner % 3 + k];
+        if (s->log->keys[p] > key) key = s->log->keys[p];
+    }
+    return key;
+}
+
+void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
+    fct_log *log = s->log;
+    uint16_t key = (uint16_t)s->queue->current;
+    for (uint32_t i = 0; i < count_b; ++i) key = find_highest_key(s, s->ring_b[i], key);
+    /* A hub does not move, so the faces at it that b does not share stay as they are. */
+    if (point_at(s, a)->valence <= SIMPLIFY_HUB)
+        for (uint32_t c = point_at(s, a)->first_corner; c != FCT_NONE; c = s->next_corners[c])
+            if (!corner_dead(s, c)) key = find_highest_key(s, c, key);
+    log->keys[a] = key;
+    log->records[log->count] =
+        (fct_record){.kept = a, .gone = b, .key = key, .first_wedge = (uint32_t)log->wedge_count};
+}
+
+/* Writes the attributes of a wedge. Wedges of one class share a vertex, so they get equal colours and
+ * normals: those of the first one. */
+static void write_wedge(fct_simplifier *s, const fct_record *record, uint32_t wedge, float *to) {
+    const fct_log *log = s->log;
+    const double *from = s->attributes + (size_t)s->channel_count * wedge;
+    uint32_t first = FCT_NONE, class = fct_sets_find(s->class_parents, s->wedge_classes[wedge]);
+    for (uint32_t i = record->first_wedge; i < log->wedge_count && first == FCT_NONE; ++i)
+        if (fct_sets_find(s->class_parents, s->wedge_classes[log->wedges[i]]) == class) first = i;
+    for (uint32_t i = 0; i < s->channel_count; ++i)
+        to[i] = first == FCT_NONE || s->channels[i].source == CHANNEL_TEXCOORD
+                    ? (float)(from[i] / s->channels[i].factor)
+                    : log->values[(size_t)s->channel_count * first + i];
+}
+
+void fct_log_end(fct_simplifier *s, double error) {
+    fct_log *log = s->log;
+    fct_record *record = &log->records[log->count];
+    write_point(s, record->kept, record->at);
+    record->error = (float)(error * s->extent);
+    for (uint32_t w = s->channel_count ? s->first_wedges[record->kept] : FCT_NONE; w != FCT_NONE;
+         w = s->next_wedges[w]) {
+        write_wedge(s, record, w, log->values + s->channel_count * log->wedge_count);
+        log->wedges[log->wedge_count++] = w;
+        ++record->wedge_count;
+    }
+    ++log->count;
+}
+
+fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t points, uint32_t wedges,
+                         fct_log **out) {
+    *out = NULL;
+    if (!s->log) return FCT_OK;
+    if (!s->channel_count) wedges = 0;
+    size_t wedge_room = (size_t)blocks * wedges;
+    fct_log all = {0}, *logs;
+    const fct_array arrays[] = {FCT_ARRAY(logs, blocks), FCT_ARRAY(all.records, (size_t)blocks * points),
+                                FCT_ARRAY(all.wedges, wedge_room),
+                                FCT_ARRAY(all.values, wedge_room * s->channel_count)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the logs of a sweep");
+    if (result != FCT_OK) return result;
+    for (size_t b = 0; b < blocks; ++b)
+        logs[b] = (fct_log){.records = all.records + b * points,
+                            .wedges = all.wedges + b * wedges,
+                            .values = all.values + b * wedges * s->channel_count,
+                            .keys = s->log->keys};
+    *out = logs;
+    return FCT_OK;
+}
+
+fct_result fct_log_join(fct_simplifier *s, fct_log *logs, uint32_t blocks) {
+    if (!logs) return FCT_OK;
+    fct_log *to = s->log;
+    fct_result result = FCT_OK;
+    for (uint32_t b = 0; b < blocks && result == FCT_OK; ++b) {
+        const fct_log *from = &logs[b];
+        if (s->channel_count) result = grow_wedges(s, from->wedge_count);
+        if (result != FCT_OK) break;
+        for (uint32_t i = 0; i < from->count; ++i) {
+            to->records[to->count] = from->records[i];
+            to->records[to->count++].first_wedge += (uint32_t)to->wedge_count;
+        }
+        if (from->wedge_count) {
+            size_t n = s->channel_count;
+            memcpy(to->wedges + to->wedge_count, from->wedges, from->wedge_count * sizeof *to->wedges);
+            memcpy(to->values + n * to->wedge_count, from->values,
+                   n * from->wedge_count * sizeof *to->values);
+            to->wedge_count += from->wedge_count;
+        }
+    }
+    void *arrays[] = {logs->records, logs->wedges, logs->values, logs};
+    for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(s->env, arrays[i]);
+    return result;
+}

@@ -1,0 +1,240 @@
+/* simplify/progressive/level.c: goes to a level and writes its mesh. */
+#include <math.h>
+#include <string.h>
+
+#include "base/math/vec.h"
+#include "simplify/progressive/progressive.h"
+
+void fct_progressive_forward(fct_progressive *m) {
+    uint32_t step = m->level++;
+    for (uint32_t n = m->step_nodes[step]; n < m->step_nodes[step + 1]; ++n) {
+        uint32_t h = m->handles[n];
+        m->nodes[h] = n;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
+            m->triangles[m->corners[i]] = h;
+    }
+}
+
+void fct_progressive_backward(fct_progressive *m) {
+    uint32_t step = --m->level;
+    for (uint32_t n = m->step_nodes[step]; n < m->step_nodes[step + 1]; ++n) {
+        uint32_t parent = m->parents[n];
+        if (parent == FCT_NONE) continue;
+        uint32_t h = m->handles[parent];
+        m->nodes[h] = parent;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
+            m->triangles[m->corners[i]] = h;
+    }
+}
+
+fct_result fct_progressive_begin(fct_progressive *m) {
+    const fct_array arrays[] = {FCT_ARRAY(m->vertices, m->handle_count),
+                                FCT_ARRAY(m->point_vertices, m->texcoord == FCT_NONE ? 0 : m->point_count)};
+    fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a progressive mesh");
+    if (result != FCT_OK) return result;
+    memset(m->vertices, 0xff, m->handle_count * sizeof *m->vertices);
+    if (m->texcoord != FCT_NONE) memset(m->point_vertices, 0xff, m->point_count * sizeof *m->point_vertices);
+    while (m->level < 1) fct_progressive_forward(m);
+    while (m->level > 1) fct_progressive_backward(m);
+    return FCT_OK;
+}
+
+void fct_progressive_destroy(fct_progressive *m) {
+    if (!m) return;
+    for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
+        fct_release(m->env, m->material_names[i]);
+    void *arrays[] = {m->material_names, m->step_nodes,    m->step_faces, m->errors,    m->parents,
+                      m->handles,        m->points,        m->corners,    m->positions, m->first_corners,
+                      m->values,         m->triangles,     m->materials,  m->nodes,     m->face_colors,
+                      m->vertices,       m->point_vertices};
+    for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(m->env, arrays[i]);
+    fct_release(m->env, m);
+}
+
+void fct_progressive_inspect(const fct_progressive *m, fct_progressive_info *out) {
+    *out = (fct_progressive_info){.least_faces = m->step_faces[1],
+                                  .most_faces = m->face_count,
+                                  .split_count = m->step_count - 1,
+                                  .total_faces = m->total_faces,
+                                  .faces = m->step_faces[m->level],
+                                  .error = (double)m->errors[m->level - 1]};
+}
+
+/* The finest level of at most `faces` faces, or 1. */
+static uint32_t find_level(const fct_progressive *m, uint32_t faces) {
+    uint32_t low = 1, high = m->step_count;
+    while (low < high) {
+        uint32_t middle = high - (high - low) / 2;
+        if (m->step_faces[middle] <= faces)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    return low;
+}
+
+static uint32_t go_to_level(fct_progressive *m, uint32_t level) {
+    while (m->level < level) fct_progressive_forward(m);
+    while (m->level > level) fct_progressive_backward(m);
+    return m->step_faces[level];
+}
+
+uint32_t fct_progressive_go(fct_progressive *m, uint32_t faces) {
+    return go_to_level(m, find_level(m, faces));
+}
+
+uint32_t fct_progressive_go_error(fct_progressive *m, double error) {
+    uint32_t low = 1, high = m->step_count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if ((double)m->errors[middle - 1] <= error)
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return go_to_level(m, low);
+}
+
+/* A mesh of a level, as it is written. */
+typedef struct level_mesh {
+    fct_progressive *m;
+    fct_mesh *out;
+    uint32_t vertex_count;
+    uint32_t *nodes; /* per vertex */
+    uint32_t *next;  /* per vertex: the vertex before it at the same point */
+    uint32_t least;  /* of a geomorph: the nodes below exist in the coarser level */
+    double t;        /* 1: no geomorph */
+} level_mesh;
+
+static bool same_floats(const float *a, const float *b) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* Whether two nodes of one point differ at most in texture coordinates. */
+static bool share_vertex(const fct_progressive *m, uint32_t a, uint32_t b) {
+    const float *x = m->values + (size_t)m->value_count * a, *y = m->values + (size_t)m->value_count * b;
+    return (m->color == FCT_NONE || same_floats(x + m->color, y + m->color)) &&
+           (m->normal == FCT_NONE || same_floats(x + m->normal, y + m->normal));
+}
+
+static uint32_t find_vertex(level_mesh *l, uint32_t handle) {
+    const fct_progressive *m = l->m;
+    uint32_t node = m->nodes[handle], first = FCT_NONE;
+    if (m->texcoord != FCT_NONE) {
+        first = m->point_vertices[m->points[node]];
+        for (uint32_t v = first; v != FCT_NONE; v = l->next[v])
+            if (share_vertex(m, l->nodes[v], node)) return v;
+        l->next[l->vertex_count] = first;
+        m->point_vertices[m->points[node]] = l->vertex_count;
+    }
+    l->nodes[l->vertex_count] = node;
+    return l->vertex_count++;
+}
+
+/* Numbers the vertices in the order of their first use. vertices[handle] receives the vertex. */
+static void number_vertices(level_mesh *l) {
+    const fct_progressive *m = l->m;
+    for (size_t c = 0; c < 3 * (size_t)m->step_faces[m->level]; ++c) {
+        uint32_t h = m->triangles[c];
+        if (m->vertices[h] == FCT_NONE) m->vertices[h] = find_vertex(l, h);
+    }
+}
+
+/* The node of the coarser level that a node belongs to. */
+static uint32_t find_ancestor(const level_mesh *l, uint32_t node) {
+    while (l->t < 1 && node >= l->least && l->m->parents[node] != FCT_NONE) node = l->m->parents[node];
+    return node;
+}
+
+static void blend_floats(const level_mesh *l, const float *a, const float *b, size_t count, float *out) {
+    for (size_t i = 0; i < count; ++i)
+        out[i] = l->t < 1 ? (float)((1 - l->t) * (double)a[i] + l->t * (double)b[i]) : b[i];
+}
+
+static void write_vertex(level_mesh *l, uint32_t v) {
+    const fct_progressive *m = l->m;
+    size_t b = l->nodes[v], a = find_ancestor(l, l->nodes[v]), n = m->value_count;
+    blend_floats(l, m->positions + 3 * a, m->positions + 3 * b, 3, l->out->positions + 3 * (size_t)v);
+    if (l->out->colors)
+        blend_floats(l, m->values + n * a + m->color, m->values + n * b + m->color, 3,
+                     l->out->colors + 3 * (size_t)v);
+    if (!l->out->normals) return;
+    float *normal = l->out->normals + 3 * (size_t)v;
+    blend_floats(l, m->values + n * a + m->normal, m->values + n * b + m->normal, 3, normal);
+    v3 unit = v3_unit(v3_load(normal));
+    if (l->t < 1 && v3_norm2(unit) > 0) v3_store(normal, unit);
+}
+
+static void write_corner(level_mesh *l, size_t c) {
+    const fct_progressive *m = l->m;
+    l->out->triangles[c] = m->vertices[m->triangles[c]];
+    if (!l->out->texcoords) return;
+    size_t b = m->nodes[m->triangles[c]], a = find_ancestor(l, (uint32_t)b), n = m->value_count;
+    blend_floats(l, m->values + n * a + m->texcoord, m->values + n * b + m->texcoord, 2,
+                 l->out->texcoords + 2 * c);
+}
+
+static fct_result copy_names(const fct_progressive *m, fct_mesh *out) {
+    if (!m->material_names) {
+        out->material_count = m->material_count;
+        return FCT_OK;
+    }
+    out->material_names = fct_allocate_zero(m->env, m->material_count, sizeof *out->material_names);
+    if (!out->material_names) return fct_fail_memory(m->env, "material names");
+    out->material_count = m->material_count;
+    for (uint32_t i = 0; i < m->material_count; ++i) {
+        size_t size = strlen(m->material_names[i]) + 1;
+        out->material_names[i] = fct_allocate(m->env, size, 1);
+        if (!out->material_names[i]) return fct_fail_memory(m->env, "material names");
+        memcpy(out->material_names[i], m->material_names[i], size);
+    }
+    return FCT_OK;
+}
+
+static fct_result fill_mesh(level_mesh *l) {
+    const fct_progressive *m = l->m;
+    uint32_t faces = m->step_faces[m->level];
+    unsigned kinds = (m->color != FCT_NONE ? FCT_MESH_COLORS : 0) |
+                     (m->normal != FCT_NONE ? FCT_MESH_NORMALS : 0) |
+                     (m->texcoord != FCT_NONE ? FCT_MESH_TEXCOORDS : 0) |
+                     (m->face_colors ? FCT_MESH_FACE_COLORS : 0) | (m->materials ? FCT_MESH_MATERIALS : 0);
+    fct_result result = fct_mesh_create(m->env, l->vertex_count, faces, kinds, l->out);
+    if (result == FCT_OK) result = copy_names(m, l->out);
+    if (result != FCT_OK) return result;
+    memcpy(l->out->origin, m->origin, sizeof l->out->origin);
+    for (uint32_t v = 0; v < l->vertex_count; ++v) write_vertex(l, v);
+    for (size_t c = 0; c < 3 * (size_t)faces; ++c) write_corner(l, c);
+    if (m->materials) memcpy(l->out->materials, m->materials, faces * sizeof *m->materials);
+    if (m->face_colors)
+        memcpy(l->out->face_colors, m->face_colors, 3 * (size_t)faces * sizeof *m->face_colors);
+    return FCT_OK;
+}
+
+static fct_result make_mesh(fct_progressive *m, uint32_t least, double t, fct_mesh *out) {
+    level_mesh l = {.m = m, .out = out, .least = least, .t = t};
+    size_t corners = 3 * (size_t)m->step_faces[m->level];
+    const fct_array arrays[] = {FCT_ARRAY(l.nodes, corners),
+                                FCT_ARRAY(l.next, m->texcoord == FCT_NONE ? 0 : corners)};
+    *out = (fct_mesh){0};
+    fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a level");
+    if (result != FCT_OK) return result;
+    number_vertices(&l);
+    result = fill_mesh(&l);
+    for (size_t c = 0; c < corners; ++c) {
+        m->vertices[m->triangles[c]] = FCT_NONE;
+        if (m->texcoord != FCT_NONE) m->point_vertices[m->points[m->nodes[m->triangles[c]]]] = FCT_NONE;
+    }
+    if (result != FCT_OK) fct_mesh_release(m->env, out);
+    fct_release_all(m->env, arrays, FCT_LENGTH(arrays));
+    return result;
+}
+
+fct_result fct_progressive_mesh(fct_progressive *m, fct_mesh *out) {
+    return make_mesh(m, 0, 1, out);
+}
+
+fct_result fct_progressive_morph(fct_progressive *m, uint32_t faces, double t, fct_mesh *out) {
+    *out = (fct_mesh){0};
+    if (!(t >= 0 && t <= 1)) return fct_fail(m->env, FCT_ERROR_DATA, "t is %g, expected 0 to 1", t);
+    return make_mesh(m, m->step_nodes[find_level(m, faces)], t, out);
+}

@@ -1,0 +1,48 @@
+# tests/tools/test_levels.sh: progressive meshes: simplify --progressive and level.
+source "$(dirname "$0")/support.sh"
+sphere 20 >sphere.off
+"$program" convert sphere.off -o sphere.ply --quiet
+expect 0 simplify sphere.off --faces 60 -o small.ply --progressive sphere.fpm --json
+holds "$(value faces_after) == 60"
+expect 0 simplify sphere.off --faces 60 -o plain.ply
+check "the log does not change the result" cmp -s small.ply plain.ply
+holds "$(wc -c <sphere.fpm) < .6 * $(wc -c <sphere.ply)"
+expect 0 level sphere.fpm --faces 301 -o level.ply --json
+keys faces vertices least_faces most_faces total_faces splits max_cost seconds read level write total peak_bytes
+holds "$(value faces) == 300 && $(value least_faces) == 60 && $(value most_faces) == 1520 && $(value total_faces) == 1520"
+cp out level
+expect 0 simplify sphere.off --faces 301 --refit 0 -o same.ply --json
+check "the error of the level" test "$(value max_cost | cut -c 1-7)" = "$(value max_cost level | cut -c 1-7)"
+expect 0 compare level.ply same.ply --json
+holds "$(value e_max) < 1e-12"
+expect 0 level sphere.fpm --ratio 1 -o all.ply
+expect 0 compare all.ply sphere.ply --json
+holds "$(value e_max) < 1e-12"
+expect 0 level sphere.fpm --max-error .01 -o fine.ply --json
+holds "$(value max_cost) <= .01 && $(value max_cost) > .005 && $(value faces) < 1520"
+expect 0 level sphere.fpm --faces 10 -o least.ply
+says "the coarsest level has 60 faces, 10 were asked for"
+head -c 3000 sphere.fpm >part.fpm
+expect 0 level part.fpm --faces 100 -o level.ply
+says "truncated"
+expect 0 level part.fpm --faces 1500 -o level.ply --json
+says "were asked for"
+holds "$(value faces) > 60 && $(value faces) < 1500"
+expect 0 level - --faces 100 -o - <sphere.fpm
+check "a PLY on standard output" test "$(head -c 3 out)" = ply
+head -c 200 sphere.fpm >part.fpm
+expect 65 level part.fpm --faces 100 -o x.ply
+says "truncated in the base mesh"
+expect 65 level sphere.off --faces 100 -o x.ply
+says "no progressive mesh"
+expect 66 level absent.fpm --faces 100 -o x.ply
+expect 64 level sphere.fpm -o x.ply
+says "expected --faces N, --ratio R or --max-error E"
+expect 64 level sphere.fpm --faces 10 --ratio .5 -o x.ply
+expect 64 level sphere.fpm --ratio 0 -o x.ply
+expect 64 level sphere.fpm --faces 10 -o x.fpm
+expect 64 simplify sphere.off --faces 10 -o x.ply --progressive x.ply
+says "expected a name that ends in .fpm"
+expect 73 simplify sphere.off --faces 10 -o x.ply --progressive absent/x.fpm
+leftovers
+finish
