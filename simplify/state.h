@@ -142,7 +142,7 @@ typedef struct fct_simplifier {
     uint32_t link_epoch;
     fct_side_mark *side_marks; /* per point */
     uint32_t side_epoch;
-    double max_error2; /* largest squared error of a contraction that was made */
+    double max_error2;   /* largest squared error of a contraction that was made */
     struct fct_log *log; /* log.h; NULL: nothing is recorded */
 } fct_simplifier;
 

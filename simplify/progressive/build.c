@@ -481,8 +481,8 @@ fct_result fct_progressive_build(const fct_simplifier *s, fct_progressive **out)
     builder *b = fct_allocate_zero(s->env, 1, sizeof *b);
     fct_progressive *m = fct_allocate_zero(s->env, 1, sizeof *m);
     fct_result result = b && m ? FCT_OK : fct_fail_memory(s->env, "a progressive mesh");
+    if (m) m->env = s->env;
     if (result == FCT_OK) {
-        m->env = s->env;
         m->color = m->normal = m->texcoord = FCT_NONE;
         if (s->mesh->colors) m->color = m->value_count, m->value_count += 3;
         if (s->mesh->normals) m->normal = m->value_count, m->value_count += 3;

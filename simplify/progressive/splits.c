@@ -97,9 +97,8 @@ static uint32_t add_point(fct_splits *k, uint32_t point, int context, const floa
 
 enum { ATTRIBUTES = 3 };
 
-/* Fills in the guess of the values of a node whose parent has `parent` (FCT_NONE: none), and the context of
- * each attribute: 0: as the parent; 1: opposite to the node at the other end; 2: as another node of this end.
- */
+/* Fills in the guess of the values of a node, and the context of each: 0: as its parent (FCT_NONE: 0); 1: as
+ * another node of this end, whose parent has the same attribute. */
 static void guess_values(const fct_splits *k, uint32_t parent, uint32_t group, bool second, float *guess,
                          int contexts[PROGRESSIVE_VALUES]) {
     const fct_progressive *m = k->m;
@@ -108,24 +107,19 @@ static void guess_values(const fct_splits *k, uint32_t parent, uint32_t group, b
     for (int a = 0; a < ATTRIBUTES; ++a) {
         if (firsts[a] == FCT_NONE) continue;
         size_t first = firsts[a], bytes = sizes[a] * sizeof(float);
-        int context = 0;
         memset(guess + first, 0, bytes);
         if (parent == FCT_NONE) continue;
         const float *from = m->values + n * parent + first;
         memcpy(guess + first, from, bytes);
-        for (uint32_t i = 0; i < k->member_count && group != FCT_NONE && context < 2; ++i) {
+        for (uint32_t i = 0; i < k->member_count && group != FCT_NONE; ++i) {
             const stream_member *o = &k->members[i];
-            const float *other = m->values + n * o->node + first;
-            if (o->group == FCT_NONE) continue;
-            if (o->second == second && !memcmp(from, m->values + n * m->parents[o->node] + first, bytes)) {
-                context = 2;
-                memcpy(guess + first, other, bytes);
-            } else if (o->second != second && o->group == group) {
-                context = 1;
-                for (uint32_t j = 0; j < sizes[a]; ++j) guess[first + j] = from[j] + from[j] - other[j];
-            }
+            if (o->group == FCT_NONE || o->second != second ||
+                memcmp(from, m->values + n * m->parents[o->node] + first, bytes))
+                continue;
+            memcpy(guess + first, m->values + n * o->node + first, bytes);
+            for (uint32_t x = 0; x < sizes[a]; ++x) contexts[first + x] = 1;
+            break;
         }
-        for (uint32_t j = 0; j < sizes[a]; ++j) contexts[first + j] = context;
     }
 }
 

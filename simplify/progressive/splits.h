@@ -65,7 +65,7 @@ typedef struct fct_splits {
     struct {
         fct_model split, side[2], another, turned, neighbour, new_point, new_handle, first_handle, new_member,
             first_member, material, face_color;
-        fct_number_models faces, distance, list, error, position[3][3], value[3][PROGRESSIVE_VALUES], color;
+        fct_number_models faces, distance, list, error, position[3][3], value[2][PROGRESSIVE_VALUES], color;
     } models;
 } fct_splits;
 

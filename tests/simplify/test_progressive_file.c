@@ -1,4 +1,5 @@
 /* Progressive mesh files: what is saved is loaded; small; readable from the front; damage is found. */
+#define _GNU_SOURCE
 #include "levels.h"
 #include "mend_levels.h"
 
@@ -207,6 +208,33 @@ static void malformed_streams_are_harmless(void **state) {
     }
 }
 
+/* A stream whose values a mesh cannot have is not written, or refused. */
+static void impossible_values_are_refused(void **state) {
+    (void)state;
+    fct_mesh torus = make_torus(&env, 6, false, true);
+    for (int fault = 0; fault < 7; ++fault) {
+        fct_progressive *made = progressive_of(&env, &torus, fct_simplify_def_default(), 50), *read;
+        if (fault == 1) made->positions[3 * (size_t)made->node_count - 1] = INFINITY;
+        if (fault == 2) made->values[7] = NAN;
+        if (fault == 3) made->values[(size_t)made->value_count * made->node_count - 1] = INFINITY;
+        if (fault == 4) made->face_colors[3 * (size_t)made->face_count - 1] = NAN;
+        if (fault == 5) made->material_count = 0;
+        if (fault == 6) made->errors[9] = 2 * made->errors[8];
+        char *bytes = NULL;
+        size_t size = 0;
+        FILE *stream = open_memstream(&bytes, &size);
+        fct_result written = fct_progressive_write(made, stream);
+        fclose(stream);
+        fct_result result = fct_progressive_read(&env, "a file", (unsigned char *)bytes, size, &read);
+        /* The writer looks at most values too. */
+        assert_int_equal(written != FCT_OK ? written : result, fault ? FCT_ERROR_DATA : FCT_OK);
+        free(bytes);
+        fct_progressive_destroy(made);
+        fct_progressive_destroy(read);
+    }
+    fct_mesh_release(&env, &torus);
+}
+
 /* Limits are 5 % above what was measured. */
 static void files_are_smaller_than_binary_plys(void **state) {
     (void)state;
@@ -229,9 +257,11 @@ int main(void) {
     env = fct_env_default();
     env.message = recorder_message;
     env.message_user = &heard;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(loads_what_was_saved), cmocka_unit_test(truncated_files_give_coarse_levels),
-        cmocka_unit_test(damage_is_found), cmocka_unit_test(malformed_streams_are_harmless),
-        cmocka_unit_test(files_are_smaller_than_binary_plys)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(loads_what_was_saved),
+                                       cmocka_unit_test(truncated_files_give_coarse_levels),
+                                       cmocka_unit_test(damage_is_found),
+                                       cmocka_unit_test(malformed_streams_are_harmless),
+                                       cmocka_unit_test(impossible_values_are_refused),
+                                       cmocka_unit_test(files_are_smaller_than_binary_plys)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
