@@ -184,11 +184,44 @@ static void losses_are_distances_to_the_remaining_faces(void **state) {
     assert_true(largest > 1e-4); /* the loss mattered somewhere */
 }
 
+/* On a finely divided sphere every fan is level: its losses are far below the costs, so they may be left out.
+ * A spike is never level. */
+static void level_fans_lose_nothing(void **state) {
+    (void)state;
+    fct_mesh meshes[2] = {make_sphere(&env, 24), make_spikes(0)};
+    uint32_t level[2] = {0}, all[2] = {0};
+    double lost = 0, cost = 0;
+    for (int kind = 0; kind < 2; ++kind) {
+        fct_simplify_def def = fct_simplify_def_default();
+        fct_simplifier *s = open_simplifier(&env, &meshes[kind], &def);
+        for (uint32_t e = 0; e < s->edge_count; ++e) {
+            uint32_t a = s->edges[e].ends[0], b = s->edges[e].ends[1];
+            fct_candidate c;
+            fct_loss loss;
+            if (!fct_place(s, a, b, false, &c)) continue;
+            uint32_t count_a = fct_simplify_gather(s, a, s->ring_a),
+                     count_b = fct_simplify_gather(s, b, s->ring_b);
+            const fct_move move = {a, b, count_a, count_b, c.at};
+            if (!fct_simplify_remains_good(s, &move)) continue;
+            ++all[kind];
+            if (!fct_simplify_is_level(s)) continue;
+            ++level[kind];
+            lost += fct_loss_measure(s, a, b, count_a, count_b, &c, &loss), cost += c.error;
+        }
+        fct_simplifier_destroy(s);
+        fct_mesh_release(&env, &meshes[kind]);
+    }
+    assert_true(level[0] > all[0] - all[0] / 10);
+    assert_true(level[1] < all[1] / 2);
+    assert_true(lost < .1 * cost);
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nearest_points_are_nearest),
         cmocka_unit_test(losses_are_distances_to_the_remaining_faces),
+        cmocka_unit_test(level_fans_lose_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

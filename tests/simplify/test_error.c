@@ -1,0 +1,113 @@
+/* The errors of a result, and that sweeps over blocks keep it valid, exact in its number of faces, and the
+ * same for every number of threads. */
+#include "shapes.h"
+
+static fct_env env;
+
+enum { N = 4 };
+
+/* A square of N x N cells, whose middle vertex is raised by `height` and brighter by `light`. */
+static fct_mesh make_bump(float height, float light) {
+    fct_mesh mesh;
+    assert_int_equal(
+        fct_mesh_create(&env, (N + 1) * (N + 1), 2 * N * N, FCT_MESH_COLORS | FCT_MESH_TEXCOORDS, &mesh),
+        FCT_OK);
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+        uint32_t x = v % (N + 1), y = v / (N + 1);
+        bool middle = x == N / 2 && y == N / 2;
+        const float p[3] = {(float)x, (float)y, middle ? height : 0};
+        memcpy(mesh.positions + 3 * v, p, sizeof p);
+        for (uint32_t k = 0; k < 3; ++k)
+            mesh.colors[3 * v + k] = .1f + .05f * (float)x + (middle ? light * (float)(k + 1) : 0);
+    }
+    uint32_t *t = mesh.triangles;
+    for (uint32_t y = 0; y < N; ++y)
+        for (uint32_t x = 0; x < N; ++x) {
+            uint32_t a = y * (N + 1) + x, b = a + 1, c = a + N + 2, d = a + N + 1;
+            const uint32_t two[6] = {a, b, c, a, c, d};
+            memcpy(t, two, sizeof two);
+            t += 6;
+        }
+    for (uint32_t c = 0; c < 3 * mesh.face_count; ++c) {
+        const float *p = mesh.positions + 3 * mesh.triangles[c];
+        mesh.texcoords[2 * c] = p[0] / N, mesh.texcoords[2 * c + 1] = p[1] / N + (p[2] > 0 ? .2f : 0);
+    }
+    return mesh;
+}
+
+/* Two triangles replace the square: every sample is as far from them as it is high. Vertices count with a
+ * twelfth of the areas around them, centroids with three quarters. */
+static void errors_are_those_of_a_bump(void **state) {
+    (void)state;
+    const double height = .6, light = .1;
+    fct_mesh mesh = make_bump((float)height, (float)light);
+    double all = mesh_area(&mesh), middle = 0, faces = 0; /* around the middle vertex; their number */
+    for (uint32_t f = 0; f < mesh.face_count; ++f)
+        for (uint32_t k = 0; k < 3; ++k)
+            if (mesh.triangles[3 * f + k] == N / 2 * (N + 1) + N / 2)
+                middle += .5 * v3_norm(face_cross(&mesh, f)), ++faces;
+    assert_true(faces == 6);
+    /* the share of a square: the vertex itself, and its faces' centroids at a third */
+    double share = (middle / 12 + .75 * middle / 9) / all;
+    fct_simplify_def def = fct_simplify_def_default();
+    def.target_faces = 2;
+    def.placement = FCT_PLACE_SUBSET;
+    fct_simplify_stats stats;
+    fct_mesh out = simplified(&env, &mesh, &def, &stats);
+    assert_int_equal(out.face_count, 2);
+    assert_true(fabs(stats.distance_rms - height * sqrt(share)) < 1e-5);
+    assert_true(fabs(stats.distance_max - height) < 1e-5);
+    /* one component: the mean over light, 2 light and 3 light squared */
+    assert_true(fabs(stats.color_rms - light * sqrt(14 / 3. * share)) < 1e-5);
+    assert_true(fabs(stats.texcoord_rms - .2 * sqrt(share)) < 1e-5);
+    assert_true(stats.normal_rms == 0);
+    fct_mesh_release(&env, &out);
+    def.target_faces = mesh.face_count; /* nothing to do, no error */
+    out = simplified(&env, &mesh, &def, &stats);
+    assert_true(stats.distance_rms == 0 && stats.distance_max == 0 && stats.color_rms == 0);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
+/* A closed surface of 90,000 faces goes through several sweeps. */
+static void blocks_give_the_same_on_all_threads(void **state) {
+    (void)state;
+    fct_mesh sphere = make_sphere(&env, 150);
+    assert_true(sphere.face_count > 80000);
+    const uint32_t targets[] = {40000, 3001, 500};
+    for (int i = 0; i < 3; ++i) {
+        fct_simplify_def def = fct_simplify_def_default();
+        def.target_faces = targets[i];
+        fct_mesh out[2];
+        fct_simplify_stats stats[2];
+        for (int k = 0; k < 2; ++k) {
+            fct_env own = env;
+            own.thread_count = k ? 4 : 1;
+            out[k] = simplified(&own, &sphere, &def, &stats[k]);
+        }
+        assert_int_equal(out[0].face_count, out[1].face_count);
+        assert_int_equal(out[0].face_count, targets[i] / 2 * 2);
+        assert_memory_equal(out[0].positions, out[1].positions, 12 * (size_t)out[0].vertex_count);
+        assert_memory_equal(out[0].triangles, out[1].triangles, 12 * (size_t)out[0].face_count);
+        assert_true(stats[0].distance_rms == stats[1].distance_rms && stats[0].max_cost == stats[1].max_cost);
+        /* Equilateral triangles of n faces that cut a unit sphere best are .26 / n times its area away: the
+         * mean square of h^2 (1/6 - r^2) over a triangle, with its plane at the mean height. */
+        assert_true(stats[0].distance_rms < 8. / targets[i]);
+        fct_mesh_report report;
+        assert_int_equal(fct_mesh_inspect(&env, &out[0], &report), FCT_OK);
+        assert_int_equal(report.boundary_edges + report.nonmanifold_edges + report.duplicate_faces +
+                             report.degenerate_faces,
+                         0);
+        for (int k = 0; k < 2; ++k) fct_mesh_release(&env, &out[k]);
+    }
+    fct_mesh_release(&env, &sphere);
+}
+
+int main(void) {
+    env = fct_env_default();
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(errors_are_those_of_a_bump),
+        cmocka_unit_test(blocks_give_the_same_on_all_threads),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
