@@ -143,7 +143,7 @@ typedef struct fct_simplifier {
     fct_side_mark *side_marks; /* per point */
     uint32_t side_epoch;
     double max_error2; /* largest squared error of a contraction that was made */
-    struct fct_log *log; /* log.h; NULL: nothing is recorded */
+    struct fct_log *log;  /* log.h; NULL: nothing is recorded */
 } fct_simplifier;
 
 static inline void use_scratch(fct_simplifier *s, fct_scratch *scratch) {

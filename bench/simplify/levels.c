@@ -2,9 +2,9 @@
  * the resolution.
  *
  * usage: levels MESH [FACES], FACES of the base mesh: default 200.
- * Goes from the coarsest level to the finest and back, 100 times or for a second, as Fahn, Chen and Shiau do for
- * table 1 of "Polygonal Mesh Simplification with Face Color and Boundary Edge Preservation Using Quadric Error
- * Metric".
+ * Goes from the coarsest level to the finest and back, 100 times or for a second, as Fahn, Chen and Shiau do
+ * for table 1 of "Polygonal Mesh Simplification with Face Color and Boundary Edge Preservation Using Quadric
+ * Error Metric".
  */
 #include <stdio.h>
 #include <sys/stat.h>
