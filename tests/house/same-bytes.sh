@@ -55,7 +55,7 @@ write_outputs() {
         done
         # shellcheck disable=SC2086 # a list of words
         "$@" bake "$in/cornell/scene.json" $light -o "$out/lit.ply" --also "$out/lit.glb" --quiet
-        "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --quiet
+        "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --progressive "$out/fewer.fpm" --quiet
         "$@" simplify "$out/lit.ply" --ratio .3 -o "$out/fewer-lit.glb" --quiet
         "$@" compare "$in/mesh.ply" "$out/fewer.ply" --samples 2 | grep -vE 'seconds|bytes' >"$out/compare.txt"
     } 2>"$out.err"
@@ -74,7 +74,7 @@ fine="--error 1e-3" coarse="--error 1e-2 --max-edge .5" # an emulated processor 
 make_inputs inputs 12000
 make_inputs small 1500
 FACETREE_SIMD=baseline write_outputs inputs first "$fine" "$program"
-[ "$(find first -type f -size +0 | wc -l)" = 23 ] || { echo "expected 23 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
+[ "$(find first -type f -size +0 | wc -l)" = 24 ] || { echo "expected 24 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
 variants=baseline
 FACETREE_SIMD=avx2 "$program" --version >/dev/null 2>&1 && variants="baseline avx2"
 threads() { "$@" --threads "$count"; }

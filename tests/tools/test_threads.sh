@@ -18,13 +18,13 @@ for threads in 1 2 5; do
     expect 0 cluster bumpy.off -o $threads.fct --threads $threads --quiet
     expect 0 simplify bumpy.off --ratio .1 -o $threads.ply --threads $threads --quiet
     expect 0 bake scene.json -o $threads.glb --error $error --threads $threads --quiet
-    expect 0 simplify $threads.glb --ratio .2 -o $threads-lit.ply --threads $threads --quiet
+    expect 0 simplify $threads.glb --ratio .2 -o $threads-lit.ply --progressive $threads-lit.fpm --threads $threads --quiet
     expect 0 compare bumpy.off 1.ply --threads $threads
     cp out $threads.txt
     sed -i '/^seconds/d' $threads.txt
 done
 for threads in 2 5; do
-    for file in .fct .ply .glb -lit.ply .txt -touching.txt; do
+    for file in .fct .ply .glb -lit.ply -lit.fpm .txt -touching.txt; do
         check "$threads threads make the same $file as one" cmp -s 1$file $threads$file
     done
 done
