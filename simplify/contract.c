@@ -180,9 +180,11 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     uint32_t before = s->live_faces, contractions = 0;
     *stop = FCT_STOP_FACES;
     if (before <= s->def->target_faces) return FCT_OK;
-    fct_result result =
-        fct_parallel_for_progress(s->env, "costs", s->edge_count, EDGE_CHUNK, find_first_buckets, s);
+    fct_result result = FCT_OK;
+    if (!s->priced)
+        result = fct_parallel_for_progress(s->env, "costs", s->edge_count, EDGE_CHUNK, find_first_buckets, s);
     if (result != FCT_OK) return result;
+    s->priced = true;
     result = fct_simplify_sweep(s, contract_block);
     if (result != FCT_OK) return result;
     queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);

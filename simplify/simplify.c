@@ -88,18 +88,40 @@ static fct_result run_contractions(fct_simplifier *s, fct_stop *stop, fct_progre
     return result;
 }
 
-/* Contracts, refits and writes a sorted mesh. */
+/* What the refit changes. */
+typedef struct kept {
+    v3 *positions;
+    uint32_t *sources;
+    double *attributes;
+} kept;
+
+static void exchange(fct_simplifier *s, kept *k, bool restore) {
+    for (uint32_t p = 0; p < s->point_count; ++p) {
+        fct_point *point = point_at(s, p);
+        if (restore)
+            point->at = k->positions[p], point->source = k->sources[p];
+        else
+            k->positions[p] = point->at, k->sources[p] = point->source;
+    }
+    size_t bytes = (size_t)s->wedge_count * s->channel_count * sizeof(double);
+    if (s->channel_count)
+        memcpy(restore ? s->attributes : k->attributes, restore ? k->attributes : s->attributes, bytes);
+}
+
+/* Contracts, refits and writes a sorted mesh. keep: room for what the refit changes, which is then undone;
+ * NULL: the refit stays. */
 static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out, bool measure,
-                                 fct_simplify_stats *stats, fct_progressive **progressive) {
+                                 fct_simplify_stats *stats, fct_progressive **progressive, kept *keep) {
     double start = fct_seconds();
     fct_fit fit = {0};
     fct_result result = run_contractions(s, &stats->stopped_because, progressive);
     double contracted = fct_seconds();
     stats->seconds_contract = contracted - start;
     bool changed = s->live_faces < s->face_count;
+    if (result == FCT_OK && keep) exchange(s, keep, false);
     if (result == FCT_OK && changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
     if (result == FCT_OK) result = fct_simplify_output(s, places, out);
-    if (result != FCT_OK) fct_mesh_release(s->env, out);
+    if (result == FCT_OK && keep) exchange(s, keep, true);
     stats->seconds_refit = fct_seconds() - contracted;
     stats->faces_after = out->face_count;
     stats->max_cost = sqrt(s->max_error2) * s->extent;
@@ -107,10 +129,38 @@ static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_
     return result;
 }
 
-/* progressive may be NULL. */
+/* The results that one run makes. */
+typedef struct wanted {
+    const uint32_t *target_faces;
+    uint32_t count;
+    fct_mesh *out;
+    fct_simplify_stats *stats;     /* may be NULL */
+    fct_progressive **progressive; /* NULL: none; only with one result */
+} wanted;
+
+/* Each level begins where the contractions of the level before ended, without its refit. */
+static fct_result run_levels(fct_simplifier *s, fct_simplify_def *def, const uint32_t *places,
+                             const wanted *w, const fct_simplify_stats *start) {
+    kept k;
+    bool several = w->count > 1;
+    const fct_array arrays[] = {
+        FCT_ARRAY_IF(several, k.positions, s->point_count), FCT_ARRAY_IF(several, k.sources, s->point_count),
+        FCT_ARRAY_IF(several, k.attributes, (size_t)s->wedge_count * s->channel_count)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "levels");
+    for (uint32_t i = 0; i < w->count && result == FCT_OK; ++i) {
+        fct_simplify_stats found = *start;
+        def->target_faces = w->target_faces[i];
+        result = run_simplifier(s, places, &w->out[i], w->stats != NULL, &found, w->progressive,
+                                several ? &k : NULL);
+        if (result == FCT_OK && w->stats) w->stats[i] = found;
+    }
+    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
+    return result;
+}
+
 static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
-                           fct_mesh *out, fct_simplify_stats *stats, fct_progressive **progressive) {
-    *out = (fct_mesh){0};
+                           const wanted *w) {
+    for (uint32_t i = 0; i < w->count; ++i) w->out[i] = (fct_mesh){0};
     fct_result result = check_input(env, mesh, def);
     if (result != FCT_OK) return result;
     double start = fct_seconds();
@@ -120,25 +170,42 @@ static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_s
     if (result != FCT_OK) return result;
     fct_simplify_def own = *def;
     own.locks = sorted.locks;
+    own.target_faces = w->target_faces[0];
     fct_simplifier *s;
     result = fct_simplifier_create(env, &sorted.mesh, &own, &s);
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = run_simplifier(s, sorted.places, out, stats != NULL, &found, progressive);
+    if (result == FCT_OK) result = run_levels(s, &own, sorted.places, w, &found);
     fct_simplifier_destroy(s);
     fct_simplify_release_sorted(env, &sorted);
-    if (result == FCT_OK && stats) *stats = found;
+    for (uint32_t i = 0; i < w->count && result != FCT_OK; ++i) fct_mesh_release(env, &w->out[i]);
     return result;
 }
 
 fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def, fct_mesh *out,
                         fct_simplify_stats *stats) {
-    return simplify(env, mesh, def, out, stats, NULL);
+    const wanted w = {&def->target_faces, 1, out, stats, NULL};
+    return simplify(env, mesh, def, &w);
+}
+
+fct_result fct_simplify_levels(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                               const uint32_t *target_faces, uint32_t count, fct_mesh *out,
+                               fct_simplify_stats *stats) {
+    const wanted w = {target_faces, count, out, stats, NULL};
+    for (uint32_t i = 0; i < count; ++i) out[i] = (fct_mesh){0};
+    if (count == 0) return fct_fail(env, FCT_ERROR_DATA, "0 levels, expected at least 1");
+    for (uint32_t i = 1; i < count; ++i)
+        if (target_faces[i] >= target_faces[i - 1])
+            return fct_fail(env, FCT_ERROR_DATA,
+                            "level %u has %u faces, expected fewer than the %u of level %u", i + 1,
+                            target_faces[i], target_faces[i - 1], i);
+    return simplify(env, mesh, def, &w);
 }
 
 fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                     fct_mesh *out, fct_simplify_stats *stats, fct_progressive **progressive) {
     *progressive = NULL;
-    fct_result result = simplify(env, mesh, def, out, stats, progressive);
+    const wanted w = {&def->target_faces, 1, out, stats, progressive};
+    fct_result result = simplify(env, mesh, def, &w);
     if (result == FCT_OK) return FCT_OK;
     fct_progressive_destroy(*progressive);
     *progressive = NULL;

@@ -143,6 +143,7 @@ typedef struct fct_simplifier {
     fct_side_mark *side_marks; /* per point */
     uint32_t side_epoch;
     double max_error2;   /* largest squared error of a contraction that was made */
+    bool priced;         /* the edges have their first costs */
     struct fct_log *log; /* log.h; NULL: nothing is recorded */
 } fct_simplifier;
 

@@ -3,6 +3,7 @@
 #include "tools/commands.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,12 +12,16 @@
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
 
+enum { MOST_LEVELS = 32 };
+
 typedef struct simplify_options {
     fct_simplify_def def;
     bool faces_given, error_given, attributes_given;
     double ratio; /* 0: not given */
     const char *progressive;
-    double weights[3]; /* of color, uv, normal; negative: the default; NAN: not in the list */
+    double weights[3];          /* of color, uv, normal; negative: the default; NAN: not in the list */
+    double levels[MOST_LEVELS]; /* faces, or ratios below 1 */
+    uint32_t level_count;
 } simplify_options;
 
 enum {
@@ -32,12 +37,18 @@ enum {
     KEY_LOCK_BORDER,
     KEY_TOPOLOGY,
     KEY_REFIT,
-    KEY_PROGRESSIVE
+    KEY_PROGRESSIVE,
+    KEY_LEVELS
 };
 
 static const struct argp_option simplify_options_table[] = {
     {"faces", KEY_FACES, "N", 0, "Stop at N faces or fewer", 0},
     {"ratio", KEY_RATIO, "R", 0, "Stop at R times the faces of the input, above 0 and at most 1", 0},
+    {"levels", KEY_LEVELS, "LIST", 0,
+     "Write several levels in one run, such as 100000,10000,1000: faces, or ratios below 1, in descending "
+     "order. "
+     "With -o small.ply they are small-1.ply, small-2.ply and so on",
+     0},
     {"max-error", KEY_MAX_ERROR, "E", 0,
      "Make no contraction whose error is above E, a distance in the mesh's unit: the root mean square from "
      "the "
@@ -101,6 +112,24 @@ static error_t parse_attributes(simplify_options *o, char *list, struct argp_sta
     return 0;
 }
 
+static error_t parse_levels(simplify_options *o, char *list, struct argp_state *state) {
+    o->level_count = 0;
+    for (char *item = list; item;) {
+        char *comma = strchr(item, ',');
+        if (comma) *comma = 0;
+        if (o->level_count == MOST_LEVELS)
+            return tool_usage(state, "--levels: expected at most %d levels, found more", MOST_LEVELS);
+        double *level = &o->levels[o->level_count++];
+        error_t error = tool_parse_real(state, "--levels", item, 0, FCT_NONE - 1., level);
+        if (error) return error;
+        if (*level >= 1 && *level != floor(*level))
+            return tool_usage(state, "--levels: expected a number of faces or a ratio below 1, found '%s'",
+                              item);
+        item = comma ? comma + 1 : NULL;
+    }
+    return 0;
+}
+
 static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
     static const char *const weightings[] = {"area", "angle", "uniform", NULL}; /* in the order of the enum */
@@ -148,9 +177,13 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     case KEY_PROGRESSIVE:
         o->progressive = text;
         return 0;
+    case KEY_LEVELS:
+        return parse_levels(o, text, state);
     case ARGP_KEY_END:
         if (o->faces_given && o->ratio > 0)
             return tool_usage(state, "expected either --faces or --ratio, found both");
+        if (o->level_count > 0 && (o->faces_given || o->ratio > 0 || o->progressive))
+            return tool_usage(state, "--levels: expected neither --faces, --ratio nor --progressive");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -174,24 +207,36 @@ static int set_attribute_weights(tool *t, simplify_options *o, const fct_mesh *m
     return TOOL_DONE;
 }
 
-static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
-    static const char *const reasons[] = {
-        [FCT_STOP_FACES] = "faces", [FCT_STOP_ERROR] = "error", [FCT_STOP_EXHAUSTED] = "exhausted"};
-    double total = tool_seconds() - t->start;
-    tool_say(t, "%u faces to %u (stopped by %s), distance %.3g (largest %.3g), %.2f s", s->faces_before,
-             s->faces_after, reasons[s->stopped_because], s->distance_rms, s->distance_max, total);
-    return tool_json(
-        t,
-        json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f, s:{s:f, s:f, s:f, s:f}, s:I}",
-                  "faces_before", (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after,
-                  "vertices", (json_int_t)mesh->vertex_count, "stopped_because", reasons[s->stopped_because],
-                  "max_cost", s->max_cost, "distance_rms", s->distance_rms, "distance_max", s->distance_max,
-                  "color_rms", s->color_rms, "uv_rms", s->texcoord_rms, "normal_rms", s->normal_rms,
-                  "seconds", "init", s->seconds_init, "contract", s->seconds_contract, "refit",
-                  s->seconds_refit, "total", total, "peak_bytes", (json_int_t)tool_peak_bytes()));
+static const char *const stop_reasons[] = {
+    [FCT_STOP_FACES] = "faces", [FCT_STOP_ERROR] = "error", [FCT_STOP_EXHAUSTED] = "exhausted"};
+
+/* The keys of one result, without times. */
+static json_t *pack_result(const fct_mesh *mesh, const fct_simplify_stats *s) {
+    return json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "faces_before",
+                     (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after, "vertices",
+                     (json_int_t)mesh->vertex_count, "stopped_because", stop_reasons[s->stopped_because],
+                     "max_cost", s->max_cost, "distance_rms", s->distance_rms, "distance_max",
+                     s->distance_max, "color_rms", s->color_rms, "uv_rms", s->texcoord_rms, "normal_rms",
+                     s->normal_rms);
 }
 
-/* Checks the name of the progressive mesh before the work. */
+static void say_result(tool *t, const char *path, const fct_simplify_stats *s) {
+    tool_say(t, "%s%s%u faces to %u (stopped by %s), distance %.3g (largest %.3g), %.2f s", path ? path : "",
+             path ? ": " : "", s->faces_before, s->faces_after, stop_reasons[s->stopped_because],
+             s->distance_rms, s->distance_max, tool_seconds() - t->start);
+}
+
+static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
+    say_result(t, NULL, s);
+    json_t *all = pack_result(mesh, s);
+    json_object_set_new(all, "seconds",
+                        json_pack("{s:f, s:f, s:f, s:f}", "init", s->seconds_init, "contract",
+                                  s->seconds_contract, "refit", s->seconds_refit, "total",
+                                  tool_seconds() - t->start));
+    json_object_set_new(all, "peak_bytes", json_integer((json_int_t)tool_peak_bytes()));
+    return tool_json(t, all);
+}
+
 static int check_progressive(tool *t, const char *path) {
     if (!path) return TOOL_DONE;
     int code = tool_check_kind(t, path, "fpm", NULL);
@@ -210,10 +255,66 @@ static int simplify_mesh(tool *t, const simplify_options *o, const fct_mesh *mes
     return code;
 }
 
+static void warn_exhausted(tool *t, uint32_t target, const fct_simplify_stats *s) {
+    if (s->faces_after > target && s->stopped_because == FCT_STOP_EXHAUSTED)
+        tool_warn(t, "stopped at %u faces, because no more contractions are allowed", s->faces_after);
+}
+
+/* "small.ply" becomes "small-3.ply". The caller frees it. */
+static char *name_level(const char *path, uint32_t level) {
+    const char *dot = strrchr(path, '.');
+    size_t stem = dot ? (size_t)(dot - path) : strlen(path), room = strlen(path) + 16;
+    char *name = malloc(room);
+    if (name) snprintf(name, room, "%.*s-%u%s", (int)stem, path, level, dot ? dot : "");
+    return name;
+}
+
+/* Writes one level; `results` receives its keys. */
+static int save_level(tool *t, fct_gltf *gltf, uint32_t level, const fct_mesh *mesh,
+                      const fct_simplify_stats *s, json_t *results) {
+    char *path = name_level(t->output, level);
+    if (!path) return tool_fail(t, TOOL_MEMORY, "out of memory: a file name");
+    int code = tool_check_output(t, path);
+    if (code == TOOL_DONE)
+        code = gltf ? tool_save_gltf(t, gltf, path, mesh) : tool_save_mesh(t, path, mesh, 1);
+    if (code == TOOL_DONE) {
+        say_result(t, path, s);
+        json_t *keys = pack_result(mesh, s);
+        json_object_set_new(keys, "file", json_string(path));
+        json_array_append_new(results, keys);
+    }
+    free(path);
+    return code;
+}
+
+static int run_levels(tool *t, simplify_options *o, fct_gltf *gltf, const fct_mesh *mesh) {
+    uint32_t targets[MOST_LEVELS] = {0}, count = o->level_count;
+    fct_mesh levels[MOST_LEVELS];
+    fct_simplify_stats stats[MOST_LEVELS];
+    for (uint32_t i = 0; i < count; ++i) {
+        double level = o->levels[i];
+        targets[i] = (uint32_t)(level < 1 ? (double)llround(level * mesh->face_count) : level);
+    }
+    int code = tool_result(t, fct_simplify_levels(&t->env, mesh, &o->def, targets, count, levels, stats));
+    if (code != TOOL_DONE) return code;
+    json_t *results = json_array();
+    for (uint32_t i = 0; i < count && code == TOOL_DONE; ++i) {
+        warn_exhausted(t, targets[i], &stats[i]);
+        code = save_level(t, gltf, i + 1, &levels[i], &stats[i], results);
+    }
+    for (uint32_t i = 0; i < count; ++i) fct_mesh_release(&t->env, &levels[i]);
+    if (code != TOOL_DONE) {
+        json_decref(results);
+        return code;
+    }
+    return tool_json(t, json_pack("{s:o, s:{s:f}, s:I}", "levels", results, "seconds", "total",
+                                  tool_seconds() - t->start, "peak_bytes", (json_int_t)tool_peak_bytes()));
+}
+
 static int run_simplify(tool *t, void *options) {
     simplify_options *o = options;
-    if (!o->faces_given && !(o->ratio > 0) && !o->error_given)
-        return tool_fail(t, TOOL_USAGE, "expected --faces N, --ratio R or --max-error E");
+    if (!o->faces_given && !(o->ratio > 0) && !o->error_given && o->level_count == 0)
+        return tool_fail(t, TOOL_USAGE, "expected --faces N, --ratio R, --levels LIST or --max-error E");
     fct_mesh mesh, simple = {0};
     fct_gltf *gltf = NULL; /* the document that is kept, if both files are glTF */
     fct_simplify_stats stats;
@@ -226,13 +327,16 @@ static int run_simplify(tool *t, void *options) {
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     code = set_attribute_weights(t, o, &mesh);
+    if (code == TOOL_DONE && o->level_count > 0) {
+        code = run_levels(t, o, gltf, &mesh);
+        goto done;
+    }
     if (code == TOOL_DONE) code = simplify_mesh(t, o, &mesh, &simple, &stats);
     if (code == TOOL_DONE)
         code = gltf ? tool_save_gltf(t, gltf, t->output, &simple) : tool_save_mesh(t, t->output, &simple, 1);
-    if (code == TOOL_DONE && stats.faces_after > o->def.target_faces &&
-        stats.stopped_because == FCT_STOP_EXHAUSTED)
-        tool_warn(t, "stopped at %u faces, because no more contractions are allowed", stats.faces_after);
+    if (code == TOOL_DONE) warn_exhausted(t, o->def.target_faces, &stats);
     if (code == TOOL_DONE) code = report_simplify(t, &simple, &stats);
+done:
     fct_mesh_release(&t->env, &simple);
     fct_mesh_release(&t->env, &mesh);
     fct_gltf_close(gltf);

@@ -115,6 +115,16 @@ typedef struct fct_simplify_stats {
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 
+/* Several levels in one run: out[i] has at most target_faces[i] faces, a descending list. The contractions of
+ * a level continue those of the level before, and each level is fitted to the input. def->target_faces is not
+ * used; the automatic weight of colours is that of the first level. `stats` has room for `count` entries, or
+ * is NULL. On failure no mesh is left. Errors: as fct_simplify; DATA, too, if the list is empty or not
+ * descending.
+ */
+FCT_API fct_result fct_simplify_levels(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                                       const uint32_t *target_faces, uint32_t count, fct_mesh *out,
+                                       fct_simplify_stats *stats);
+
 #ifdef __cplusplus
 }
 #endif

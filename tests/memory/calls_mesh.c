@@ -240,6 +240,14 @@ static fct_result simplify(const fct_env *env) {
     return finish_mesh(env, &mesh, STARVE(fct_simplify(env, &inputs.sheet, &def, &mesh, NULL)));
 }
 
+static fct_result simplify_levels(const fct_env *env) {
+    fct_mesh levels[2];
+    fct_simplify_def def = fct_simplify_def_default();
+    const uint32_t targets[2] = {inputs.sheet.face_count / 2, inputs.sheet.face_count / 4};
+    fct_result result = STARVE(fct_simplify_levels(env, &inputs.sheet, &def, targets, 2, levels, NULL));
+    return finish_mesh(env, &levels[0], finish_mesh(env, &levels[1], result));
+}
+
 static fct_result simplify_progressive(const fct_env *env) {
     fct_mesh mesh;
     fct_progressive *progressive;
@@ -334,6 +342,7 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_inward_find", "", find_inward, false},
                                   {"fct_inward_flip", "", flip_inward, false},
                                   {"fct_simplify", "", simplify, false},
+                                  {"fct_simplify_levels", "", simplify_levels, false},
                                   {"fct_simplify_progressive", "", simplify_progressive, false},
                                   {"fct_progressive_save", "", save_progressive, false},
                                   {"fct_progressive_load", "", load_progressive, false},

@@ -103,11 +103,58 @@ static void blocks_give_the_same_on_all_threads(void **state) {
     fct_mesh_release(&env, &sphere);
 }
 
+static void assert_same(const fct_mesh *a, const fct_mesh *b) {
+    assert_int_equal(a->vertex_count, b->vertex_count);
+    assert_int_equal(a->face_count, b->face_count);
+    assert_memory_equal(a->positions, b->positions, 12 * (size_t)a->vertex_count);
+    assert_memory_equal(a->triangles, b->triangles, 12 * (size_t)a->face_count);
+    if (a->colors) assert_memory_equal(a->colors, b->colors, 12 * (size_t)a->vertex_count);
+}
+
+/* The first level is that of a run of its own. The refit of a level leaves no trace in the next one: without
+ * refits, and after levels that are fitted, the contractions are the same. */
+static void levels_continue_one_run(void **state) {
+    (void)state;
+    fct_mesh mesh = make_sphere(&env, 60);
+    mesh.colors = malloc(12 * (size_t)mesh.vertex_count);
+    for (uint32_t i = 0; i < 3 * mesh.vertex_count; ++i) mesh.colors[i] = .5f + .4f * mesh.positions[i];
+    const uint32_t targets[3] = {9000, 800, 60};
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_mesh fitted[3], plain[3];
+    fct_simplify_stats stats[3], plain_stats[3];
+    assert_int_equal(fct_simplify_levels(&env, &mesh, &def, targets, 3, fitted, stats), FCT_OK);
+    fct_simplify_def alone = def;
+    alone.target_faces = targets[0];
+    fct_mesh first = simplified(&env, &mesh, &alone, NULL);
+    assert_same(&fitted[0], &first);
+    def.refit_passes = 0;
+    assert_int_equal(fct_simplify_levels(&env, &mesh, &def, targets, 3, plain, plain_stats), FCT_OK);
+    for (int i = 0; i < 3; ++i) {
+        assert_int_equal(fitted[i].face_count, targets[i]);
+        assert_int_equal(stats[i].faces_before, mesh.face_count);
+        assert_memory_equal(fitted[i].triangles, plain[i].triangles, 12 * (size_t)targets[i]);
+        assert_true(stats[i].max_cost == plain_stats[i].max_cost);
+        assert_true(stats[i].distance_rms < plain_stats[i].distance_rms);
+        assert_true(i == 0 || stats[i].distance_rms > 5 * stats[i - 1].distance_rms);
+        fct_mesh_release(&env, &fitted[i]);
+        fct_mesh_release(&env, &plain[i]);
+    }
+    const uint32_t wrong[2] = {800, 800};
+    assert_int_equal(fct_simplify_levels(&env, &mesh, &def, wrong, 2, fitted, NULL), FCT_ERROR_DATA);
+    assert_null(fitted[0].positions);
+    assert_int_equal(fct_simplify_levels(&env, &mesh, &def, wrong, 0, fitted, NULL), FCT_ERROR_DATA);
+    fct_mesh_release(&env, &first);
+    free(mesh.colors);
+    mesh.colors = NULL;
+    fct_mesh_release(&env, &mesh);
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_are_those_of_a_bump),
         cmocka_unit_test(blocks_give_the_same_on_all_threads),
+        cmocka_unit_test(levels_continue_one_run),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,7 +37,7 @@ expect 65 level sphere.off --faces 100 -o x.ply
 says "no progressive mesh"
 expect 66 level absent.fpm --faces 100 -o x.ply
 expect 64 level sphere.fpm -o x.ply
-says "expected --faces N, --ratio R or --max-error E"
+says "expected --faces N, --ratio R, --levels LIST or --max-error E"
 expect 64 level sphere.fpm --faces 10 --ratio .5 -o x.ply
 expect 64 level sphere.fpm --ratio 0 -o x.ply
 expect 64 level sphere.fpm --faces 10 -o x.fpm
@@ -46,3 +46,15 @@ says "expected a name that ends in .fpm"
 expect 73 simplify sphere.off --faces 10 -o x.ply --progressive absent/x.fpm
 leftovers
 finish
+# several levels in one run
+expect 0 simplify sphere.off --levels .5,300,60 -o chain.ply --json
+keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because max_cost distance_rms distance_max color_rms uv_rms normal_rms file
+holds "$("$program" info chain-1.ply --json | sed -n 's/.*"faces": \([0-9]*\).*/\1/p' | head -n 1) == 760"
+expect 0 simplify sphere.off --ratio .5 -o half.ply
+check "the first level is that of a run of its own" cmp -s half.ply chain-1.ply
+expect 0 compare sphere.off chain-3.ply
+expect 64 simplify sphere.off --levels 1.5 -o chain.ply
+says "expected a number of faces or a ratio below 1"
+expect 64 simplify sphere.off --levels 300 --faces 10 -o chain.ply
+expect 65 simplify sphere.off --levels 60,300 -o chain.ply
+says "level 2 has 300 faces, expected fewer than the 60 of level 1"

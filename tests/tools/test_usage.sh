@@ -119,7 +119,7 @@ expect 64 closest cube.off --points p --max-distance -1
 expect 64 compare cube.off
 expect 64 compare cube.off cube.off --samples -5
 expect 64 simplify cube.off -o x.ply
-says "expected --faces N, --ratio R or --max-error E"
+says "expected --faces N, --ratio R, --levels LIST or --max-error E"
 expect 64 simplify cube.off -o x.ply --faces 4 --ratio .5
 expect 64 simplify cube.off -o x.ply --ratio 0
 expect 64 simplify cube.off -o x.ply --ratio 2
