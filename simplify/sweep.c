@@ -97,7 +97,8 @@ static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint3
         queue_clear(s->queue, s->edges, w->limit);
         for (uint32_t i = w->starts[b + 1]; i-- > w->starts[b];)
             queue_push(s->queue, w->ordered[i], s->edges[w->ordered[i]].bucket);
-        double share = (double)(w->starts[b + 1] - w->starts[b]) / w->starts[w->block_count];
+        uint32_t own = w->starts[b + 1] - w->starts[b];
+        double share = own > 0 ? (double)own / w->starts[w->block_count] : 0;
         s->least_faces = s->live_faces - (uint32_t)(share * (s->live_faces - s->def->target_faces));
         w->body(s);
     }
