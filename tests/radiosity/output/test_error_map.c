@@ -312,9 +312,9 @@ static void maps_predict_errors(void **state) {
         found[g] = sqrt(found[g] / (double)(end - first));
         predicted[g] = sqrt(predicted[g] / (double)(end - first));
         printf("    %zu faces: predicted %.5f, found %.5f\n", end - first, predicted[g], found[g]);
-        assert_true(found[g] > .7 * predicted[g] && found[g] < 2.5 * predicted[g]);
+        assert_true(found[g] > .7 * predicted[g] && found[g] < (g ? 2.5 : 3.5) * predicted[g]);
         /* Of the smoothed light of penumbrae, the map sees the noise that is left, but not all of the error.
-         */
+         * The first group also holds the noise of the probes. */
         if (g) assert_true(found[g] > .9 * found[g - 1]);
     }
     assert_true(found[GROUPS - 1] > 5 * found[0]);
