@@ -37,7 +37,7 @@ expect 65 level sphere.off --faces 100 -o x.ply
 says "no progressive mesh"
 expect 66 level absent.fpm --faces 100 -o x.ply
 expect 64 level sphere.fpm -o x.ply
-says "expected --faces N, --ratio R, --levels LIST or --max-error E"
+says "expected --faces N, --ratio R or --max-error E"
 expect 64 level sphere.fpm --faces 10 --ratio .5 -o x.ply
 expect 64 level sphere.fpm --ratio 0 -o x.ply
 expect 64 level sphere.fpm --faces 10 -o x.fpm
