@@ -169,11 +169,13 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
     }
 }
 
-/* The loop of a block in a sweep. */
+/* The loop of a block in a sweep. It ends while a body of four faces may still vanish. */
 static void contract_block(fct_simplifier *s) {
-    for (uint32_t e; s->live_faces > s->least_faces && s->wedge_room >= SIMPLIFY_MAX_WEDGES &&
-                     (e = queue_pop(s->queue)) != FCT_NONE;)
+    while (s->live_faces >= s->least_faces + 4 && s->wedge_room >= SIMPLIFY_MAX_WEDGES) {
+        uint32_t e = queue_pop(s->queue);
+        if (e == FCT_NONE) return;
         if (s->edges[e].state == EDGE_QUEUED) process_edge(s, e);
+    }
 }
 
 fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {

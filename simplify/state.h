@@ -48,16 +48,18 @@ typedef struct fct_remaining {
     double norm2;          /* of `normal` */
 } fct_remaining;
 
-/* What holds a point besides its planes. */
+/* The freedom of a held point: planes pull it towards its curve; it stays on its line; it stays where it is;
+ * its attributes stay, too. */
 enum { HOLD_PLANES, HOLD_LINE, HOLD_POINT, HOLD_LOCK };
 
-/* What holds a point of a boundary, a border or a seam (cost/constraint.h). */
+/* The rules for a point of a boundary, a border or a seam, and for a locked point (cost/constraint.h). */
 typedef struct fct_constraint {
     double planes[POSITION_QUADRIC]; /* of the held sides; [10] is the sum of their lengths */
     uint32_t line;                   /* of HOLD_LINE */
     uint8_t hold;
 } fct_constraint;
 
+/* A straight part of such a curve. */
 typedef struct fct_line {
     v3 origin, direction; /* of unit length */
 } fct_line;

@@ -27,14 +27,14 @@ typedef struct sweep {
     uint32_t *edges, edge_count; /* the edges that are not dead yet */
     uint32_t *blocks;            /* per point that is left: its block */
     uint32_t *chosen, *owners;   /* edges of the sweep, and their blocks */
-    uint32_t *starts,
-        *ordered;            /* the edges of block b are ordered[starts[b]] to ordered[starts[b + 1] - 1] */
-    fct_simplifier *results; /* per block: the copy that worked on it */
-    fct_log *logs;           /* per block; NULL without a log */
+    uint32_t *ordered;           /* the chosen edges, block after block */
+    uint32_t *starts;            /* per block: the place of its first edge; then the number of edges */
+    fct_simplifier *results;     /* per block: the copy that worked on it */
+    fct_log *logs;               /* per block; NULL without a log */
 } sweep;
 
 /* Drops dead edges from the list, and returns the highest bucket up to which at most `most` edges are queued;
- * *count is their number. FCT_NONE if there is no such bucket. */
+ * *count is their number. With 0 edges the result has no meaning. */
 static uint32_t find_limit(sweep *w, uint32_t most, uint32_t *count) {
     const fct_edge *edges = w->s->edges;
     uint32_t counts[QUEUE_BUCKETS] = {0}, kept = 0;
@@ -64,7 +64,7 @@ static void cut_blocks(sweep *w, uint32_t first) {
 }
 
 /* Lists the queued edges up to the limit by their blocks. Edges between blocks are left out. */
-static uint32_t choose_edges(sweep *w) {
+static void choose_edges(sweep *w) {
     fct_simplifier *s = w->s;
     uint32_t count = 0;
     memset(w->starts, 0, ((size_t)w->block_count + 1) * sizeof *w->starts);
@@ -81,7 +81,6 @@ static uint32_t choose_edges(sweep *w) {
     for (uint32_t i = 0; i < count; ++i) w->ordered[w->starts[w->owners[i]]++] = w->chosen[i];
     for (uint32_t b = w->block_count; b > 0; --b) w->starts[b] = w->starts[b - 1];
     w->starts[0] = 0;
-    return count;
 }
 
 static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
@@ -115,16 +114,15 @@ static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
     fct_result result = fct_log_split(s, w->block_count, BLOCK_POINTS, MOST_WEDGES, &w->logs);
     if (result != FCT_OK) goto done;
     fct_parallel_for(s->env, w->block_count, 1, run_blocks, w);
-    uint32_t before = s->live_faces;
-    fct_simplifier all = *s;
+    uint32_t before = s->live_faces, side_epoch = s->side_epoch, link_epoch = s->link_epoch;
     for (uint32_t b = 0; b < w->block_count; ++b) {
         const fct_simplifier *r = &w->results[b];
         s->live_faces -= before - r->live_faces;
-        if (r->max_error2 > s->max_error2) s->max_error2 = r->max_error2;
-        if (r->side_epoch > all.side_epoch) all.side_epoch = r->side_epoch;
-        if (r->link_epoch > all.link_epoch) all.link_epoch = r->link_epoch;
+        s->max_error2 = fct_max(s->max_error2, r->max_error2);
+        if (r->side_epoch > side_epoch) side_epoch = r->side_epoch;
+        if (r->link_epoch > link_epoch) link_epoch = r->link_epoch;
     }
-    s->side_epoch = all.side_epoch, s->link_epoch = all.link_epoch;
+    s->side_epoch = side_epoch, s->link_epoch = link_epoch;
     *contracted = (before - s->live_faces) / 2;
     result = fct_log_join(s, w->logs, w->block_count);
 done:

@@ -32,15 +32,11 @@ static int count_options(const level_options *o) {
 
 static error_t parse_level(int key, char *text, struct argp_state *state) {
     level_options *o = state->input;
-    error_t error;
     switch (key) {
     case KEY_FACES:
         return tool_parse_count32(state, "--faces", text, 0, FCT_NONE - 1, &o->faces);
     case KEY_RATIO:
-        error = tool_parse_real(state, "--ratio", text, 0, 1, &o->ratio);
-        return error          ? error
-               : o->ratio > 0 ? 0
-                              : tool_usage(state, "--ratio: expected a number above 0, found '%s'", text);
+        return tool_parse_ratio(state, "--ratio", text, &o->ratio);
     case KEY_MAX_ERROR:
         return tool_parse_real(state, "--max-error", text, 0, INFINITY, &o->error);
     case ARGP_KEY_END:

@@ -143,10 +143,7 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         o->faces_given = true;
         return tool_parse_count32(state, "--faces", text, 0, FCT_NONE - 1, &o->def.target_faces);
     case KEY_RATIO:
-        error = tool_parse_real(state, "--ratio", text, 0, 1, &o->ratio);
-        return error          ? error
-               : o->ratio > 0 ? 0
-                              : tool_usage(state, "--ratio: expected a number above 0, found '%s'", text);
+        return tool_parse_ratio(state, "--ratio", text, &o->ratio);
     case KEY_MAX_ERROR:
         o->error_given = true;
         return tool_parse_real(state, "--max-error", text, 0, INFINITY, &o->def.max_error);
@@ -269,14 +266,25 @@ static char *name_level(const char *path, uint32_t level) {
     return name;
 }
 
+/* Whether each level can be written. */
+static int check_levels(tool *t, const simplify_options *o) {
+    int code = TOOL_DONE;
+    if (o->level_count > 0 && !strcmp(t->output, "-"))
+        return tool_fail(t, TOOL_USAGE, "--levels: expected -o FILE, found standard output");
+    for (uint32_t i = 1; i <= o->level_count && code == TOOL_DONE; ++i) {
+        char *path = name_level(t->output, i);
+        code = path ? tool_check_output(t, path) : tool_fail(t, TOOL_MEMORY, "out of memory: a file name");
+        free(path);
+    }
+    return code;
+}
+
 /* Writes one level; `results` receives its keys. */
 static int save_level(tool *t, fct_gltf *gltf, uint32_t level, const fct_mesh *mesh,
                       const fct_simplify_stats *s, json_t *results) {
     char *path = name_level(t->output, level);
     if (!path) return tool_fail(t, TOOL_MEMORY, "out of memory: a file name");
-    int code = tool_check_output(t, path);
-    if (code == TOOL_DONE)
-        code = gltf ? tool_save_gltf(t, gltf, path, mesh) : tool_save_mesh(t, path, mesh, 1);
+    int code = gltf ? tool_save_gltf(t, gltf, path, mesh) : tool_save_mesh(t, path, mesh, 1);
     if (code == TOOL_DONE) {
         say_result(t, path, s);
         json_t *keys = pack_result(mesh, s);
@@ -320,6 +328,7 @@ static int run_simplify(tool *t, void *options) {
     fct_simplify_stats stats;
     bool keeps = tool_is_gltf(t, t->inputs[0]) && tool_ends(t->output, "glb");
     int code = check_progressive(t, o->progressive);
+    if (code == TOOL_DONE) code = check_levels(t, o);
     if (code != TOOL_DONE) return code;
     code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
@@ -350,21 +359,24 @@ int tool_simplify(int argc, char **argv) {
         .name = "simplify",
         .synopsis = "IN -o OUT",
         .summary = "reduce a mesh, keeping its shape and colours",
-        .text = "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. "
-                "If both are "
-                "glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
-                "counts once, "
-                "however many nodes place it. "
-                "Edges are contracted in the "
-                "order of their quadric error until the faces are as few as --faces or --ratio says, or "
-                "until the error would "
-                "exceed --max-error.\n\n"
-                "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
-                "exhausted), max_cost (the largest "
-                "error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms (errors "
-                "of the result), seconds{init, contract, refit, total}, peak_bytes.",
+        .text =
+            "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. "
+            "If both are "
+            "glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
+            "counts once, "
+            "however many nodes place it. "
+            "Edges are contracted in the "
+            "order of their quadric error until the faces are as few as --faces or --ratio says, or "
+            "until the error would "
+            "exceed --max-error.\n\n"
+            "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
+            "exhausted), max_cost (the largest "
+            "error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms (errors "
+            "of the result), seconds{init, contract, refit, total}, peak_bytes. With --levels: levels[] with "
+            "these keys up to normal_rms and file, seconds{total}, peak_bytes.",
         .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
+                    "  facetree simplify bunny.obj --levels 20000,5000,1000 -o lod.ply\n"
                     "  facetree simplify bunny.obj --faces 200 -o small.ply --progressive bunny.fpm",
         .options = simplify_options_table,
         .parse = parse_simplify,

@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 typedef struct bench_side {
-    const char *policies; /* the names that open accepts, for the error message */
+    const char *policies; /* the names that `open` accepts; an error message lists them */
     /* The mesh in the form of the library; not timed. The mesh outlives it. NULL: the policy is unknown, or
      * *refused tells why the library cannot hold this mesh. */
     void *(*open)(const fct_mesh *mesh, const char *policy, uint32_t threads, const char **refused);

@@ -35,17 +35,17 @@ typedef enum fct_stop {
     FCT_STOP_EXHAUSTED /* no contraction is allowed */
 } fct_stop;
 
+/* Only for color_weight: 2 / sqrt(faces of the result), at most .1. Without target_faces the result is taken
+ * to have as many faces as the longest side of the bounds has lengths of max_error. So colours weigh less in
+ * larger scenes and finer results. */
+#define FCT_WEIGHT_AUTO (-1.)
+
 /* Attributes. The simplifier knows three attributes, each with a weight: vertex colours, texture coordinates
  * and vertex normals. Positions are scaled so that the longest side of the bounds is 1. An attribute is
  * scaled so that its range is about 1, and then multiplied by its weight. For colours this is the range from
  * the 2nd to the 98th percentile, but at least 1/20 of the full range. A weight above 0 makes the attribute a
  * part of the error. With weight 0 it does not count in the error and is interpolated, but its seams are
  * still held in place. A weight has no effect if the mesh does not have the attribute. */
-/* Only for color_weight: 2 / sqrt(faces) of the result, at most .1; without target_faces the result has about
- * as many faces as the longest side of the bounds has lengths of max_error. So colours weigh less in larger
- * scenes and finer results. */
-#define FCT_WEIGHT_AUTO (-1.)
-
 typedef struct fct_simplify_def {
     uint32_t size;
     uint32_t target_faces; /* stop at this count or below; default 0 */

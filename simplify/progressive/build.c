@@ -3,8 +3,9 @@
  * 1. Sort the records by their keys, so that levels in the middle of a sweep are even.
  * 2. Repeat the contractions on the faces of the input. Each one ends nodes and faces. They are listed, with
  *    the corners that move away from the ended nodes.
- * 3. What remains is the base mesh. Write the lists in reverse: the items of the last contraction follow
- * those of the base mesh. Handles are wedges of the simplifier (without attributes: points). When wedges
+ * 3. What remains is the base mesh. Write it, then the lists in reverse order: those of the last contraction
+ *    first.
+ * Handles are wedges of the simplifier (without attributes: points). When wedges
  * merge, that of the kept point stays, so that few corners move. Cost: linear, plus the rings of vanished
  * points.
  */

@@ -16,7 +16,7 @@ typedef struct fct_landing {
     bool attributes; /* the face is on the sample's side of a seam, so its attributes count */
 } fct_landing;
 
-/* What limits the step of a point. */
+/* The limit of a point's step depends on these. */
 typedef struct fct_reach {
     double residual2; /* the mean squared distance of its samples from the surface, times `weight` */
     double weight;

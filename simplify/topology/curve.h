@@ -1,5 +1,5 @@
-/* simplify/topology/curve.h: the input in the order of a space-filling curve, so that what is near in space
- * is near in memory. */
+/* simplify/topology/curve.h: sorts the input along a space-filling curve. Then neighbours are near in memory.
+ */
 #ifndef FCT_SIMPLIFY_CURVE_H
 #define FCT_SIMPLIFY_CURVE_H
 

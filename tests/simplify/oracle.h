@@ -142,6 +142,17 @@ enum {
         FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS
 };
 
+/* Each array alone, some together, and all. */
+static const unsigned array_sets[] = {0,
+                                      FCT_MESH_COLORS,
+                                      FCT_MESH_MATERIALS,
+                                      FCT_MESH_FACE_COLORS,
+                                      FCT_MESH_TEXCOORDS,
+                                      FCT_MESH_NORMALS,
+                                      FCT_MESH_COLORS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS,
+                                      ALL_ARRAYS};
+enum { ARRAY_SETS = sizeof array_sets / sizeof *array_sets };
+
 static inline fct_simplifier *open_simplifier(const fct_env *env, const fct_mesh *mesh,
                                               const fct_simplify_def *def) {
     fct_simplifier *s;

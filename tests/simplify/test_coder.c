@@ -1,4 +1,5 @@
-/* The adaptive range coder: what is written is read, its length is the entropy, and its end is found. */
+/* The adaptive range coder: the reader gets the values of the writer, the length is the entropy, and the
+ * reader finds the end. */
 #include "simplify/progressive/coder.h"
 #include "support.h"
 

@@ -56,5 +56,8 @@ expect 0 compare sphere.off chain-3.ply
 expect 64 simplify sphere.off --levels 1.5 -o chain.ply
 says "expected a number of faces or a ratio below 1"
 expect 64 simplify sphere.off --levels 300 --faces 10 -o chain.ply
+expect 64 simplify sphere.off --levels 300,60 -o -
+says "found standard output"
+expect 73 simplify sphere.off --levels 300,60 -o nowhere/chain.ply
 expect 65 simplify sphere.off --levels 60,300 -o chain.ply
 says "level 2 has 300 faces, expected fewer than the 60 of level 1"

@@ -57,6 +57,13 @@ error_t tool_parse_real(struct argp_state *state, const char *name, const char *
     return 0;
 }
 
+error_t tool_parse_ratio(struct argp_state *state, const char *name, const char *text, double *value) {
+    error_t error = tool_parse_real(state, name, text, 0, 1, value);
+    if (!error && *value == 0)
+        return tool_usage(state, "%s: expected a number above 0, found '%s'", name, text);
+    return error;
+}
+
 error_t tool_parse_length(struct argp_state *state, const char *name, const char *text, tool_length *length) {
     char number[64];
     size_t size = strlen(text);

@@ -18,6 +18,9 @@ error_t tool_parse_count32(struct argp_state *state, const char *name, const cha
 error_t tool_parse_real(struct argp_state *state, const char *name, const char *text, double least,
                         double most, double *value);
 
+/* A number above 0 and at most 1. */
+error_t tool_parse_ratio(struct argp_state *state, const char *name, const char *text, double *value);
+
 /* A length of at least 0 in the mesh's unit; with % a share of the diagonal of the bounds. */
 typedef struct tool_length {
     double value; /* negative: not given */

@@ -102,8 +102,8 @@ static void near_lamps_do_not_shine(void **state) {
     end_gap(&g);
 }
 
-/* Between two sheets that nearly touch, three near hits weaken the stored light: rho_1 rho_2 rho_1 of
- * what is stored for the lid. */
+/* Between two sheets that nearly touch, light is reflected three times before it counts: rho_1 rho_2 rho_1
+ * times the stored light of the lid. */
 static void narrow_gaps_are_dark(void **state) {
     (void)state;
     gap g = make_gap(1e-3, 1, 0, 7);

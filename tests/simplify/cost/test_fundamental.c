@@ -72,17 +72,9 @@ static void check_wedges(const fct_mesh *mesh, const fct_simplify_def *def) {
 /* Every combination of arrays. */
 static void quadrics_are_direct_sums(void **state) {
     (void)state;
-    const unsigned arrays[] = {0,
-                               FCT_MESH_COLORS,
-                               FCT_MESH_MATERIALS,
-                               FCT_MESH_FACE_COLORS,
-                               FCT_MESH_TEXCOORDS,
-                               FCT_MESH_NORMALS,
-                               FCT_MESH_COLORS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS,
-                               ALL_ARRAYS};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
+    for (size_t i = 0; i < ARRAY_SETS; ++i)
         for (int kind = 0; kind < 4; ++kind) {
-            fct_mesh mesh = make_sheet(&env, arrays[i], 11 + i);
+            fct_mesh mesh = make_sheet(&env, array_sets[i], 11 + i);
             fct_simplify_def def = fct_simplify_def_default();
             def.weighting = kind < 2 ? FCT_WEIGHT_AREA : kind == 2 ? FCT_WEIGHT_ANGLE : FCT_WEIGHT_UNIFORM;
             if (kind == 1) def.color_weight = .7, def.texcoord_weight = .3, def.normal_weight = 0;
