@@ -181,7 +181,7 @@ static bool find_curve(const world *w, const fct_body_pair *pair, vec *area, vec
     const fct_mesh *mesh_a = pair->body_a ? &w->pebble.mesh : &w->bowl.mesh, *mesh_b = &w->pebble.mesh;
     fct_pose pose = relate(&a->pose, &b->pose);
     fct_face_pair faces[MOST_PAIRS];
-    size_t count = fct_bvh_pairs(a->bvh, b->bvh, &pose, MOST_PAIRS, MOST_PAIRS, faces, NULL);
+    size_t count = fct_bvh_pairs(a->bvh, b->bvh, &pose, MOST_PAIRS, MOST_PAIRS, faces, NULL, NULL);
     vec first = {0}, sum = {0}, twice = {0};
     double length = 0;
     for (size_t i = 0; i < count; ++i) {

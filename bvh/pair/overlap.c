@@ -4,14 +4,26 @@
  * against its eight children. Boxes that overlap deepest come first, so that a contact is found early. A pair
  * of leaves compares the boxes of single triangles in the coordinates of one leaf, then each pair that is
  * left exactly.
+ *
+ * With a hint, the search keeps its front: each node that it opened, with those of its boxes that are apart
+ * from the other box, and each pair of leaves. A pair of the front waits until b has moved by the least of
+ * these distances. Then its boxes are tested again, and the search goes down where they are not apart any
+ * more. A front whose pairs are tested about as often as those of a search from the roots is dropped. If a
+ * contact is found, the pairs that were not searched stay in the front, as pairs that do not wait.
  */
 #include "bvh/pair/search.h"
 
 #include "base/math/simd.h"
 #include "bvh/pair/boxes.h"
+#include "bvh/pair/hint.h"
 #include "bvh/pair/leaves.h"
 #include "bvh/pair/place.h"
 #include "bvh/pair/triangles.h"
+
+/* A pair of boxes. */
+typedef struct box_pair {
+    uint32_t a, b;
+} box_pair;
 
 typedef struct overlap_search {
     const fct_pair_map *map;
@@ -20,6 +32,10 @@ typedef struct overlap_search {
     bool self, prefetches;
     fct_placed_box placed_a, placed_b; /* a box of b in a, and of a in b: the last ones used */
     fct_visits visits;
+    fct_pair_hint *hint; /* NULL if no front is kept */
+    double gap_of_a, gap_of_b; /* gaps in the scaled units, times this, are lower bounds in a's */
+    uint32_t effort;           /* nodes and pairs of leaves tested */
+    box_pair last;             /* the leaves of the last pair of faces */
 } overlap_search;
 
 static bool share_corner(const v3 a[3], const v3 b[3]) {
@@ -39,19 +55,38 @@ static void record_pair(overlap_search *s, uint32_t place_a, uint32_t place_b) {
     ++s->count;
 }
 
-/* Returns whether the search has all it wants. */
-static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
+/* The least bound of the squared distances of those triangles of the mask that are below `count`. */
+static float find_least_gap2(const triangle_boxes *boxes, uint32_t count, uint32_t mask, const float low[3],
+                             const float high[3], float slack) {
+    float gap2[16], least = INFINITY;
+    for (uint32_t first = 0; first < count; first += 8)
+        f8_store(gap2 + first, bound_triangles(boxes, first, low, high, slack));
+    for (mask &= (1u << count) - 1; mask; mask &= mask - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(mask);
+        if (gap2[i] < least) least = gap2[i];
+    }
+    return least;
+}
+
+/* Returns whether the search has all it wants. If it keeps a front, *gap becomes at most the distance of the
+ * leaves, scaled. */
+static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b, double *gap) {
     const fct_pair_map *map = s->map;
     const fct_leaf *a = fct_bvh_leaf(map->a, fct_box_child(map->a, box_a)),
                    *b = fct_bvh_leaf(map->b, fct_box_child(map->b, box_b));
     fct_leaf_maps maps;
     triangle_boxes boxes_a, boxes_b;
-    float low[3], high[3];
+    float low[3], high[3], least2 = INFINITY;
     fct_leaf_maps_set(map, box_a, box_b, &maps);
+    ++s->effort;
     placed_leaf placed = place_leaf(b, &maps.of_b);
     find_triangle_boxes(b, &placed, &boxes_b);
     for (int k = 0; k < 3; ++k) low[k] = -maps.half_a[k], high[k] = maps.half_a[k];
     uint32_t open_b = meet_triangles(&boxes_b, b->count, low, high, maps.slack) & b->mask;
+    if (s->hint) {
+        least2 = find_least_gap2(&boxes_b, b->count, b->mask & ~open_b, low, high, 2 * maps.slack);
+        *gap = sqrt((double)least2) * (1 - 0x1p-20);
+    }
     if (!open_b) return false;
     placed = place_leaf(a, &maps.of_a);
     find_triangle_boxes(a, &placed, &boxes_a);
@@ -60,6 +95,10 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
         for (int k = 0; k < 3; ++k) low[k] = boxes_b.low[k][i], high[k] = boxes_b.high[k][i];
         uint32_t open_a = meet_triangles(&boxes_a, a->count, low, high, maps.slack) & a->mask;
         if (s->self && box_a == box_b) open_a &= (1u << i) - 1;
+        if (s->hint && least2 > 0) {
+            float row2 = open_a ? 0 : find_least_gap2(&boxes_a, a->count, a->mask, low, high, 2 * maps.slack);
+            if (row2 < least2) least2 = row2;
+        }
         if (!open_a) continue;
         v3 p[3], q[3];
         fct_pair_triangle_b(map, b->first + i, q);
@@ -69,9 +108,12 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
             ++s->visits.triangles;
             if ((s->self && share_corner(p, q)) || !fct_triangles_meet(p, q)) continue;
             record_pair(s, a->first + j, b->first + i);
-            if (s->count == s->limit) return true;
+            if (s->count < s->limit) continue;
+            s->last = (box_pair){box_a, box_b};
+            return true;
         }
     }
+    if (s->hint) *gap = sqrt((double)least2) * (1 - 0x1p-20);
     return false;
 }
 
@@ -92,24 +134,51 @@ static inline void prefetch_child(const fct_bvh *bvh, uint32_t ref) {
     for (uint32_t i = 0; i < bytes; i += 64) __builtin_prefetch(at + i);
 }
 
-/* A pair of boxes. */
-typedef struct box_pair {
-    uint32_t a, b;
-} box_pair;
+/* --- The front --- */
 
-/* Pushes box `fixed` with the children of the node of `opened`, those that overlap deepest on top. Returns
- * the new height of the stack. */
-static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint32_t opened, box_pair *stack,
-                          uint32_t height) {
+/* How far b has come when a gap is closed. */
+static float find_reach(const overlap_search *s, double gap) {
+    return (float)((s->hint->way + gap) * (1 - 0x1p-22));
+}
+
+static void add_to_front(overlap_search *s, fct_front_pair pair) {
+    if (s->hint->front_count < FCT_FRONT_PAIRS) {
+        s->hint->front[s->hint->front_count++] = pair;
+    } else {
+        s->hint->front_count = 0;
+        s->hint = NULL;
+    }
+}
+
+/* Keeps the boxes of the pair that are apart, by the gaps. */
+static void keep_apart(const overlap_search *s, bool opens_a, f8 gaps, uint32_t met, fct_front_pair *pair) {
+    float gap[8], least = INFINITY;
+    pair->lanes &= ~met;
+    f8_store(gap, gaps);
+    for (uint32_t lanes = pair->lanes & FCT_FRONT_ALL; lanes; lanes &= lanes - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(lanes);
+        if (gap[i] < least) least = gap[i];
+    }
+    pair->reach = find_reach(s, fct_max((double)least, 0) * (opens_a ? s->gap_of_a : s->gap_of_b));
+}
+
+/* Pushes the other box with those boxes of the opened node that it may meet, those that overlap deepest on top.
+ * `lanes` and bit 8 of pair.lanes tell the node and its boxes. If the search keeps a front, *pair keeps the
+ * boxes that are apart. Returns the new height of the stack. */
+static uint32_t open_node(overlap_search *s, fct_front_pair *pair, box_pair *stack, uint32_t height) {
     const fct_pair_map *map = s->map;
+    bool opens_a = pair->lanes & FCT_FRONT_OPENS_A;
+    uint32_t fixed = opens_a ? pair->box_b : pair->box_a;
     const fct_bvh *other = opens_a ? map->b : map->a, *own = opens_a ? map->a : map->b;
-    uint32_t number = fct_box_child(own, opened);
+    uint32_t number = fct_box_child(own, opens_a ? pair->box_a : pair->box_b);
     const fct_pair_node *node = &own->pairs[number];
     fct_placed_box *box = opens_a ? &s->placed_a : &s->placed_b;
     float depth[8], waiting[8];
+    f8 gap;
     place_box(opens_a ? &map->to_a : &map->to_b, other, fixed, box);
-    uint32_t met = meet_boxes(box, node, depth), base = height;
-    ++s->visits.nodes, s->visits.boxes += 8;
+    uint32_t met = meet_boxes(box, node, depth, &gap) & pair->lanes, base = height;
+    ++s->visits.nodes, s->visits.boxes += 8, ++s->effort;
+    if (s->hint) keep_apart(s, opens_a, f8_sub(gap, f8_set(box->slack)), met, pair);
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = number << 3 | i;
         if (node->child[i] == FCT_NONE) continue;
@@ -123,21 +192,30 @@ static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint3
     return height;
 }
 
-static size_t search_below(overlap_search *s, box_pair from) {
+/* Returns whether the search has all it wants. */
+static bool search_stack(overlap_search *s, box_pair *stack, uint32_t height) {
     const fct_bvh *a = s->map->a, *b = s->map->b;
-    box_pair stack[FCT_PAIR_STACK];
-    uint32_t height = 1;
-    stack[0] = from;
     while (height) {
-        box_pair pair = stack[--height];
-        if (fct_box_is_leaf(a, pair.a) && fct_box_is_leaf(b, pair.b)) {
-            if (search_leaves(s, pair.a, pair.b)) break;
-            continue;
+        box_pair boxes = stack[--height];
+        bool leaves = fct_box_is_leaf(a, boxes.a) && fct_box_is_leaf(b, boxes.b), done = false;
+        fct_front_pair pair = fct_front_begin(s->map, boxes.a, boxes.b);
+        if (leaves) {
+            double gap;
+            done = search_leaves(s, boxes.a, boxes.b, &gap);
+            if (s->hint && !done) pair.reach = find_reach(s, gap);
+        } else {
+            height = open_node(s, &pair, stack, height);
         }
-        height = fct_opens_a(s->map, pair.a, pair.b) ? open_node(s, true, pair.b, pair.a, stack, height)
-                                                     : open_node(s, false, pair.a, pair.b, stack, height);
+        if (s->hint && (pair.lanes & FCT_FRONT_ALL)) add_to_front(s, pair);
+        if (done) return true;
     }
-    return s->count;
+    return false;
+}
+
+static void search_below(overlap_search *s, box_pair from) {
+    box_pair stack[FCT_PAIR_STACK];
+    stack[0] = from;
+    search_stack(s, stack, 1);
 }
 
 static overlap_search begin_search(const fct_pair_map *map, size_t limit, size_t capacity,
@@ -156,6 +234,79 @@ size_t fct_overlap_search(const fct_pair_map *map, size_t limit, size_t capacity
     return s.count;
 }
 
+/* Tests a pair of the front again, and what is below it. Returns whether faces meet. */
+static bool test_pair_again(overlap_search *s, fct_front_pair *pair) {
+    const fct_pair_map *map = s->map;
+    box_pair stack[FCT_PAIR_STACK];
+    if (!fct_box_is_leaf(map->a, pair->box_a) || !fct_box_is_leaf(map->b, pair->box_b))
+        return search_stack(s, stack, open_node(s, pair, stack, 0));
+    double gap;
+    bool done = search_leaves(s, pair->box_a, pair->box_b, &gap);
+    if (s->hint && !done) pair->reach = find_reach(s, gap);
+    return done;
+}
+
+static bool is_expired(const fct_pair_hint *hint, uint32_t i) {
+    return (double)hint->front[i].reach <= hint->way;
+}
+
+/* Tests the pairs of the front that may not be apart any more. Pairs without boxes leave the front. */
+static bool test_front(overlap_search *s, fct_pair_hint *hint) {
+    uint32_t count = hint->front_count, kept = 0;
+    for (uint32_t i = 0; i < count; ++i)
+        if (is_expired(hint, i) && test_pair_again(s, &hint->front[i])) return true;
+    for (uint32_t i = 0; s->hint && i < hint->front_count; ++i)
+        if (hint->front[i].lanes & FCT_FRONT_ALL) hint->front[kept++] = hint->front[i];
+    if (s->hint) hint->front_count = kept;
+    return false;
+}
+
+/* A search from the roots, which makes a new front if s->hint is set. */
+static bool search_roots(overlap_search *s, fct_pair_hint *hint) {
+    hint->front_count = 0, hint->way = 0;
+    search_below(s, (box_pair){0, 0});
+    hint->effort = s->effort;
+    return s->count > 0;
+}
+
+/* A search from the roots is better if more than this part of its tests must be repeated. */
+#define MOST_EXPIRED .5
+/* Then the next searches do not make a front, because b moves too fast. */
+#define PAUSE 6
+
+bool fct_front_search(const fct_pair_map *map, fct_pair_hint *hint, fct_visits *visits) {
+    overlap_search s = begin_search(map, 1, 1, &hint->pair);
+    double narrow = (1 - 0x1p-20) / (1 + map->to_a.skew), shrink2 = 1 - map->to_a.skew;
+    s.gap_of_a = narrow;
+    s.gap_of_b = shrink2 > 0 ? map->to_a.factor * sqrt(shrink2) * narrow : 0;
+    bool met = false, tested = false;
+    if (hint->touching) {
+        met = tested = search_leaves(&s, hint->front[0].box_a, hint->front[0].box_b, NULL);
+    } else if (hint->front_count) {
+        uint32_t expired = 0;
+        for (uint32_t i = 0; i < hint->front_count; ++i) expired += is_expired(hint, i);
+        tested = expired <= MOST_EXPIRED * hint->effort;
+        if (tested) {
+            s.hint = hint;
+            met = test_front(&s, hint);
+        } else {
+            hint->pause = PAUSE;
+        }
+    }
+    if (!tested) {
+        s.hint = hint->pause ? NULL : hint;
+        hint->pause -= hint->pause > 0;
+        met = search_roots(&s, hint);
+    }
+    hint->touching = met;
+    if (met) {
+        hint->front[0] = fct_front_begin(map, s.last.a, s.last.b);
+        hint->front_count = 0;
+    }
+    fct_visits_add(visits, &s.visits);
+    return met;
+}
+
 /* A node with itself: each of its boxes with itself, and all pairs of them. */
 size_t fct_self_search(const fct_pair_map *map, size_t limit, size_t capacity, fct_face_pair *pairs,
                        fct_visits *visits) {
@@ -167,14 +318,15 @@ size_t fct_self_search(const fct_pair_map *map, size_t limit, size_t capacity, f
     while (height) {
         uint32_t box = stack[--height], number = fct_box_child(bvh, box);
         if (number & FCT_REF_LEAF) {
-            if (search_leaves(&s, box, box)) break;
+            if (search_leaves(&s, box, box, NULL)) break;
             continue;
         }
         const fct_pair_node *node = &bvh->pairs[number];
         for (uint32_t i = 0; i < 8 && node->child[i] != FCT_NONE && s.count < limit; ++i) {
             float depth[8];
             place_box(&map->to_a, bvh, number << 3 | i, &s.placed_a);
-            uint32_t met = meet_boxes(&s.placed_a, node, depth) & ((1u << i) - 1);
+            f8 gap;
+            uint32_t met = meet_boxes(&s.placed_a, node, depth, &gap) & ((1u << i) - 1);
             ++s.visits.nodes, s.visits.boxes += i;
             for (; met && s.count < limit; met &= met - 1)
                 search_below(&s, (box_pair){number << 3 | (uint32_t)__builtin_ctz(met), number << 3 | i});

@@ -78,9 +78,9 @@ fct_pose random_pose(const model &a, const model &b, double away, uint64_t &seed
 }
 
 std::set<face_pair> our_pairs(const model &a, const model &b, const fct_pose &pose) {
-    size_t count = fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, 0, nullptr, nullptr);
+    size_t count = fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, 0, nullptr, nullptr, nullptr);
     std::vector<fct_face_pair> pairs(count);
-    assert_int_equal(fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, count, pairs.data(), nullptr), count);
+    assert_int_equal(fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, count, pairs.data(), nullptr, nullptr), count);
     std::set<face_pair> out;
     for (const fct_face_pair &p : pairs) out.insert({p.face_a, p.face_b});
     assert_int_equal(out.size(), count);
