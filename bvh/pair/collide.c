@@ -49,8 +49,8 @@ static fct_near_pair begin_near_pair(const fct_pair_map *map, double most, const
 static bool find_overlap(const fct_pair_map *map, fct_pair_hint *hint, fct_visits *visits) {
     fct_face_pair found;
     if (!hint) return fct_overlap_search(map, 1, 1, &found, visits) > 0;
-    fct_hint_move(map, hint);
-    return hint_meets(map, hint) || fct_front_search(map, hint, visits);
+    fct_hint_move(map, hint, false);
+    return hint_meets(map, hint) || fct_front_search(map, hint, -1, visits);
 }
 
 bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_hint *hint,
@@ -86,11 +86,11 @@ fct_distance_def fct_distance_def_default(void) {
     return (fct_distance_def){.size = sizeof(fct_distance_def), .max_distance = INFINITY};
 }
 
-static bool find_distance(const fct_pair_map *map, const fct_distance_def *def, double enough,
-                          fct_pair_hint *hint, fct_distance *out, fct_visits *visits) {
+static bool find_distance(const fct_pair_map *map, const fct_distance_def *def, fct_pair_hint *hint,
+                          fct_distance *out, fct_visits *visits) {
     if (!(def->max_distance >= 0) || !(def->relative >= 0) || !(def->absolute >= 0)) return false;
     fct_near_pair best = begin_near_pair(map, def->max_distance, hint);
-    fct_distance_search(map, def->relative, def->absolute, enough, &best, visits);
+    fct_distance_search(map, def->relative, def->absolute, 0, &best, visits);
     if (best.place_a == FCT_NONE) return false;
     *out =
         (fct_distance){.distance = sqrt(best.distance2), .pair = make_pair(map, best.place_a, best.place_b)};
@@ -106,14 +106,24 @@ bool fct_bvh_distance(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, 
     fct_pair_map map;
     if (!def) def = &standard;
     if (def->size != sizeof *def || !fct_pair_map_set(a, b, pose, &map)) return false;
-    return find_distance(&map, def, 0, hint, out, visits);
+    return find_distance(&map, def, hint, out, visits);
 }
+
+/* Up to this distance, scaled, the search of contacts also finds near faces. */
+#define FRONT_DISTANCE 1.0
 
 bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, double distance,
                     fct_pair_hint *hint, fct_visits *visits) {
-    fct_distance_def def = fct_distance_def_default();
-    fct_distance found;
     fct_pair_map map;
-    def.max_distance = distance;
-    return fct_pair_map_set(a, b, pose, &map) && find_distance(&map, &def, distance, hint, &found, visits);
+    if (!(distance >= 0) || !fct_pair_map_set(a, b, pose, &map)) return false;
+    fct_near_pair best = begin_near_pair(&map, distance, hint);
+    if (hint) fct_hint_move(&map, hint, true);
+    if (best.place_a != FCT_NONE) return true;
+    if (hint && distance * a->scale <= FRONT_DISTANCE && (hint->touching || !hint->pause))
+        return fct_front_search(&map, hint, distance, visits);
+    if (hint) hint->touching = false, hint->pause -= hint->pause > 0;
+    fct_distance_search(&map, 0, 0, distance, &best, visits);
+    if (best.place_a == FCT_NONE) return false;
+    if (hint) hint->pair = make_pair(&map, best.place_a, best.place_b);
+    return true;
 }

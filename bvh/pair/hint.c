@@ -53,8 +53,9 @@ static double bound_way(const fct_bounds *b, const fct_pose *from, const fct_pos
     return sqrt(most2) + ROUNDING * (bound_lengths(b, from) + bound_lengths(b, to));
 }
 
-void fct_hint_move(const fct_pair_map *map, fct_pair_hint *hint) {
-    if (hint->model_a != map->a->pair_stamp || hint->model_b != map->b->pair_stamp) {
+void fct_hint_move(const fct_pair_map *map, fct_pair_hint *hint, bool near) {
+    if (hint->model_a != map->a->pair_stamp || hint->model_b != map->b->pair_stamp || hint->near != near) {
+        hint->near = near;
         hint->model_a = map->a->pair_stamp, hint->model_b = map->b->pair_stamp;
         hint->touching = false, hint->front_count = hint->pause = 0;
     }

@@ -60,7 +60,8 @@ typedef struct fct_pair_hint {
     /* The rest belongs to the queries. */
     uint64_t model_a, model_b; /* what the models of the last query hold, as hashes; 0 if there was none */
     fct_pose pose;             /* of the last query */
-    bool touching;        /* faces met; front[0] is their pair of leaves, and there is no front */
+    bool near;            /* it looked for faces within a distance */
+    bool touching;        /* it found a pair of faces; front[0] is their pair of leaves, and there is no front */
     uint32_t pause;       /* searches that make no front, because b moves too fast */
     uint32_t front_count; /* pairs of the front */
     uint32_t effort;      /* boxes and leaves that its search tested */

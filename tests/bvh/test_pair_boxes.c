@@ -85,7 +85,7 @@ static void boxes_meet_or_not(void **state) {
         fct_placed_box placed = place_plainly(&other, 0, 2e-6f);
         float depth[8], gap[8];
         f8 gaps;
-        uint32_t mask = meet_boxes(&placed, &node, depth, &gaps);
+        uint32_t mask = meet_boxes(&placed, &node, 0, depth, &gaps);
         f8_store(gap, gaps);
         for (uint32_t k = 0; k < 8; ++k) {
             double face = -INFINITY, cross = -INFINITY;
