@@ -30,7 +30,7 @@ static bool read_faces(const fct_pair_map *map, const fct_face_pair *pair, v3 p[
 
 static bool hint_meets(const fct_pair_map *map, fct_pair_hint *hint) {
     v3 p[3], q[3];
-    if (!hint || !read_faces(map, &hint->pair, p, q) || !fct_triangles_meet(p, q)) return false;
+    if (!hint || hint->stale || !read_faces(map, &hint->pair, p, q) || !fct_triangles_meet(p, q)) return false;
     hint->pair = make_pair(map, hint->pair.place_a, hint->pair.place_b);
     return true;
 }
@@ -50,7 +50,8 @@ static bool find_overlap(const fct_pair_map *map, fct_pair_hint *hint, fct_visit
     fct_face_pair found;
     if (!hint) return fct_overlap_search(map, 1, 1, &found, visits) > 0;
     fct_hint_move(map, hint, false);
-    return hint_meets(map, hint) || fct_front_search(map, hint, -1, visits);
+    hint->stale = !hint_meets(map, hint) && !fct_front_search(map, hint, -1, visits);
+    return !hint->stale;
 }
 
 bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_hint *hint,
@@ -96,7 +97,7 @@ static bool find_distance(const fct_pair_map *map, const fct_distance_def *def, 
         (fct_distance){.distance = sqrt(best.distance2), .pair = make_pair(map, best.place_a, best.place_b)};
     out->point_a[0] = best.point_a.x, out->point_a[1] = best.point_a.y, out->point_a[2] = best.point_a.z;
     out->point_b[0] = best.point_b.x, out->point_b[1] = best.point_b.y, out->point_b[2] = best.point_b.z;
-    if (hint) hint->pair = out->pair;
+    if (hint) hint->pair = out->pair, hint->stale = false;
     return true;
 }
 
@@ -116,14 +117,17 @@ bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, do
                     fct_pair_hint *hint, fct_visits *visits) {
     fct_pair_map map;
     if (!(distance >= 0) || !fct_pair_map_set(a, b, pose, &map)) return false;
-    fct_near_pair best = begin_near_pair(&map, distance, hint);
+    fct_near_pair best = begin_near_pair(&map, distance, hint && !hint->stale ? hint : NULL);
     if (hint) fct_hint_move(&map, hint, true);
-    if (best.place_a != FCT_NONE) return true;
-    if (hint && distance * a->scale <= FRONT_DISTANCE && (hint->touching || !hint->pause))
-        return fct_front_search(&map, hint, distance, visits);
-    if (hint) hint->touching = false, hint->pause -= hint->pause > 0;
-    fct_distance_search(&map, 0, 0, distance, &best, visits);
-    if (best.place_a == FCT_NONE) return false;
-    if (hint) hint->pair = make_pair(&map, best.place_a, best.place_b);
-    return true;
+    bool found = best.place_a != FCT_NONE;
+    if (!found && hint && distance * a->scale <= FRONT_DISTANCE && (hint->touching || !hint->pause)) {
+        found = fct_front_search(&map, hint, distance, visits);
+    } else if (!found) {
+        if (hint) hint->touching = false, hint->pause -= hint->pause > 0;
+        fct_distance_search(&map, 0, 0, distance, &best, visits);
+        found = best.place_a != FCT_NONE;
+        if (hint && found) hint->pair = make_pair(&map, best.place_a, best.place_b);
+    }
+    if (hint) hint->stale = !found;
+    return found;
 }

@@ -71,9 +71,6 @@ static inline uint32_t fct_box_child(const fct_bvh *bvh, uint32_t box) {
 static inline bool fct_box_is_leaf(const fct_bvh *bvh, uint32_t box) {
     return fct_box_child(bvh, box) & FCT_REF_LEAF;
 }
-/* The boxes of a pair of a front: all children of the node that is opened, or a pair of leaves. */
-#define FCT_FRONT_OPENS_A 0x100u
-#define FCT_FRONT_ALL     0xffu
 /* An eighth of the volume. */
 static inline float fct_box_volume(const fct_bvh *bvh, uint32_t box) {
     const fct_pair_node *n = &bvh->pairs[box >> 3];

@@ -56,10 +56,11 @@ enum { FCT_FRONT_PAIRS = 128 };
  * answers, and a distance within the tolerance. Keep one per pair of models and per thread. It is a value, and
  * owns nothing. What it knows about other models is not used. */
 typedef struct fct_pair_hint {
-    fct_face_pair pair; /* the last faces that met or were nearest; may be set */
+    fct_face_pair pair; /* the last faces that met or were nearest; may be set in a new hint */
     /* The rest belongs to the queries. */
     uint64_t model_a, model_b; /* what the models of the last query hold, as hashes; 0 if there was none */
     fct_pose pose;             /* of the last query */
+    bool stale;           /* the pair did not answer it */
     bool near;            /* it looked for faces within a distance */
     bool touching;        /* it found a pair of faces; front[0] is their pair of leaves, and there is no front */
     uint32_t pause;       /* searches that make no front, because b moves too fast */
