@@ -5,6 +5,9 @@
  * it ends. Narrow phase: the pairs that are left are ordered by the bodies' numbers, take their hints from the
  * last frame, and run on all threads.
  */
+#include <stddef.h>
+#include <string.h>
+
 #include "base/key.h"
 #include "base/parallel.h"
 #include "base/sort.h"
@@ -20,13 +23,13 @@ typedef struct world_bounds {
 /* A pair of bodies whose bounds meet. */
 typedef struct body_candidate {
     uint32_t body_a, body_b;
-    bool touch;
-    fct_pair_hint hint;
+    fct_face_pair faces; /* FCT_NONE if the bodies do not touch */
 } body_candidate;
 
 typedef struct candidate_list {
     size_t count, capacity;
     body_candidate *list;
+    fct_pair_hint *hints; /* of the candidates; NULL without a tracker */
 } candidate_list;
 
 struct fct_body_tracker {
@@ -38,6 +41,11 @@ typedef struct touch_job {
     const fct_body *bodies;
     candidate_list candidates;
 } touch_job;
+
+static void release_candidates(const fct_env *env, candidate_list *candidates) {
+    fct_release(env, candidates->list);
+    fct_release(env, candidates->hints);
+}
 
 static fct_result check_bodies(const fct_env *env, uint32_t count, const fct_body *bodies) {
     for (uint32_t i = 0; i < count; ++i) {
@@ -106,7 +114,7 @@ static fct_result list_candidates(const fct_env *env, uint32_t count, const worl
             if (result != FCT_OK) return result;
             uint32_t first = order[i] < order[j] ? order[i] : order[j], second = order[i] ^ order[j] ^ first;
             out->list[out->count++] =
-                (body_candidate){.body_a = first, .body_b = second, .hint = fct_pair_hint_none()};
+                (body_candidate){.body_a = first, .body_b = second, .faces = fct_face_pair_none()};
         }
     }
     return FCT_OK;
@@ -130,7 +138,7 @@ static fct_result sort_candidates(const fct_env *env, candidate_list *candidates
     if (result == FCT_OK) {
         for (size_t i = 0; i < count; ++i) sorted[i] = candidates->list[order[i]];
         body_candidate *list = candidates->list;
-        *candidates = (candidate_list){count, count, sorted};
+        *candidates = (candidate_list){count, count, sorted, NULL};
         sorted = list;
     }
     fct_release(env, sorted);
@@ -139,14 +147,24 @@ static fct_result sort_candidates(const fct_env *env, candidate_list *candidates
     return result;
 }
 
-/* Both lists are ordered. */
-static void copy_hints(const candidate_list *from, candidate_list *to) {
-    for (size_t i = 0, j = 0; i < from->count && j < to->count;) {
-        uint64_t old = candidate_key(&from->list[i]), key = candidate_key(&to->list[j]);
-        if (old == key) to->list[j].hint = from->list[i].hint;
-        if (old <= key) ++i;
-        if (old >= key) ++j;
+/* The pairs of a front that are not used need no copy. */
+static void copy_hint(const fct_pair_hint *from, fct_pair_hint *to) {
+    uint32_t used = from->touching ? 1 : from->front_count;
+    memcpy(to, from, offsetof(fct_pair_hint, front) + used * sizeof from->front[0]);
+}
+
+/* Hints for all candidates: those of the last frame, or new ones. Both lists are ordered. */
+static fct_result take_hints(const fct_env *env, const candidate_list *last, candidate_list *out) {
+    const fct_pair_hint none = fct_pair_hint_none();
+    out->hints = fct_allocate(env, out->count, sizeof *out->hints);
+    if (!out->hints) return fct_fail_memory(env, "hints of bodies");
+    for (size_t i = 0, j = 0; i < out->count; ++i) {
+        uint64_t key = candidate_key(&out->list[i]);
+        while (j < last->count && candidate_key(&last->list[j]) < key) ++j;
+        bool known = j < last->count && candidate_key(&last->list[j]) == key;
+        copy_hint(known ? &last->hints[j] : &none, &out->hints[i]);
     }
+    return FCT_OK;
 }
 
 /* Sorts the bodies along an axis, and lists the candidates. */
@@ -173,9 +191,13 @@ static void test_candidates(void *user, size_t begin, size_t end, size_t chunk, 
     const touch_job *job = user;
     for (size_t i = begin; i < end; ++i) {
         body_candidate *c = &job->candidates.list[i];
+        fct_pair_hint *hint = job->candidates.hints ? &job->candidates.hints[i] : NULL;
         const fct_body *a = &job->bodies[c->body_a], *b = &job->bodies[c->body_b];
         fct_pose pose = fct_pose_relate(&a->pose, &b->pose);
-        c->touch = fct_bvh_overlap(a->bvh, b->bvh, &pose, &c->hint, NULL);
+        if (!hint)
+            fct_bvh_pairs(a->bvh, b->bvh, &pose, 1, 1, &c->faces, NULL, NULL);
+        else if (fct_bvh_overlap(a->bvh, b->bvh, &pose, hint, NULL))
+            c->faces = hint->pair;
     }
 }
 
@@ -183,11 +205,33 @@ static size_t list_touching(const candidate_list *candidates, size_t capacity, f
     size_t found = 0;
     for (size_t i = 0; i < candidates->count; ++i) {
         const body_candidate *c = &candidates->list[i];
-        if (!c->touch) continue;
-        if (found < capacity) pairs[found] = (fct_body_pair){c->body_a, c->body_b, c->hint.pair};
+        if (c->faces.face_a == FCT_NONE) continue;
+        if (found < capacity) pairs[found] = (fct_body_pair){c->body_a, c->body_b, c->faces};
         ++found;
     }
     return found;
+}
+
+/* Fills job->candidates, which the caller releases. */
+static fct_result find_touching(const fct_env *env, uint32_t count, fct_body_tracker *tracker,
+                                touch_job *job) {
+    fct_result result = check_bodies(env, count, job->bodies);
+    if (result == FCT_OK && count) result = run_broad_phase(env, count, job);
+    if (result == FCT_OK) result = sort_candidates(env, &job->candidates);
+    if (result == FCT_OK && tracker) result = take_hints(env, &tracker->last, &job->candidates);
+    if (result == FCT_OK)
+        result = fct_parallel_for_progress(env, "pairs of bodies", job->candidates.count, PAIR_CHUNK,
+                                           test_candidates, job);
+    return result;
+}
+
+fct_result fct_bodies_touching(const fct_env *env, uint32_t count, const fct_body *bodies, size_t capacity,
+                               fct_body_pair *pairs, size_t *found) {
+    touch_job job = {.bodies = bodies};
+    fct_result result = find_touching(env, count, NULL, &job);
+    *found = result == FCT_OK ? list_touching(&job.candidates, capacity, pairs) : 0;
+    release_candidates(env, &job.candidates);
+    return result;
 }
 
 fct_result fct_body_tracker_create(const fct_env *env, fct_body_tracker **out) {
@@ -199,37 +243,17 @@ fct_result fct_body_tracker_create(const fct_env *env, fct_body_tracker **out) {
 
 void fct_body_tracker_destroy(fct_body_tracker *tracker) {
     if (!tracker) return;
-    fct_release(tracker->env, tracker->last.list);
+    release_candidates(tracker->env, &tracker->last);
     fct_release(tracker->env, tracker);
 }
 
 fct_result fct_body_tracker_touching(fct_body_tracker *tracker, uint32_t count, const fct_body *bodies,
                                      size_t capacity, fct_body_pair *pairs, size_t *found) {
-    const fct_env *env = tracker->env;
     touch_job job = {.bodies = bodies};
-    *found = 0;
-    fct_result result = check_bodies(env, count, bodies);
-    if (result == FCT_OK && count) result = run_broad_phase(env, count, &job);
-    if (result == FCT_OK) result = sort_candidates(env, &job.candidates);
-    if (result == FCT_OK) {
-        copy_hints(&tracker->last, &job.candidates);
-        result = fct_parallel_for_progress(env, "pairs of bodies", job.candidates.count, PAIR_CHUNK,
-                                           test_candidates, &job);
-    }
-    if (result != FCT_OK) {
-        fct_release(env, job.candidates.list);
-        return result;
-    }
-    *found = list_touching(&job.candidates, capacity, pairs);
-    fct_release(env, tracker->last.list);
-    tracker->last = job.candidates;
-    return FCT_OK;
-}
-
-fct_result fct_bodies_touching(const fct_env *env, uint32_t count, const fct_body *bodies, size_t capacity,
-                               fct_body_pair *pairs, size_t *found) {
-    fct_body_tracker once = {.env = env};
-    fct_result result = fct_body_tracker_touching(&once, count, bodies, capacity, pairs, found);
-    fct_release(env, once.last.list);
+    fct_result result = find_touching(tracker->env, count, tracker, &job);
+    *found = result == FCT_OK ? list_touching(&job.candidates, capacity, pairs) : 0;
+    candidate_list old = result == FCT_OK ? tracker->last : job.candidates;
+    if (result == FCT_OK) tracker->last = job.candidates;
+    release_candidates(tracker->env, &old);
     return result;
 }
