@@ -2,9 +2,9 @@
  *
  * Surfaces of two bodies that overlap meet in a closed curve. The area inside of this curve, times a
  * pressure, is the force that drives the bodies apart: so it grows with the depth, and its direction does not
- * depend on single faces. A tracker keeps, for each pair of bodies, where the last search ended; pebbles that rest
- * cost little. Friction is a spring between the bodies, which slides at the Coulomb limit. Each
- * run gives the same frames, for any number of threads.
+ * depend on single faces. A tracker keeps, for each pair of bodies, where the last search ended; pebbles that
+ * rest cost little. Friction is a spring between the bodies, which slides at the Coulomb limit. Each run
+ * gives the same frames, for any number of threads.
  *
  * Writes falling-0.ply to falling-3.ply, with y up, while z is up here. usage: falling
  */

@@ -2,8 +2,8 @@
  *
  * Broad phase: the root box of each body has bounds in the world. Bodies are sorted by the lower end of their
  * bounds along the axis on which their centres spread most, and each is compared with those that begin before
- * it ends. Narrow phase: the pairs that are left are ordered by the bodies' numbers, take their hints from the
- * last frame, and run on all threads.
+ * it ends. Narrow phase: the pairs that are left are ordered by the bodies' numbers, take their hints from
+ * the last frame, and run on all threads.
  */
 #include <stddef.h>
 #include <string.h>

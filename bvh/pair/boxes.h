@@ -56,9 +56,10 @@ static inline f8 separate_along_a(const fct_placed_box *b, const fct_pair_node *
     return f8_sub(f8_abs(at), f8_add(f8_load(n->half[s]), radius));
 }
 
-/* A mask of the boxes of the node that may lie within a distance of box b. depth[i]: along the axis of a box on which they overlap
- * least, how far box i and b are apart, so it is negative for boxes that overlap far. gap: for boxes outside
- * of the mask, a lower bound of the distance plus the slack; a product of two axes is at most 1 long. */
+/* A mask of the boxes of the node that may lie within a distance of box b. depth[i]: along the axis of a box
+ * on which they overlap least, how far box i and b are apart, so it is negative for boxes that overlap far.
+ * gap: for boxes outside of the mask, a lower bound of the distance plus the slack; a product of two axes is
+ * at most 1 long. */
 static inline uint32_t meet_boxes(const fct_placed_box *b, const fct_pair_node *n, float within,
                                   float depth[8], f8 *gap) {
     box_terms t;

@@ -30,7 +30,8 @@ static bool read_faces(const fct_pair_map *map, const fct_face_pair *pair, v3 p[
 
 static bool hint_meets(const fct_pair_map *map, fct_pair_hint *hint) {
     v3 p[3], q[3];
-    if (!hint || hint->stale || !read_faces(map, &hint->pair, p, q) || !fct_triangles_meet(p, q)) return false;
+    if (!hint || hint->stale || !read_faces(map, &hint->pair, p, q) || !fct_triangles_meet(p, q))
+        return false;
     hint->pair = make_pair(map, hint->pair.place_a, hint->pair.place_b);
     return true;
 }

@@ -1,10 +1,11 @@
-/* bvh/pair/front.c: the search for a contact, or for faces within a distance, that keeps its front. A kernel file.
+/* bvh/pair/front.c: the search for a contact, or for faces within a distance, that keeps its front. A kernel
+ * file.
  *
- * The front is each node that the search opened, with those of its boxes that are apart from the other box, and
- * each pair of leaves. A pair of the front waits until b has moved by the least of these distances. Then its
- * boxes are tested again, and the search goes down where they are not apart any more. So a pair of bodies that
- * moves slowly, or rests, tests few boxes or none. A search from the roots makes a new front if many pairs have
- * moved that far, and none while b moves fast. After a contact, the pair of leaves comes first.
+ * The front is each node that the search opened, with those of its boxes that are apart from the other box,
+ * and each pair of leaves. A pair of the front waits until b has moved by the least of these distances. Then
+ * its boxes are tested again, and the search goes down where they are not apart any more. So a pair of bodies
+ * that moves slowly, or rests, tests few boxes or none. A search from the roots makes a new front if many
+ * pairs have moved that far, and none while b moves fast. After a contact, the pair of leaves comes first.
  *
  * Bounds of the float kernel apart.h spare most pairs of triangles the exact test, and tell how far they are
  * apart.
@@ -85,10 +86,10 @@ static bool test_listed(front_search *s, leaf_pair *l) {
     return false;
 }
 
-/* A mask of the triangles whose boxes may be near the box low..high. *least2 becomes at most the squared distances
- * of the others. */
+/* A mask of the triangles whose boxes may be near the box low..high. *least2 becomes at most the squared
+ * distances of the others. */
 static inline uint32_t find_near(const front_search *s, const triangle_boxes *boxes, uint32_t count,
-                          const float low[3], const float high[3], float slack, f8 *least2) {
+                                 const float low[3], const float high[3], float slack, f8 *least2) {
     f8 within2 = f8_set(s->within_a * s->within_a * (1 + 0x1p-20f)), none = f8_set(INFINITY);
     uint32_t near = 0;
     for (uint32_t first = 0; first < count; first += 8) {
@@ -161,8 +162,8 @@ static void keep_apart(const front_search *s, bool opens_a, f8 gaps, uint32_t me
     pair->reach = find_reach(s, fct_max((double)least, 0) * (opens_a ? s->gap_of_a : s->gap_of_b));
 }
 
-/* Tests the boxes of the pair, and pushes those that are not apart. If the search keeps a front, the others stay
- * in the pair. Returns the new height of the stack. */
+/* Tests the boxes of the pair, and pushes those that are not apart. If the search keeps a front, the others
+ * stay in the pair. Returns the new height of the stack. */
 static uint32_t open_node(front_search *s, fct_front_pair *pair, box_pair *stack, uint32_t height) {
     const fct_pair_map *map = s->map;
     bool opens_a = pair->lanes & FCT_FRONT_OPENS_A;

@@ -1,8 +1,8 @@
 /* bvh/pair/hint.c: see hint.h.
  *
  * If boxes are d apart, their faces stay apart while no point of b comes farther than d. A point x of b comes
- * |(R' - R) x + (t' - t)| from one pose to the next. This is convex in x, so over the bounds of b it is largest at a
- * corner.
+ * |(R' - R) x + (t' - t)| from one pose to the next. This is convex in x, so over the bounds of b it is
+ * largest at a corner.
  */
 #include "bvh/pair/hint.h"
 
@@ -28,8 +28,7 @@ static double bound_lengths(const fct_bounds *b, const fct_pose *pose) {
     for (int i = 0; i < 3; ++i) {
         sum += fabs(pose->translation[i]);
         for (int j = 0; j < 3; ++j)
-            sum += fabs(pose->rotation[i][j]) *
-                   fct_max(fabs((double)b->lower[j]), fabs((double)b->upper[j]));
+            sum += fabs(pose->rotation[i][j]) * fct_max(fabs((double)b->lower[j]), fabs((double)b->upper[j]));
     }
     return sum;
 }

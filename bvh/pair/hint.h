@@ -18,8 +18,8 @@ static inline fct_front_pair fct_front_begin(const fct_pair_map *map, uint32_t b
     return pair;
 }
 
-/* Takes the hint to the pose of the map. Forgets the front if it belongs to other models or to the other kind of
- * search (near: of faces within a distance), or if b has come so far that reaches lose digits. */
+/* Takes the hint to the pose of the map. Forgets the front if it belongs to other models or to the other kind
+ * of search (near: of faces within a distance), or if b has come so far that reaches lose digits. */
 void fct_hint_move(const fct_pair_map *map, fct_pair_hint *hint, bool near);
 
 #endif

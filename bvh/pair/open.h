@@ -37,10 +37,10 @@ typedef struct opened_node {
     bool opens_a, prefetches;
 } opened_node;
 
-/* Pushes the boxes of the node in the mask `met` with the other box, those that overlap deepest on top. Returns
- * the new height of the stack. */
-static inline __attribute__((always_inline)) uint32_t push_boxes(const opened_node *node, uint32_t met, const float depth[8],
-                                  box_pair *stack, uint32_t height) {
+/* Pushes the boxes of the node in the mask `met` with the other box, those that overlap deepest on top.
+ * Returns the new height of the stack. */
+static inline __attribute__((always_inline)) uint32_t
+push_boxes(const opened_node *node, uint32_t met, const float depth[8], box_pair *stack, uint32_t height) {
     const uint32_t *children = node->own->pairs[node->number].child;
     float waiting[8];
     uint32_t base = height;

@@ -76,8 +76,8 @@ static bool search_leaves(overlap_search *s, uint32_t box_a, uint32_t box_b) {
     return false;
 }
 
-/* Pushes box `fixed` with the children of the node of `opened` that it may meet. Returns the new height of the
- * stack. */
+/* Pushes box `fixed` with the children of the node of `opened` that it may meet. Returns the new height of
+ * the stack. */
 static uint32_t open_node(overlap_search *s, bool opens_a, uint32_t fixed, uint32_t opened, box_pair *stack,
                           uint32_t height) {
     const fct_pair_map *map = s->map;

@@ -53,17 +53,17 @@ enum { FCT_FRONT_PAIRS = 128 };
  * apart until b has moved by the distance of the boxes, so the next search looks only at the others.
  *
  * A hint does not change whether faces meet, how many do, or the exact distance. It may change which pair
- * answers, and a distance within the tolerance. Keep one per pair of models and per thread. It is a value, and
- * owns nothing. What it knows about other models is not used. */
+ * answers, and a distance within the tolerance. Keep one per pair of models and per thread. It is a value,
+ * and owns nothing. What it knows about other models is not used. */
 typedef struct fct_pair_hint {
     fct_face_pair pair; /* the last faces that met or were nearest; may be set in a new hint */
     /* The rest belongs to the queries. */
     uint64_t model_a, model_b; /* what the models of the last query hold, as hashes; 0 if there was none */
     fct_pose pose;             /* of the last query */
-    bool stale;           /* the pair did not answer it */
-    bool near;            /* it looked for faces within a distance */
-    bool touching;        /* it found a pair of faces; front[0] is their pair of leaves, and there is no front */
-    uint32_t pause;       /* searches that make no front, because b moves too fast */
+    bool stale;                /* the pair did not answer it */
+    bool near;                 /* it looked for faces within a distance */
+    bool touching;  /* it found a pair of faces; front[0] is their pair of leaves, and there is no front */
+    uint32_t pause; /* searches that make no front, because b moves too fast */
     uint32_t front_count; /* pairs of the front */
     uint32_t effort;      /* boxes and leaves that its search tested */
     double way;           /* how far b has come since the front was made; at least, scaled */
@@ -172,9 +172,9 @@ typedef struct fct_body_pair {
 FCT_API fct_result fct_bodies_touching(const fct_env *env, uint32_t count, const fct_body *bodies,
                                        size_t capacity, fct_body_pair *pairs, size_t *found);
 
-/* The same from frame to frame: keeps a hint for each pair of bodies whose bounds met in the last frame (about
- * 2 KB), so bodies that move slowly take less time. It finds the same pairs of bodies, perhaps with other
- * faces. Bodies may be added at the end, and may change their models. */
+/* The same from frame to frame: keeps a hint for each pair of bodies whose bounds met in the last frame
+ * (about 2 KB), so bodies that move slowly take less time. It finds the same pairs of bodies, perhaps with
+ * other faces. Bodies may be added at the end, and may change their models. */
 typedef struct fct_body_tracker fct_body_tracker;
 /* The environment must outlive the tracker. Errors: MEMORY. */
 FCT_API fct_result fct_body_tracker_create(const fct_env *env, fct_body_tracker **out);

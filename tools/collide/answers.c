@@ -40,9 +40,9 @@ static void answer_pose(const collide_answers *a, size_t i, fct_pair_hint *hint,
         break;
     case COLLIDE_PAIRS:
         out->pairs = a->slots + i * a->slot;
-        out->pair_count = model_b
-                              ? fct_bvh_pairs(model_a, model_b, &pose, q->limit, a->slot, out->pairs, NULL, visits)
-                              : fct_bvh_self_pairs(model_a, q->limit, a->slot, out->pairs, visits);
+        out->pair_count =
+            model_b ? fct_bvh_pairs(model_a, model_b, &pose, q->limit, a->slot, out->pairs, NULL, visits)
+                    : fct_bvh_self_pairs(model_a, q->limit, a->slot, out->pairs, visits);
         out->found = out->pair_count > 0;
         break;
     }
