@@ -122,7 +122,7 @@ static int fetch_all_pairs(tool *t, collide_answers *a, collide_answer *answer) 
     if (m->b)
         fct_bvh_pairs(m->a, m->b, &pose, answer->pair_count, a->large_capacity, a->large, NULL, NULL);
     else
-        fct_bvh_self_pairs(m->a, answer->pair_count, a->large_capacity, a->large, NULL, NULL);
+        fct_bvh_self_pairs(m->a, answer->pair_count, a->large_capacity, a->large, NULL);
     a->seconds += tool_seconds() - start;
     answer->pairs = a->large;
     return TOOL_DONE;
