@@ -47,12 +47,23 @@ static fct_near_pair begin_near_pair(const fct_pair_map *map, double most, const
     return known.distance2 <= best.distance2 ? known : best;
 }
 
+/* Whether the next query does without a front. */
+static bool is_paused(fct_pair_hint *hint) {
+    if (hint->touching || !hint->pause) return false;
+    --hint->pause;
+    return true;
+}
+
 static bool find_overlap(const fct_pair_map *map, fct_pair_hint *hint, fct_visits *visits) {
     fct_face_pair found;
     if (!hint) return fct_overlap_search(map, 1, 1, &found, visits) > 0;
     fct_hint_move(map, hint, false);
-    hint->stale = !hint_meets(map, hint) && !fct_front_search(map, hint, -1, visits);
-    return !hint->stale;
+    bool meet = hint_meets(map, hint);
+    if (!meet)
+        meet = is_paused(hint) ? fct_overlap_search(map, 1, 1, &hint->pair, visits) > 0
+                               : fct_front_search(map, hint, -1, visits);
+    hint->stale = !meet;
+    return meet;
 }
 
 bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_hint *hint,
@@ -121,10 +132,9 @@ bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, do
     fct_near_pair best = begin_near_pair(&map, distance, hint && !hint->stale ? hint : NULL);
     if (hint) fct_hint_move(&map, hint, true);
     bool found = best.place_a != FCT_NONE;
-    if (!found && hint && distance * a->scale <= FRONT_DISTANCE && (hint->touching || !hint->pause)) {
+    if (!found && hint && distance * a->scale <= FRONT_DISTANCE && !is_paused(hint)) {
         found = fct_front_search(&map, hint, distance, visits);
     } else if (!found) {
-        if (hint) hint->touching = false, hint->pause -= hint->pause > 0;
         fct_distance_search(&map, 0, 0, distance, &best, visits);
         found = best.place_a != FCT_NONE;
         if (hint && found) hint->pair = make_pair(&map, best.place_a, best.place_b);

@@ -24,7 +24,7 @@
 typedef struct front_search {
     const fct_pair_map *map;
     fct_pair_hint *hint;
-    bool keeps;                /* the front; else the search is as fast as one without a hint */
+    bool keeps;                /* the front: not of a fast motion, nor once it is full */
     double gap_of_a, gap_of_b; /* gaps in the scaled units, times this, are lower bounds in a's */
     bool near;                 /* looks for faces within `distance`, unscaled, also for those without area */
     double distance;
@@ -182,7 +182,7 @@ static uint32_t open_node(front_search *s, fct_front_pair *pair, box_pair *stack
     return push_boxes(&node, met, depth, stack, height);
 }
 
-/* Returns whether faces are found. */
+/* Returns whether faces are found; front[0] is then their pair of leaves. */
 static bool search_stack(front_search *s, box_pair *stack, uint32_t height) {
     while (height) {
         box_pair boxes = stack[--height];
@@ -203,7 +203,11 @@ static bool search_stack(front_search *s, box_pair *stack, uint32_t height) {
 /* Tests a pair of the front again, and what is below it. */
 static bool test_pair_again(front_search *s, fct_front_pair *pair) {
     box_pair stack[FCT_PAIR_STACK];
-    if (fct_front_is_leaves(s->map, pair)) return search_leaves(s, pair);
+    if (fct_front_is_leaves(s->map, pair)) {
+        bool found = search_leaves(s, pair);
+        if (found) s->hint->front[0] = *pair;
+        return found;
+    }
     return search_stack(s, stack, open_node(s, pair, stack, 0));
 }
 
@@ -217,10 +221,7 @@ static bool test_front(front_search *s) {
     fct_pair_hint *hint = s->hint;
     uint32_t count = hint->front_count, kept = 0;
     for (uint32_t i = 0; i < count; ++i)
-        if (is_expired(s, &hint->front[i]) && test_pair_again(s, &hint->front[i])) {
-            hint->front[0] = hint->front[i];
-            return true;
-        }
+        if (is_expired(s, &hint->front[i]) && test_pair_again(s, &hint->front[i])) return true;
     for (uint32_t i = 0; i < hint->front_count; ++i)
         if (hint->front[i].lanes & FCT_FRONT_ALL) hint->front[kept++] = hint->front[i];
     hint->front_count = kept;
@@ -238,7 +239,7 @@ static bool search_roots(front_search *s) {
 
 /* A search from the roots is better if more than this part of its tests must be repeated. */
 #define MOST_EXPIRED .5
-/* Then the next searches do not make a front, because b moves too fast. */
+/* Then, or if the leaves of a contact have none any more, the next queries do without a front. */
 #define PAUSE 6
 
 static bool is_worn(const front_search *s) {
@@ -248,7 +249,8 @@ static bool is_worn(const front_search *s) {
 }
 
 static front_search begin_search(const fct_pair_map *map, fct_pair_hint *hint, double distance) {
-    front_search s = {.map = map, .hint = hint, .near = distance >= 0, .prefetches = is_prefetched(map)};
+    front_search s = {
+        .map = map, .hint = hint, .near = distance >= 0, .keeps = true, .prefetches = is_prefetched(map)};
     double narrow = (1 - 0x1p-20) / (1 + map->to_a.skew), shrink2 = 1 - map->to_a.skew;
     s.gap_of_a = narrow;
     s.gap_of_b = shrink2 > 0 ? map->to_a.factor * sqrt(shrink2) * narrow : 0;
@@ -263,13 +265,11 @@ static front_search begin_search(const fct_pair_map *map, fct_pair_hint *hint, d
 bool fct_front_search(const fct_pair_map *map, fct_pair_hint *hint, double distance, fct_visits *visits) {
     front_search s = begin_search(map, hint, distance);
     bool found = hint->touching && search_leaves(&s, &hint->front[0]);
-    bool fronted = !hint->touching && hint->front_count;
-    if (fronted && is_worn(&s)) fronted = false, hint->pause = PAUSE;
-    s.keeps = !hint->pause;
-    if (fronted) {
+    if (!found && !hint->touching && hint->front_count && !is_worn(&s)) {
         found = test_front(&s);
     } else if (!found) {
-        hint->pause -= hint->pause > 0;
+        s.keeps = !hint->touching && !hint->front_count;
+        if (!s.keeps) hint->pause = PAUSE;
         found = search_roots(&s);
     }
     hint->touching = found;

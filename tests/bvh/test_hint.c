@@ -27,6 +27,12 @@ static bool check_hints(const model *a, const model *b, const fct_pose *pose, fc
     if (meet) {
         fct_contact contact;
         assert_true(fct_bvh_contact(a->bvh, b->bvh, pose, &hints[0].pair, &contact));
+        /* Without the pair of faces, their pair of leaves answers. */
+        fct_pair_hint leaves = hints[0];
+        fct_visits visits = {0, 0, 0};
+        leaves.pair = fct_face_pair_none();
+        assert_true(fct_bvh_overlap(a->bvh, b->bvh, pose, &leaves, &visits));
+        if (hints[0].touching) assert_int_equal(visits.nodes, 0);
     }
     memset(pairs, 0, sizeof pairs);
     size_t count = fct_bvh_pairs(a->bvh, b->bvh, pose, 40, 40, pairs[0], NULL, NULL);
@@ -115,6 +121,11 @@ static void a_shift_by_the_gap(void **state) {
                 assert_int_equal(fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, &visits), i == steps);
                 if (i <= steps * 9 / 10) assert_int_equal(visits.nodes, 0);
             }
+            /* Without the pair of faces, their pair of leaves answers. */
+            fct_visits visits = {0, 0, 0};
+            hint.pair = fct_face_pair_none();
+            assert_true(fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, &visits));
+            assert_int_equal(visits.nodes, 0);
             model_release(&env, &m);
         }
 }
@@ -205,6 +216,49 @@ static void a_far_sheet(void **state) {
     assert_in_range(met, count, 9 * count);
     model_release(&env, &a);
     model_release(&env, &b);
+}
+
+/* The pair of leaves of the contact answers the same question again. */
+static void check_leaves(const model *m, const fct_pose *pose, fct_pair_hint *hint) {
+    fct_visits visits = {0, 0, 0};
+    hint->pair = fct_face_pair_none();
+    assert_true(hint->touching);
+    assert_true(fct_bvh_overlap(m->bvh, m->bvh, pose, hint, &visits));
+    assert_int_equal(visits.nodes, 0);
+}
+
+/* A body beside another one moves into contact by one step. Each pair of the front alone, as if b had not
+ * come as far as the others, leads to the contacts below it. */
+static void contacts_below_a_front(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    model m = pair_model_make(&env, make_pebble(&env, 16, 10));
+    uint64_t seed = 21;
+    size_t below = 0, total = 0;
+    for (int walk = 0; walk < (SANITIZED ? 20 : 60); ++walk) {
+        fct_pair_hint hint = fct_pair_hint_none(), before;
+        fct_pose pose = random_pose(&seed, 0);
+        v3 away = v3_scale(random_direction(&seed), 1.9);
+        pose.translation[0] = away.x, pose.translation[1] = away.y, pose.translation[2] = away.z;
+        if (fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, NULL)) continue;
+        before = hint;
+        for (int k = 0; k < 3; ++k) pose.translation[k] *= .6;
+        if (!fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, NULL)) continue;
+        check_leaves(&m, &pose, &hint);
+        bool any = false;
+        for (uint32_t i = 0; i < before.front_count; ++i) {
+            hint = before;
+            for (uint32_t k = 0; k < hint.front_count; ++k) hint.front[k].reach = k == i ? -1 : 1e30f;
+            hint.effort = 1000; /* so that the front is used */
+            if (!fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, NULL)) continue;
+            check_leaves(&m, &pose, &hint);
+            any = true, ++below;
+        }
+        assert_true(any);
+        ++total;
+    }
+    assert_true(total >= 10 && below > total);
+    model_release(&env, &m);
 }
 
 /* What hints save, measured, and 5 % above: slow bodies close to each other, fast ones, and contact that
@@ -305,6 +359,7 @@ int main(void) {
         cmocka_unit_test(a_bar_that_turns),
         cmocka_unit_test(hints_of_other_models),
         cmocka_unit_test(a_far_sheet),
+        cmocka_unit_test(contacts_below_a_front),
         cmocka_unit_test(hints_save_visits),
         cmocka_unit_test(trackers),
     };
