@@ -43,7 +43,7 @@ static inline __attribute__((always_inline)) uint32_t
 push_boxes(const opened_node *node, uint32_t met, const float depth[8], box_pair *stack, uint32_t height) {
     const uint32_t *children = node->own->pairs[node->number].child;
     float waiting[8];
-    uint32_t base = height;
+    const uint32_t base = height;
     for (; met; met &= met - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(met), child = node->number << 3 | i;
         if (children[i] == FCT_NONE) continue;
