@@ -3,10 +3,6 @@
 #include "bvh/pair/search.h"
 #include "bvh/pair/triangles.h"
 
-fct_face_pair fct_face_pair_none(void) {
-    return (fct_face_pair){FCT_NONE, FCT_NONE, FCT_NONE, FCT_NONE};
-}
-
 static bool is_pair(const fct_pair_map *map, const fct_face_pair *pair) {
     return pair && pair->place_a < map->a->view.face_count && pair->place_b < map->b->view.face_count;
 }

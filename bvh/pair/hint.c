@@ -14,6 +14,10 @@
 /* Scaled. A reach is a float, so it errs by 2^-22 of the way. */
 #define LONGEST_WAY 16.0
 
+fct_face_pair fct_face_pair_none(void) {
+    return (fct_face_pair){FCT_NONE, FCT_NONE, FCT_NONE, FCT_NONE};
+}
+
 fct_pair_hint fct_pair_hint_none(void) {
     return (fct_pair_hint){.pair = fct_face_pair_none()};
 }
