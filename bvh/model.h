@@ -132,7 +132,8 @@ struct fct_bvh {
     /* FCT_BVH_PAIRS */
     fct_pair_node *pairs; /* pair_count; node 0 has one child, the root */
     uint32_t pair_count;
-    uint32_t *parts; /* part_count: one tree vertex of each connected part */
+    uint64_t pair_stamp; /* of the pairs, the positions and the triangles; not 0 */
+    uint32_t *parts;     /* part_count: one tree vertex of each connected part */
     uint32_t part_count;
     /* FCT_BACKEND_EMBREE */
     struct fct_embree *embree;

@@ -76,7 +76,7 @@ static fct_motion plan_motion(const fct_bvh *a, const fct_bvh *b) {
 
 static void show_pairs(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose) {
     fct_face_pair pairs[SHOWN];
-    size_t found = fct_bvh_pairs(a, b, pose, SIZE_MAX, SHOWN, pairs, NULL);
+    size_t found = fct_bvh_pairs(a, b, pose, SIZE_MAX, SHOWN, pairs, NULL, NULL);
     printf("%zu pairs of faces then\n", found);
     for (size_t i = 0; i < found && i < SHOWN; ++i) {
         fct_contact c;
@@ -90,7 +90,7 @@ static void show_pairs(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose)
  */
 static bool show_motion(const fct_bvh *a, const fct_bvh *b, bool balls) {
     fct_motion motion = plan_motion(a, b);
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     fct_distance start;
     fct_first_contact first;
     if (!fct_bvh_distance(a, b, &motion.from, NULL, &hint, &start, NULL)) return false;
@@ -100,7 +100,7 @@ static bool show_motion(const fct_bvh *a, const fct_bvh *b, bool balls) {
            first.nearest.point_a[1], first.nearest.point_a[2]);
 
     fct_pose pose = fct_motion_at(b, &motion, fmin(first.time + .01, 1));
-    hint = first.nearest.pair;
+    hint.pair = first.nearest.pair;
     bool before = fct_bvh_overlap(a, b, &motion.from, NULL, NULL);
     bool after = fct_bvh_overlap(a, b, &pose, &hint, NULL);
     printf("touching at the start: %s; a little later: %s\n", before ? "yes" : "no", after ? "yes" : "no");

@@ -2,8 +2,9 @@
  *
  * Surfaces of two bodies that overlap meet in a closed curve. The area inside of this curve, times a
  * pressure, is the force that drives the bodies apart: so it grows with the depth, and its direction does not
- * depend on single faces. Friction is a spring between the bodies, which slides at the Coulomb limit. Each
- * run gives the same frames, for any number of threads.
+ * depend on single faces. A tracker keeps, for each pair of bodies, where the last search ended; pebbles that
+ * rest cost little. Friction is a spring between the bodies, which slides at the Coulomb limit. Each run
+ * gives the same frames, for any number of threads.
  *
  * Writes falling-0.ply to falling-3.ply, with y up, while z is up here. usage: falling
  */
@@ -143,6 +144,7 @@ typedef struct world {
     const fct_env *env;
     shape bowl, pebble;
     fct_body bodies[BODIES];
+    fct_body_tracker *tracker;
     motion motions[BODIES];
     vec slide[BODIES][BODIES];        /* how far the friction spring of two bodies is stretched */
     uint32_t touched[BODIES][BODIES]; /* the step after the last one in which they touched */
@@ -181,7 +183,7 @@ static bool find_curve(const world *w, const fct_body_pair *pair, vec *area, vec
     const fct_mesh *mesh_a = pair->body_a ? &w->pebble.mesh : &w->bowl.mesh, *mesh_b = &w->pebble.mesh;
     fct_pose pose = relate(&a->pose, &b->pose);
     fct_face_pair faces[MOST_PAIRS];
-    size_t count = fct_bvh_pairs(a->bvh, b->bvh, &pose, MOST_PAIRS, MOST_PAIRS, faces, NULL);
+    size_t count = fct_bvh_pairs(a->bvh, b->bvh, &pose, MOST_PAIRS, MOST_PAIRS, faces, NULL, NULL);
     vec first = {0}, sum = {0}, twice = {0};
     double length = 0;
     for (size_t i = 0; i < count; ++i) {
@@ -277,7 +279,7 @@ static fct_result advance(world *w) {
         w->motions[i].force = (vec){0, 0, -gravity}, w->motions[i].torque = (vec){0, 0, 0};
     w->carried = 0;
     fct_result result =
-        fct_bodies_touching(w->env, BODIES, w->bodies, BODIES * BODIES / 2, pairs, &w->pair_count);
+        fct_body_tracker_touching(w->tracker, BODIES, w->bodies, BODIES * BODIES / 2, pairs, &w->pair_count);
     if (result != FCT_OK) return result;
     for (size_t i = 0; i < w->pair_count; ++i) push_apart(w, pairs + i);
     for (int i = 1; i < BODIES; ++i) move_body(&w->bodies[i].pose, w->motions + i);
@@ -368,11 +370,13 @@ int main(void) {
     env.message = print_error;
     static world w;
     w.env = &env;
-    bool good = make_shape(&env, true, &w.bowl) == FCT_OK && make_shape(&env, false, &w.pebble) == FCT_OK;
+    bool good = make_shape(&env, true, &w.bowl) == FCT_OK && make_shape(&env, false, &w.pebble) == FCT_OK &&
+                fct_body_tracker_create(&env, &w.tracker) == FCT_OK;
     if (good) {
         place_pebbles(&w);
         good = run_world(&w) == FCT_OK && check_rest(&w);
     }
+    fct_body_tracker_destroy(w.tracker);
     release_shape(&env, &w.pebble);
     release_shape(&env, &w.bowl);
     return !good;

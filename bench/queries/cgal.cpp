@@ -94,6 +94,23 @@ void find_closest_points(void *m, size_t count, const void *queries, double *dis
             std::sqrt(static_cast<model *>(m)->boxes.squared_distance(make_point<fast>(points + 3 * i)));
 }
 
+void count_hits(void *m, size_t count, const void *queries, double *hits) {
+    const auto *rays = static_cast<const fct_ray *>(queries);
+    for (size_t i = 0; i < count; ++i)
+        hits[i] = double(static_cast<model *>(m)->boxes.number_of_intersected_primitives(make_ray(rays[i])));
+}
+
+void count_in_box(void *m, size_t count, const void *queries, double *faces) {
+    const auto *balls = static_cast<const bench_ball *>(queries);
+    for (size_t i = 0; i < count; ++i) {
+        const float *c = balls[i].center;
+        double r = double(balls[i].radius);
+        fast::Iso_cuboid_3 box(fast::Point_3(double(c[0]) - r, double(c[1]) - r, double(c[2]) - r),
+                               fast::Point_3(double(c[0]) + r, double(c[1]) + r, double(c[2]) + r));
+        faces[i] = double(static_cast<model *>(m)->boxes.number_of_intersected_primitives(box));
+    }
+}
+
 void make_body(model *m) {
     namespace polygons = CGAL::Polygon_mesh_processing;
     if (!m->body.is_empty()) return;
@@ -154,7 +171,9 @@ bench_side make_side() {
     s.ask[BENCH_ANY_HIT] = find_any_hits;
     s.ask[BENCH_CLOSEST_POINT] = find_closest_points;
     s.ask[BENCH_SIGNED_DISTANCE] = find_signed_distances;
-    s.ask[BENCH_OVERLAP] = find_overlaps;
+    s.ask[BENCH_ALL_HITS] = count_hits;
+    s.ask[BENCH_BOX] = count_in_box;
+    s.ask[BENCH_OVERLAP] = s.ask[BENCH_PATH] = find_overlaps;
     return s;
 }
 

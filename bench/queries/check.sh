@@ -18,6 +18,17 @@ rows 'incoherent any' 16
 rows 'box points' 12
 rows touching 8
 rows distance 8
+rows 'all hits' 4
+rows 'eight nearest' 4
+rows 'faces in ball' 4
+rows 'faces in box' 4
+rows 'all pairs' 4
+rows within 4
+rows relation 2
+rows 'first contact' 4
+rows 'slow path' 8
+rows refit 2
+rows 'self pairs' 2
 rows 'distance field' 8
 rows 'falling bodies' 2
 if grep -q ' 0\.0 pairs' "$work/table.txt"; then echo 'check: no bodies touch' >&2; exit 1; fi

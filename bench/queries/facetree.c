@@ -74,6 +74,110 @@ static void ask_distance(const fct_bvh *bvh, size_t count, const fct_pose *poses
     }
 }
 
+static void ask_all_hits(const fct_bvh *bvh, size_t count, const fct_ray *rays, double *hits, fct_visits *v) {
+    fct_hit list[64];
+    for (size_t i = 0; i < count; ++i) hits[i] = (double)fct_bvh_all_hits(bvh, rays + i, 64, list, v);
+}
+
+enum { NEAREST = 8 };
+
+static void ask_nearest(const fct_bvh *bvh, size_t count, const float *points, double *distances,
+                        fct_visits *v) {
+    fct_closest nearest[NEAREST];
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t found = fct_bvh_nearest(bvh, points + 3 * i, NEAREST, INFINITY, nearest, v);
+        distances[i] = found ? (double)nearest[found - 1].distance : INFINITY;
+    }
+}
+
+static void ask_ball(const fct_bvh *bvh, size_t count, const bench_ball *balls, double *faces,
+                     fct_visits *v) {
+    uint32_t list[256];
+    for (size_t i = 0; i < count; ++i)
+        faces[i] = fct_bvh_faces_in_ball(bvh, balls[i].center, balls[i].radius, 256, list, v);
+}
+
+static void ask_box(const fct_bvh *bvh, size_t count, const bench_ball *balls, double *faces, fct_visits *v) {
+    uint32_t list[256];
+    for (size_t i = 0; i < count; ++i) {
+        double planes[6][4] = {{0}};
+        for (int k = 0; k < 6; ++k) {
+            double sign = k % 2 ? -1 : 1;
+            planes[k][k / 2] = sign;
+            planes[k][3] = (double)balls[i].radius - sign * (double)balls[i].center[k / 2];
+        }
+        faces[i] = fct_bvh_faces_in_planes(bvh, 6, planes[0], 256, list, v);
+    }
+}
+
+static void ask_path(const fct_bvh *bvh, size_t count, const fct_pose *poses, double *touching,
+                     fct_visits *v) {
+    fct_pair_hint hint = fct_pair_hint_none();
+    for (size_t i = 0; i < count; ++i) touching[i] = fct_bvh_overlap(bvh, bvh, poses + i, &hint, v);
+}
+
+static void ask_pairs(const fct_bvh *bvh, size_t count, const fct_pose *poses, double *pairs, fct_visits *v) {
+    static _Thread_local fct_face_pair list[4096];
+    for (size_t i = 0; i < count; ++i)
+        pairs[i] = (double)fct_bvh_pairs(bvh, bvh, poses + i, SIZE_MAX, 4096, list, NULL, v);
+}
+
+static void ask_within(const fct_bvh *bvh, size_t count, const bench_near *near, double *found,
+                       fct_visits *v) {
+    for (size_t i = 0; i < count; ++i)
+        found[i] = fct_bvh_within(bvh, bvh, &near[i].pose, near[i].distance, NULL, v);
+}
+
+static void ask_relation(const fct_bvh *bvh, size_t count, const fct_pose *poses, double *relations,
+                         fct_visits *v) {
+    for (size_t i = 0; i < count; ++i) relations[i] = fct_bvh_relation(bvh, bvh, poses + i, NULL, v);
+}
+
+static void ask_first_contact(const fct_bvh *bvh, size_t count, const fct_motion *motions, double *times,
+                              fct_visits *v) {
+    fct_bounds b = fct_bvh_bounds(bvh);
+    fct_first_contact first;
+    double tolerance = 1e-4 * ((double)b.upper[0] - (double)b.lower[0]);
+    for (size_t i = 0; i < count; ++i)
+        times[i] = fct_bvh_first_contact(bvh, bvh, motions + i, tolerance, &first, v) ? first.time : INFINITY;
+}
+
+static void find_all_hits(void *m, size_t count, const void *rays, double *hits) {
+    ask_all_hits(((model *)m)->bvh, count, rays, hits, NULL);
+}
+
+static void find_nearest(void *m, size_t count, const void *points, double *distances) {
+    ask_nearest(((model *)m)->bvh, count, points, distances, NULL);
+}
+
+static void find_in_ball(void *m, size_t count, const void *balls, double *faces) {
+    ask_ball(((model *)m)->bvh, count, balls, faces, NULL);
+}
+
+static void find_in_box(void *m, size_t count, const void *balls, double *faces) {
+    ask_box(((model *)m)->bvh, count, balls, faces, NULL);
+}
+
+static void find_path(void *m, size_t count, const void *poses, double *touching) {
+    ask_path(((model *)m)->bvh, count, poses, touching, NULL);
+}
+
+static void find_pairs(void *m, size_t count, const void *poses, double *pairs) {
+    ask_pairs(((model *)m)->bvh, count, poses, pairs, NULL);
+}
+
+static void find_within(void *m, size_t count, const void *near, double *found) {
+    ask_within(((model *)m)->bvh, count, near, found, NULL);
+}
+
+static void find_relations(void *m, size_t count, const void *poses, double *relations) {
+    ask_relation(((model *)m)->bvh, count, poses, relations, NULL);
+}
+
+static void find_first_contacts(void *m, size_t count, const void *motions, double *times) {
+    ask_first_contact(((model *)m)->bvh, count, motions, times, NULL);
+}
+
 static void find_closest_hits(void *m, size_t count, const void *rays, double *t) {
     ask_closest_hit(((model *)m)->bvh, count, rays, t, NULL);
 }
@@ -109,8 +213,32 @@ void bench_count_visits(const void *m, bench_question question, size_t count, co
     case BENCH_ANY_HIT:
         ask_any_hit(bvh, count, queries, answers, visits);
         break;
+    case BENCH_ALL_HITS:
+        ask_all_hits(bvh, count, queries, answers, visits);
+        break;
     case BENCH_CLOSEST_POINT:
         ask_closest_point(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_NEAREST:
+        ask_nearest(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_BALL:
+        ask_ball(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_BOX:
+        ask_box(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_PATH:
+        ask_path(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_PAIRS:
+        ask_pairs(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_WITHIN:
+        ask_within(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_FIRST_CONTACT:
+        ask_first_contact(bvh, count, queries, answers, visits);
         break;
     case BENCH_OVERLAP:
         ask_overlap(bvh, count, queries, answers, visits);
@@ -118,7 +246,7 @@ void bench_count_visits(const void *m, bench_question question, size_t count, co
     case BENCH_DISTANCE:
         ask_distance(bvh, count, queries, answers, visits);
         break;
-    default: /* signed distances have no visits of their own here */
+    default: /* what needs signs has no visits of its own here */
         break;
     }
     free(answers);
@@ -188,9 +316,17 @@ const bench_side bench_facetree = {
     .bytes = count_bytes,
     .ask = {[BENCH_CLOSEST_HIT] = find_closest_hits,
             [BENCH_ANY_HIT] = find_any_hits,
+            [BENCH_ALL_HITS] = find_all_hits,
             [BENCH_CLOSEST_POINT] = find_closest_points,
+            [BENCH_NEAREST] = find_nearest,
+            [BENCH_BALL] = find_in_ball,
+            [BENCH_BOX] = find_in_box,
             [BENCH_OVERLAP] = find_overlaps,
-            [BENCH_DISTANCE] = find_distances},
+            [BENCH_PATH] = find_path,
+            [BENCH_PAIRS] = find_pairs,
+            [BENCH_WITHIN] = find_within,
+            [BENCH_DISTANCE] = find_distances,
+            [BENCH_FIRST_CONTACT] = find_first_contacts},
     .count_touching = count_touching,
 };
 
@@ -206,6 +342,8 @@ const bench_side bench_batch = {
             [BENCH_CLOSEST_POINT] = batch_points,
             [BENCH_SIGNED_DISTANCE] = batch_signed_distances,
             [BENCH_OVERLAP] = batch_overlaps,
+            [BENCH_PATH] = batch_overlaps,
+            [BENCH_RELATION] = find_relations,
             [BENCH_DISTANCE] = batch_distances},
 };
 

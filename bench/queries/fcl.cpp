@@ -43,6 +43,28 @@ void find_distances(void *m, size_t count, const void *queries, double *distance
     }
 }
 
+void find_pairs(void *m, size_t count, const void *queries, double *pairs) {
+    const fcl_model *body = static_cast<model *>(m)->get();
+    for (size_t i = 0; i < count; ++i) {
+        fcl::CollisionRequestd request(1 << 24, false);
+        fcl::CollisionResultd result;
+        fcl::collide(body, fcl::Transform3d::Identity(), body,
+                     make_fcl_pose(static_cast<const fct_pose *>(queries)[i]), request, result);
+        pairs[i] = double(result.numContacts());
+    }
+}
+
+void find_within(void *m, size_t count, const void *queries, double *found) {
+    const fcl_model *body = static_cast<model *>(m)->get();
+    const auto *near = static_cast<const bench_near *>(queries);
+    for (size_t i = 0; i < count; ++i) {
+        fcl::DistanceRequestd request;
+        fcl::DistanceResultd result;
+        fcl::distance(body, fcl::Transform3d::Identity(), body, make_fcl_pose(near[i].pose), request, result);
+        found[i] = result.min_distance <= near[i].distance;
+    }
+}
+
 // Returns false: the broad phase goes on with the next pair.
 bool test_pair(fcl::CollisionObjectd *a, fcl::CollisionObjectd *b, void *pairs) {
     fcl::CollisionRequestd request;
@@ -78,7 +100,9 @@ bench_side make_side() {
     s.most_triangles = 2000000;
     s.build = build_model;
     s.destroy = destroy_model;
-    s.ask[BENCH_OVERLAP] = find_overlaps;
+    s.ask[BENCH_OVERLAP] = s.ask[BENCH_PATH] = find_overlaps;
+    s.ask[BENCH_PAIRS] = find_pairs;
+    s.ask[BENCH_WITHIN] = find_within;
     s.ask[BENCH_DISTANCE] = find_distances;
     s.count_touching = count_touching;
     return s;

@@ -65,6 +65,11 @@ static double find_median(double *values, uint32_t count) {
 
 /* --- Asking --- */
 
+/* Only our batches have signs. */
+static bool needs_signs(bench_question q) {
+    return q == BENCH_SIGNED_DISTANCE || q == BENCH_RELATION;
+}
+
 typedef struct work {
     bench_ask *ask;
     void *model;
@@ -80,9 +85,12 @@ static void *do_work(void *work_) {
 }
 
 static size_t query_size(bench_question q) {
-    return q <= BENCH_ANY_HIT           ? sizeof(fct_ray)
-           : q <= BENCH_SIGNED_DISTANCE ? 3 * sizeof(float)
-                                        : sizeof(fct_pose);
+    return q <= BENCH_ALL_HITS        ? sizeof(fct_ray)
+           : q <= BENCH_NEAREST       ? 3 * sizeof(float)
+           : q <= BENCH_BOX           ? sizeof(bench_ball)
+           : q == BENCH_WITHIN        ? sizeof(bench_near)
+           : q == BENCH_FIRST_CONTACT ? sizeof(fct_motion)
+                                      : sizeof(fct_pose);
 }
 
 static double time_work(const bench_side *side, work w, bench_question q, uint32_t threads) {
@@ -149,14 +157,15 @@ static bool are_equal(const subject *s, const bench_side *side, bench_question q
 }
 
 /* How many answers differ. A thousandth of the rays may, because sides without watertight triangles miss rays
- * that pass a rim; nothing else may, and no ray of our own batches. */
+ * that pass a rim, and of the lists of faces, because other sides round; nothing else may, and no answer of
+ * our own batches. */
 static size_t compare_answers(subject *s, const char *row, bench_question q, const bench_side *side,
                               const work *ours, const work *theirs, size_t step) {
     size_t different = 0, size = query_size(q);
     for (size_t i = 0; i < theirs->count; ++i)
         different += !are_equal(s, side, q, ours->queries + i * step * size, ours->answers[i * step],
                                 theirs->answers[i]);
-    const bool may_miss = q <= BENCH_ANY_HIT && side != &bench_batch;
+    const bool may_miss = (q <= BENCH_ALL_HITS || q == BENCH_BOX || q == BENCH_PAIRS) && side != &bench_batch;
     if (different > (may_miss ? theirs->count / 1000 + 8 : 0)) {
         printf("  DIFFERENT: %s, %s: %zu of %zu answers\n", row, side->name, different, theirs->count);
         s->differ = true;
@@ -182,7 +191,7 @@ static void print_own(const subject *s, const char *row, bench_question q, uint3
                       double rate, const work *w) {
     char rest[96] = "0,,,";
     fct_visits v = {0, 0, 0};
-    if (threads == 1 && q != BENCH_SIGNED_DISTANCE) {
+    if (threads == 1 && !needs_signs(q)) {
         bench_count_visits(s->models[0], q, w->count, w->queries, &v);
         double n = (double)w->count;
         snprintf(rest, sizeof rest, "0,%.4g,%.4g,%.4g", (double)v.nodes / n, (double)v.boxes / n,
@@ -200,7 +209,7 @@ static void measure_threads(subject *s, const char *row, bench_question q, size_
     work works[MOST_SIDES];
     double times[MOST_SIDES][MOST_ROUNDS], ratios[MOST_SIDES][MOST_ROUNDS], spent[MOST_SIDES] = {0};
     uint32_t rounds[MOST_SIDES] = {0};
-    size_t own = q == BENCH_SIGNED_DISTANCE; /* only batches have signs */
+    size_t own = needs_signs(q);
     for (size_t i = own; i < bench_side_count; ++i) {
         const bench_side *side = bench_sides[i];
         void *model = side == &bench_batch && threads > 1 ? s->batch : s->models[i];
@@ -250,7 +259,8 @@ static void measure_row(subject *s, const char *row, bench_question q, size_t co
             work w = {bench_sides[i]->ask[q], s->models[i], count, queries, NULL};
             steps[i] = i < 2 ? 1 : choose_step(s->o, w, q, bench_sides[i]);
         }
-    for (uint32_t threads = 1; threads <= 2; ++threads)
+    const uint32_t most = q == BENCH_RELATION ? 1 : 2; /* it has no batch of its own */
+    for (uint32_t threads = 1; threads <= most; ++threads)
         measure_threads(s, row, q, count, queries, threads, steps);
 }
 
@@ -298,6 +308,23 @@ static void measure_builds(const subject *s, uint32_t threads) {
     putchar('\n');
 }
 
+/* New positions, which are the old ones, and the faces that cross each other: seconds of one thread. */
+static void measure_whole_model(const subject *s) {
+    fct_env env = bench_env(1);
+    double start = bench_cpu_seconds(), quality, refit, own;
+    fct_bvh *moved;
+    bench_check(fct_bvh_refit(&env, s->bvh, s->mesh.positions, &moved, &quality), "a refit");
+    refit = bench_cpu_seconds() - start;
+    start = bench_cpu_seconds();
+    size_t pairs = fct_bvh_self_pairs(moved, SIZE_MAX, 0, NULL, NULL);
+    own = bench_cpu_seconds() - start;
+    fct_bvh_destroy(moved);
+    printf("  %-14s T1 facetree %.4g s   %-14s T1 facetree %.4g s, %zu pairs\n", "refit", refit, "self pairs",
+           own, pairs);
+    write_row(s, "refit", 1, "facetree", "seconds", refit, 1, "0,,,");
+    write_row(s, "self pairs", 1, "facetree", "seconds", own, 1, "0,,,");
+}
+
 static double count_ray_bytes(const subject *s) {
     fct_env env = bench_env(2);
     fct_bvh *bvh;
@@ -339,6 +366,7 @@ static void measure_rays(subject *s) {
     bench_incoherent_rays(s->bvh, count, rays);
     measure_row(s, "incoherent", BENCH_CLOSEST_HIT, count, rays);
     measure_row(s, "incoherent any", BENCH_ANY_HIT, count, rays);
+    measure_row(s, "all hits", BENCH_ALL_HITS, count / 8, rays);
     free(rays);
 }
 
@@ -349,7 +377,30 @@ static void measure_points(subject *s) {
     measure_row(s, "near points", BENCH_CLOSEST_POINT, count, points);
     bench_box_points(s->bvh, count, points);
     measure_row(s, "box points", BENCH_CLOSEST_POINT, count, points);
+    bench_near_points(&s->mesh, s->diagonal, count, points);
+    measure_row(s, "eight nearest", BENCH_NEAREST, count, points);
+    bench_ball *balls = bench_allocate(count, sizeof *balls);
+    for (size_t i = 0; i < count; ++i) {
+        memcpy(balls[i].center, points + 3 * i, sizeof balls[i].center);
+        balls[i].radius = (float)(.01 * s->diagonal);
+    }
+    measure_row(s, "faces in ball", BENCH_BALL, count, balls);
+    measure_row(s, "faces in box", BENCH_BOX, count, balls);
+    free(balls);
     free(points);
+}
+
+/* Within a hundredth of the diagonal; and from apart to touching. */
+static void measure_near_poses(subject *s, size_t count, const fct_pose *touching, const fct_pose *apart) {
+    bench_near *near = bench_allocate(count, sizeof *near);
+    fct_motion *motions = bench_allocate(count, sizeof *motions);
+    for (size_t i = 0; i < count; ++i) {
+        near[i] = (bench_near){apart[i], .01 * s->diagonal};
+        motions[i] = (fct_motion){apart[i], touching[i]};
+    }
+    measure_row(s, "within", BENCH_WITHIN, count, near);
+    measure_row(s, "first contact", BENCH_FIRST_CONTACT, count, motions);
+    free(motions), free(near);
 }
 
 static void measure_poses(subject *s) {
@@ -359,6 +410,12 @@ static void measure_poses(subject *s) {
     measure_row(s, "touching", BENCH_OVERLAP, half, touching);
     measure_row(s, "apart", BENCH_OVERLAP, half, apart);
     measure_row(s, "distance", BENCH_DISTANCE, half, apart);
+    measure_row(s, "all pairs", BENCH_PAIRS, half, touching);
+    measure_row(s, "relation", BENCH_RELATION, half, touching);
+    measure_near_poses(s, half, touching, apart);
+    fct_pose *path = touching; /* the same room */
+    bench_path(s->bvh, s->diagonal, 1e-4, half, path);
+    measure_row(s, "slow path", BENCH_PATH, half, path);
     free(touching), free(apart);
 }
 
@@ -432,6 +489,7 @@ static bool measure_mesh(const options *o, const char *path) {
     build_models(&s);
     s.bvh = bench_own_bvh(s.models[0]);
     for (uint32_t threads = 1; threads <= 2; ++threads) measure_builds(&s, threads);
+    measure_whole_model(&s);
     if (o->rays) measure_rays(&s);
     if (o->points) measure_points(&s);
     if (o->poses) measure_poses(&s);

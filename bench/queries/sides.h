@@ -16,12 +16,29 @@ extern "C" {
 typedef enum bench_question {
     BENCH_CLOSEST_HIT,     /* fct_ray -> t, or infinity */
     BENCH_ANY_HIT,         /* fct_ray -> 1 or 0 */
+    BENCH_ALL_HITS,        /* fct_ray -> number of hits */
     BENCH_CLOSEST_POINT,   /* float[3] -> distance */
     BENCH_SIGNED_DISTANCE, /* float[3] -> distance, negative inside */
+    BENCH_NEAREST,         /* float[3] -> distance of the eighth nearest face */
+    BENCH_BALL,            /* bench_ball -> number of faces that touch the ball */
+    BENCH_BOX,             /* bench_ball -> number of faces that touch the cube around the ball */
     BENCH_OVERLAP,         /* fct_pose of the model beside itself -> 1 or 0 */
+    BENCH_PATH,            /* the same for poses that follow each other */
+    BENCH_PAIRS,           /* fct_pose of the model beside itself -> number of pairs of faces that meet */
+    BENCH_WITHIN,          /* bench_near -> whether the surfaces are within the distance: 1 or 0 */
     BENCH_DISTANCE,        /* fct_pose of the model beside itself -> distance of the surfaces */
+    BENCH_RELATION,        /* fct_pose of the model beside itself -> fct_relation */
+    BENCH_FIRST_CONTACT,   /* fct_motion of the model beside itself -> time */
     BENCH_QUESTIONS
 } bench_question;
+
+typedef struct bench_ball {
+    float center[3], radius;
+} bench_ball;
+typedef struct bench_near {
+    fct_pose pose;
+    double distance;
+} bench_near;
 
 typedef void bench_ask(void *model, size_t count, const void *queries, double *answers);
 

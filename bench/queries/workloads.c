@@ -151,6 +151,27 @@ void bench_contact_poses(const fct_bvh *bvh, double diagonal, size_t count, fct_
     }
 }
 
+void bench_path(const fct_bvh *bvh, double diagonal, double step, size_t count, fct_pose *poses) {
+    const double axis[3] = {.48, .6, .64}, direction[3] = {.36, -.48, .8};
+    fct_bounds b = fct_bvh_bounds(bvh);
+    double away = 0;
+    for (size_t i = 0, out = 0; i < count; ++i) {
+        double angle = 2 * step * (double)i, s = sin(angle), c = cos(angle);
+        for (int j = 0; j < 3; ++j) {
+            for (int k = 0; k < 3; ++k) poses[i].rotation[j][k] = (1 - c) * axis[j] * axis[k] + (j == k) * c;
+            poses[i].rotation[j][(j + 1) % 3] -= s * axis[(j + 2) % 3];
+            poses[i].rotation[j][(j + 2) % 3] += s * axis[(j + 1) % 3];
+        }
+        if (i == 0) away = find_contact(bvh, diagonal, direction, &poses[0]) + .01 * diagonal;
+        place_away(&b, direction, away, &poses[i]);
+        if (out)
+            --out;
+        else if (fct_bvh_overlap(bvh, bvh, &poses[i], NULL, NULL))
+            out = 30;
+        away += (out ? step : -step) * diagonal;
+    }
+}
+
 /* --- Falling bodies --- */
 
 typedef struct faller {

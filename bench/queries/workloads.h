@@ -21,6 +21,9 @@ void bench_grid_points(const fct_bvh *bvh, uint32_t side, float *points);
  * diagonal nearer than first contact, and of `apart` 1 % farther. */
 void bench_contact_poses(const fct_bvh *bvh, double diagonal, size_t count, fct_pose *touching,
                          fct_pose *apart);
+/* A body that turns by 2 `step` radians and comes nearer by `step` diagonals from pose to pose until it
+ * touches, goes away for 30 poses, and so on. */
+void bench_path(const fct_bvh *bvh, double diagonal, double step, size_t count, fct_pose *poses);
 
 /* Copies of the model fall into a box without a lid, push each other apart and come to rest: frames x count
  * poses. The pushes are simple, because the poses matter here and not the physics. */

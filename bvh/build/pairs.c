@@ -5,6 +5,8 @@
  */
 #include "bvh/build/pairs.h"
 
+#include <xxhash.h>
+
 #include "base/parallel.h"
 #include "base/union_find.h"
 #include "bvh/build/boxes.h"
@@ -68,6 +70,14 @@ static fct_result list_parts(fct_bvh *bvh) {
     return bvh->parts ? FCT_OK : fct_fail_memory(env, "the parts of a model");
 }
 
+void fct_pairs_stamp(fct_bvh *bvh) {
+    const fct_tree_view *view = &bvh->view;
+    uint64_t hash = XXH3_64bits(bvh->pairs, bvh->pair_count * sizeof *bvh->pairs);
+    hash = XXH3_64bits_withSeed(view->positions, 3 * sizeof(float) * view->vertex_count, hash);
+    hash = XXH3_64bits_withSeed(view->triangles, 3 * sizeof(uint32_t) * view->face_count, hash);
+    bvh->pair_stamp = hash | 1;
+}
+
 fct_result fct_pairs_build(fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                            const fct_wide_list *wide) {
     bvh->pair_count = wide->count + 1;
@@ -81,5 +91,6 @@ fct_result fct_pairs_build(fct_bvh *bvh, const fct_leaf_list *leaves, const fct_
     fct_parallel_for(bvh->env, wide->count, NODE_CHUNK, pack_pair_nodes, &job);
     for (uint32_t i = 1; i < wide->count; ++i)
         bvh->pairs[wide->nodes[i].parent + 1].child[wide->nodes[i].slot] = i + 1;
+    fct_pairs_stamp(bvh);
     return list_parts(bvh);
 }

@@ -7,5 +7,7 @@
 /* Fills bvh->pairs and bvh->parts. Errors: MEMORY. */
 fct_result fct_pairs_build(fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                            const fct_wide_list *wide);
+/* Sets bvh->pair_stamp. */
+void fct_pairs_stamp(fct_bvh *bvh);
 
 #endif

@@ -13,6 +13,7 @@
 
 #include "base/parallel.h"
 #include "bvh/build/boxes.h"
+#include "bvh/build/pairs.h"
 
 enum { LEAF_CHUNK = 1024, NODE_CHUNK = 64 /* per task */ };
 
@@ -185,6 +186,7 @@ fct_result fct_refit_boxes(fct_bvh *bvh, const fct_bvh *old) {
         fct_parallel_for(env, job.leaf_count, LEAF_CHUNK, move_leaves, &job);
         fct_parallel_for(env, job.node_count, NODE_CHUNK, refit_nodes, &job);
         fct_parallel_for(env, bvh->pair_count, NODE_CHUNK, refit_pair_nodes, &job);
+        if (bvh->pairs) fct_pairs_stamp(bvh);
     } else {
         result = fct_fail_memory(env, "the boxes of a moved model");
     }

@@ -16,7 +16,7 @@ typedef struct pose_batch {
 static void find_overlaps(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)thread;
     const pose_batch *batch = user;
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     uint64_t word = 0;
     for (size_t i = begin; i < end; ++i)
         word |= (uint64_t)fct_bvh_overlap(batch->a, batch->b, &batch->poses[i], &hint, NULL) << (i - begin);
@@ -32,7 +32,7 @@ void fct_bvh_overlaps(const fct_bvh *a, const fct_bvh *b, size_t count, const fc
 static void find_distances(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
     (void)chunk, (void)thread;
     const pose_batch *batch = user;
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     for (size_t i = begin; i < end; ++i) {
         fct_distance *out = &batch->distances[i];
         if (!fct_bvh_distance(batch->a, batch->b, &batch->poses[i], batch->def, &hint, out, NULL))

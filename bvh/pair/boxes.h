@@ -56,18 +56,22 @@ static inline f8 separate_along_a(const fct_placed_box *b, const fct_pair_node *
     return f8_sub(f8_abs(at), f8_add(f8_load(n->half[s]), radius));
 }
 
-/* A mask of the boxes of the node that may meet box b. depth[i]: along the direction in which they overlap
- * least, how far box i and b are apart, so it is negative for boxes that overlap far. */
-static inline uint32_t meet_boxes(const fct_placed_box *b, const fct_pair_node *n, float depth[8]) {
+/* A mask of the boxes of the node that may lie within a distance of box b. depth[i]: along the axis of a box
+ * on which they overlap least, how far box i and b are apart, so it is negative for boxes that overlap far.
+ * gap: for boxes outside of the mask, a lower bound of the distance plus the slack; a product of two axes is
+ * at most 1 long. */
+static inline uint32_t meet_boxes(const fct_placed_box *b, const fct_pair_node *n, float within,
+                                  float depth[8], f8 *gap) {
     box_terms t;
     find_box_terms(b, n, &t);
-    f8 slack = f8_set(b->slack), apart = f8_set(-INFINITY);
+    f8 most = f8_set(b->slack + within), apart = f8_set(-INFINITY);
     for (int k = 0; k < 3; ++k) {
         apart = f8_max(apart, separate_along_b(b, n, &t, k));
         apart = f8_max(apart, separate_along_a(b, n, &t, k));
     }
-    uint32_t open = f8_le(apart, slack);
+    uint32_t open = f8_le(apart, most);
     f8_store(depth, apart);
+    *gap = apart;
     if (!open) return 0;
     f8 crossed = f8_set(-INFINITY);
     for (int r = 0; r < 3; ++r) {
@@ -82,7 +86,8 @@ static inline uint32_t meet_boxes(const fct_placed_box *b, const fct_pair_node *
             crossed = f8_max(crossed, f8_sub(f8_abs(at), f8_add(radius_b, radius_a)));
         }
     }
-    return open & f8_le(crossed, slack);
+    *gap = f8_max(apart, crossed);
+    return open & f8_le(crossed, most);
 }
 
 /* A mask of the boxes of the node that may lie within sqrt(limit2) of box b. distance2[i]: a lower bound of

@@ -107,7 +107,7 @@ bool fct_bvh_first_contact(const fct_bvh *a, const fct_bvh *b, const fct_motion 
     if (!(speed < INFINITY)) return false;
     tolerance = fct_max(tolerance, LEAST_TOLERANCE * speed);
     fct_distance_def def = fct_distance_def_default();
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     def.relative = FAR_RELATIVE, def.absolute = tolerance / 8;
     for (;;) {
         fct_pose pose = pose_at(motion, &t, center, time);

@@ -18,7 +18,7 @@ static bool holds_part(const fct_bvh *outer, const fct_bvh *inner, const fct_pos
     return false;
 }
 
-fct_relation fct_bvh_relation(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_face_pair *hint,
+fct_relation fct_bvh_relation(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_hint *hint,
                               fct_visits *visits) {
     fct_pair_map map;
     if (!fct_pair_map_set(a, b, pose, &map)) return FCT_APART;

@@ -15,8 +15,15 @@ FCT_DECLARE_KERNEL(size_t, fct_overlap_search,
                    (const fct_pair_map *map, size_t limit, size_t capacity, fct_face_pair *pairs,
                     fct_visits *visits));
 
-/* The same for one model with itself: pairs of faces without a common corner, each once. `map` is the
- * identity. */
+/* Whether any faces are within `distance`, or meet if that is negative: looks at the pairs of the front that
+ * may not be apart by more, and updates the front. If so, hint->pair receives such a pair. The hint is at the
+ * pose of the map. */
+#define fct_front_search FCT_KERNEL(fct_front_search)
+FCT_DECLARE_KERNEL(bool, fct_front_search,
+                   (const fct_pair_map *map, fct_pair_hint *hint, double distance, fct_visits *visits));
+
+/* The pairs of one model with itself that meet: pairs of faces without a common corner, each once. `map` is
+ * the identity. */
 #define fct_self_search FCT_KERNEL(fct_self_search)
 FCT_DECLARE_KERNEL(size_t, fct_self_search,
                    (const fct_pair_map *map, size_t limit, size_t capacity, fct_face_pair *pairs,

@@ -31,24 +31,56 @@ typedef struct fct_pose {
 } fct_pose;
 FCT_API fct_pose fct_pose_identity(void);
 
-/* A face of a and a face of b. As a hint, it is the answer to a similar question, such as that of the last
- * frame: it makes the query faster. It does not change whether faces meet, nor the exact distance. It may
- * change which pair answers, and a distance within the tolerance. */
+/* A face of a and a face of b. */
 typedef struct fct_face_pair {
     uint32_t face_a, face_b;   /* input face ids; FCT_NONE if there is no pair */
     uint32_t place_a, place_b; /* their places in the trees' order */
 } fct_face_pair;
-/* All ids FCT_NONE: the first hint of a sequence. */
+/* All ids FCT_NONE. */
 FCT_API fct_face_pair fct_face_pair_none(void);
 
-/* Whether any two faces meet. `hint` may be NULL. It is read as a hint, and receives a pair that meets; it
- * stays unchanged if none does. */
-FCT_API bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_face_pair *hint,
+/* A pair of boxes in the front of a search: see fct_pair_hint. */
+typedef struct fct_front_pair {
+    uint32_t box_a, box_b; /* names of boxes */
+    uint32_t lanes;        /* bit i: box i of the node that was opened belongs to the pair; bit 8: a's node */
+    float reach;           /* the pair is apart until b has come this far */
+} fct_front_pair;
+enum { FCT_FRONT_PAIRS = 128 };
+
+/* What a query leaves for the next one about the same models, such as that of the next frame: it makes
+ * queries about a slow motion faster. The faces that met, or were nearest, come first. The front of a search
+ * for a contact is the set of pairs of boxes where it ended, because the boxes were apart. Each pair stays
+ * apart until b has moved by the distance of the boxes, so the next search looks only at the others.
+ *
+ * A hint does not change whether faces meet, how many do, or the exact distance. It may change which pair
+ * answers, and a distance within the tolerance. Keep one per pair of models and per thread. It is a value,
+ * and owns nothing. What it knows about other models is not used. */
+typedef struct fct_pair_hint {
+    fct_face_pair pair; /* the last faces that met or were nearest; may be set in a new hint */
+    /* The rest belongs to the queries. */
+    uint64_t model_a, model_b; /* what the models of the last query hold, as hashes; 0 if there was none */
+    fct_pose pose;             /* of the last query */
+    bool stale;                /* the pair did not answer it */
+    bool near;                 /* it looked for faces within a distance */
+    bool touching;  /* it found a pair of faces; front[0] is their pair of leaves, and there is no front */
+    uint32_t pause; /* searches that make no front, because b moves too fast */
+    uint32_t front_count; /* pairs of the front */
+    uint32_t effort;      /* boxes and leaves that its search tested */
+    double way;           /* how far b has come since the front was made; at least, scaled */
+    fct_front_pair front[FCT_FRONT_PAIRS];
+} fct_pair_hint;
+/* The first hint of a sequence. */
+FCT_API fct_pair_hint fct_pair_hint_none(void);
+
+/* Whether any two faces meet. `hint` may be NULL, as in all queries. If the result is true, hint->pair
+ * receives a pair that meets. */
+FCT_API bool fct_bvh_overlap(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, fct_pair_hint *hint,
                              fct_visits *visits);
 /* The pairs of faces that meet, in an order that is the same for the same structures and pose. Stops after
- * `limit` pairs. The first `capacity` pairs are written; returns the number of pairs found. */
+ * `limit` pairs. The first `capacity` pairs are written; returns the number of pairs found. A hint changes
+ * neither the pairs nor their order. */
 FCT_API size_t fct_bvh_pairs(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, size_t limit,
-                             size_t capacity, fct_face_pair *pairs, fct_visits *visits);
+                             size_t capacity, fct_face_pair *pairs, fct_pair_hint *hint, fct_visits *visits);
 /* The pairs of faces of one model that meet and share no vertex position; each once, with face_a < face_b. */
 FCT_API size_t fct_bvh_self_pairs(const fct_bvh *bvh, size_t limit, size_t capacity, fct_face_pair *pairs,
                                   fct_visits *visits);
@@ -77,13 +109,13 @@ typedef struct fct_distance {
     fct_face_pair pair;
 } fct_distance;
 /* The distance of the two surfaces; returns whether it is within max_distance. def and hint may be NULL;
- * *hint receives the pair. A def of another size finds nothing. */
+ * hint->pair receives the pair. A def of another size finds nothing. */
 FCT_API bool fct_bvh_distance(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose,
-                              const fct_distance_def *def, fct_face_pair *hint, fct_distance *out,
+                              const fct_distance_def *def, fct_pair_hint *hint, fct_distance *out,
                               fct_visits *visits);
 /* Whether the surfaces are within `distance` of each other. */
 FCT_API bool fct_bvh_within(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose, double distance,
-                            fct_face_pair *hint, fct_visits *visits);
+                            fct_pair_hint *hint, fct_visits *visits);
 
 typedef enum fct_relation {
     FCT_APART,    /* no faces meet, and neither body holds a part of the other */
@@ -94,7 +126,7 @@ typedef enum fct_relation {
 /* Inside is where the winding number of a surface is over 1/2 (bvh.h). Both models need FCT_BVH_SIGN too,
  * else only APART and TOUCHING are returned. */
 FCT_API fct_relation fct_bvh_relation(const fct_bvh *a, const fct_bvh *b, const fct_pose *pose,
-                                      fct_face_pair *hint, fct_visits *visits);
+                                      fct_pair_hint *hint, fct_visits *visits);
 
 /* b moves from one pose to another in the time from 0 to 1: its centre along a straight line at constant
  * speed, while it turns about the axis and angle (under half a turn) between the two rotations at constant
@@ -139,6 +171,18 @@ typedef struct fct_body_pair {
  * CANCELLED. */
 FCT_API fct_result fct_bodies_touching(const fct_env *env, uint32_t count, const fct_body *bodies,
                                        size_t capacity, fct_body_pair *pairs, size_t *found);
+
+/* The same from frame to frame: keeps a hint for each pair of bodies whose bounds met in the last frame
+ * (about 2 KB), so bodies that move slowly take less time. It finds the same pairs of bodies, perhaps with
+ * other faces. Bodies may be added at the end, and may change their models. */
+typedef struct fct_body_tracker fct_body_tracker;
+/* The environment must outlive the tracker. Errors: MEMORY. */
+FCT_API fct_result fct_body_tracker_create(const fct_env *env, fct_body_tracker **out);
+FCT_API void fct_body_tracker_destroy(fct_body_tracker *tracker);
+/* Errors: as above; the tracker then keeps the last frame. One thread at a time. */
+FCT_API fct_result fct_body_tracker_touching(fct_body_tracker *tracker, uint32_t count,
+                                             const fct_body *bodies, size_t capacity, fct_body_pair *pairs,
+                                             size_t *found);
 
 #ifdef __cplusplus
 }

@@ -78,9 +78,10 @@ fct_pose random_pose(const model &a, const model &b, double away, uint64_t &seed
 }
 
 std::set<face_pair> our_pairs(const model &a, const model &b, const fct_pose &pose) {
-    size_t count = fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, 0, nullptr, nullptr);
+    size_t count = fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, 0, nullptr, nullptr, nullptr);
     std::vector<fct_face_pair> pairs(count);
-    assert_int_equal(fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, count, pairs.data(), nullptr), count);
+    assert_int_equal(fct_bvh_pairs(a.bvh, b.bvh, &pose, SIZE_MAX, count, pairs.data(), nullptr, nullptr),
+                     count);
     std::set<face_pair> out;
     for (const fct_face_pair &p : pairs) out.insert({p.face_a, p.face_b});
     assert_int_equal(out.size(), count);
@@ -148,6 +149,51 @@ void compare_models(const char *name_a, const char *name_b, double scale, int co
     release_model(env, b);
 }
 
+// A path that comes near, touches, and goes on, in steps from 1e-5 to 1e-2 of the size: what hints keep from
+// pose to pose does not change the answers.
+void a_path(void **) {
+    fct_env env = fct_env_default();
+    model a, b;
+    if (!load_model(env, "stanford-bunny.obj", 1, a) || !load_model(env, "cow.obj", .02, b)) {
+        print_message("skipped: no bunny and cow in " FACETREE_DATA "\n");
+        return;
+    }
+    uint64_t seed = 5;
+    size_t touching = 0;
+    const int count = 400;
+    fct_pair_hint touch = fct_pair_hint_none(), near = fct_pair_hint_none();
+    fct_pose pose = random_pose(a, b, .45 * (a.size + b.size), seed);
+    fct_bounds x = fct_bvh_bounds(a.bvh), y = fct_bvh_bounds(b.bvh);
+    double within = .01 * a.size;
+    for (int i = 0; i < count; ++i) {
+        fcl::CollisionRequestd request;
+        fcl::CollisionResultd result;
+        fcl::collide(&a.peer, fcl::Transform3d::Identity(), &b.peer, make_fcl_pose(pose), request, result);
+        assert_int_equal(fct_bvh_overlap(a.bvh, b.bvh, &pose, &touch, nullptr), result.isCollision());
+        fcl::DistanceRequestd apart;
+        fcl::DistanceResultd distance;
+        fcl::distance(&a.peer, fcl::Transform3d::Identity(), &b.peer, make_fcl_pose(pose), apart, distance);
+        double gap = result.isCollision() ? 0 : distance.min_distance;
+        bool is_near = fct_bvh_within(a.bvh, b.bvh, &pose, within, &near, nullptr);
+        if (std::fabs(gap - within) > 1e-9 * a.size) assert_int_equal(is_near, gap <= within);
+        touching += result.isCollision();
+        double step = std::pow(10, -5 + 3 * random_unit(seed)) * a.size;
+        if (result.isCollision()) step *= random_unit(seed) < .1 ? -10 : -.1;
+        double length = 0, way[3];
+        for (int k = 0; k < 3; ++k) {
+            double at = pose.translation[k];
+            for (int j = 0; j < 3; ++j)
+                at += pose.rotation[k][j] * (double(y.lower[j]) + double(y.upper[j])) / 2;
+            way[k] = (double(x.lower[k]) + double(x.upper[k])) / 2 - at, length += way[k] * way[k];
+        }
+        for (int k = 0; k < 3; ++k) pose.translation[k] += step * way[k] / std::sqrt(length);
+    }
+    print_message("a path: %zu of %d poses touch\n", touching, count);
+    assert_in_range(touching, count / 20, count * 19 / 20);
+    release_model(env, a);
+    release_model(env, b);
+}
+
 void bunny_and_bunny(void **) {
     compare_models("stanford-bunny.obj", "stanford-bunny.obj", 1, 100);
 }
@@ -167,6 +213,7 @@ int main() {
         cmocka_unit_test(bunny_and_bunny),
         cmocka_unit_test(cow_and_suzanne),
         cmocka_unit_test(fandisk_and_arm),
+        cmocka_unit_test(a_path),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

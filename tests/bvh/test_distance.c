@@ -42,12 +42,13 @@ static void check_pose(const model *a, const model *b, const fct_pose *pose, dou
     check_answer(a, b, pose, &d, size);
     assert_int_equal(d.distance == 0, fct_bvh_overlap(a->bvh, b->bvh, pose, NULL, NULL));
     /* Hints, good and bad. */
-    fct_face_pair hints[3] = {
-        d.pair, {0, 0, a->mesh.face_count / 2, b->mesh.face_count / 3}, fct_face_pair_none()};
+    fct_pair_hint hints[3] = {{.pair = d.pair},
+                              {.pair = {0, 0, a->mesh.face_count / 2, b->mesh.face_count / 3}},
+                              fct_pair_hint_none()};
     for (int k = 0; k < 3; ++k) {
         assert_true(fct_bvh_distance(a->bvh, b->bvh, pose, NULL, &hints[k], &e, NULL));
         assert_true(e.distance == expected);
-        assert_memory_equal(&hints[k], &e.pair, sizeof e.pair);
+        assert_memory_equal(&hints[k].pair, &e.pair, sizeof e.pair);
     }
     /* Limits. */
     fct_distance_def def = fct_distance_def_default();
@@ -236,7 +237,7 @@ static void distance_searches_visit_few(void **state) {
         v3 away = v3_scale(random_direction(&seed), 2.2);
         pose.translation[0] = away.x, pose.translation[1] = away.y, pose.translation[2] = away.z;
         fct_distance d;
-        fct_face_pair hint = fct_face_pair_none();
+        fct_pair_hint hint = fct_pair_hint_none();
         fct_bvh_distance(m.bvh, m.bvh, &pose, NULL, &hint, &d, &visits);
         fct_bvh_distance(m.bvh, m.bvh, &pose, NULL, &hint, &d, &hinted);
         for (int k = 0; k < 2; ++k) {
@@ -503,10 +504,10 @@ static void bodies_in_bodies(void **state) {
         for (int r = 0; r < 9; ++r) pose.rotation[r / 3][r % 3] *= i % 2 ? 100 : -100;
         assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_A_INSIDE);
     }
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     fct_pose pose = fct_pose_identity();
     assert_int_equal(fct_bvh_relation(large.bvh, large.bvh, &pose, &hint, NULL), FCT_TOUCHING);
-    assert_true(hint.face_a != FCT_NONE);
+    assert_true(hint.pair.face_a != FCT_NONE);
     memset(pose.rotation[2], 0, sizeof pose.rotation[2]);
     assert_int_equal(fct_bvh_relation(large.bvh, one.bvh, &pose, NULL, NULL), FCT_B_INSIDE);
     fct_mesh_release(&env, &small);

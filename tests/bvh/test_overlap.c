@@ -34,8 +34,9 @@ static found_pairs all_pairs(const fct_mesh *a, const fct_mesh *b, const fct_pos
 static size_t check_pose(const model *a, const model *b, const fct_pose *pose) {
     found_pairs expected = all_pairs(&a->mesh, &b->mesh, pose);
     size_t room = expected.count + 10;
-    fct_face_pair *pairs = malloc(room * sizeof *pairs), hint = fct_face_pair_none();
-    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, SIZE_MAX, room, pairs, NULL), expected.count);
+    fct_face_pair *pairs = malloc(room * sizeof *pairs);
+    fct_pair_hint hint = fct_pair_hint_none();
+    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, SIZE_MAX, room, pairs, NULL, NULL), expected.count);
     const uint32_t *ids_a = fct_tree_get(a->tree).face_ids, *ids_b = fct_tree_get(b->tree).face_ids;
     for (size_t i = 0; i < expected.count; ++i) {
         assert_int_equal(ids_a[pairs[i].place_a], pairs[i].face_a);
@@ -44,10 +45,10 @@ static size_t check_pose(const model *a, const model *b, const fct_pose *pose) {
     /* The first pairs are those of the whole answer. */
     size_t some = expected.count / 2;
     fct_face_pair *first = malloc((some + 1) * sizeof *first);
-    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, some, some, first, NULL), some);
+    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, some, some, first, NULL, NULL), some);
     assert_memory_equal(first, pairs, some * sizeof *first);
     free(first);
-    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, SIZE_MAX, 0, NULL, NULL), expected.count);
+    assert_int_equal(fct_bvh_pairs(a->bvh, b->bvh, pose, SIZE_MAX, 0, NULL, NULL, NULL), expected.count);
     qsort(pairs, expected.count, sizeof *pairs, compare_pairs);
     for (size_t i = 0; i < expected.count; ++i) {
         assert_int_equal(pairs[i].face_a, expected.pairs[i].face_a);
@@ -57,14 +58,14 @@ static size_t check_pose(const model *a, const model *b, const fct_pose *pose) {
     assert_int_equal(fct_bvh_overlap(a->bvh, b->bvh, pose, &hint, NULL), expected.count > 0);
     if (expected.count) {
         fct_contact contact;
-        assert_non_null(bsearch(&hint, pairs, expected.count, sizeof hint, compare_pairs));
-        assert_true(fct_bvh_contact(a->bvh, b->bvh, pose, &hint, &contact));
+        assert_non_null(bsearch(&hint.pair, pairs, expected.count, sizeof hint.pair, compare_pairs));
+        assert_true(fct_bvh_contact(a->bvh, b->bvh, pose, &hint.pair, &contact));
         /* The hint alone answers. */
         fct_visits visits = {0, 0, 0};
         assert_true(fct_bvh_overlap(a->bvh, b->bvh, pose, &hint, &visits));
         assert_int_equal(visits.nodes, 0);
     } else {
-        assert_int_equal(hint.face_a, FCT_NONE);
+        assert_int_equal(hint.pair.face_a, FCT_NONE);
     }
     free(pairs);
     free(expected.pairs);
@@ -124,7 +125,7 @@ static void coincident_models(void **state) {
     assert_true(check_pose(&a, &a, &pose) >= a.mesh.face_count);
     size_t same = check_pose(&grid, &grid, &pose);
     assert_true(same > 3 * grid.mesh.face_count);
-    assert_int_equal(fct_bvh_pairs(grid.bvh, grid.bvh, NULL, SIZE_MAX, 0, NULL, NULL), same);
+    assert_int_equal(fct_bvh_pairs(grid.bvh, grid.bvh, NULL, SIZE_MAX, 0, NULL, NULL, NULL), same);
     pose.translation[0] = 1; /* shares an edge of the square */
     assert_true(check_pose(&grid, &grid, &pose) > 12);
     pose.translation[1] = 1; /* a corner */
@@ -268,7 +269,7 @@ static void calls_without_answers(void **state) {
           plain = model_make(&env, make_sphere(&env, 4), FCT_BACKEND_OBB);
     fct_pose pose = fct_pose_identity();
     assert_false(fct_bvh_overlap(m.bvh, plain.bvh, &pose, NULL, NULL));
-    assert_int_equal(fct_bvh_pairs(plain.bvh, m.bvh, &pose, 9, 0, NULL, NULL), 0);
+    assert_int_equal(fct_bvh_pairs(plain.bvh, m.bvh, &pose, 9, 0, NULL, NULL, NULL), 0);
     assert_int_equal(fct_bvh_self_pairs(plain.bvh, 9, 0, NULL, NULL), 0);
     assert_true(fct_bvh_overlap(m.bvh, m.bvh, &pose, NULL, NULL));
     for (int k = 0; k < 12; ++k) {
@@ -281,7 +282,7 @@ static void calls_without_answers(void **state) {
             assert_false(fct_bvh_distance(m.bvh, m.bvh, &broken, NULL, NULL, &distance, NULL));
         }
     }
-    assert_int_equal(fct_bvh_pairs(m.bvh, m.bvh, NULL, 0, 0, NULL, NULL), 0);
+    assert_int_equal(fct_bvh_pairs(m.bvh, m.bvh, NULL, 0, 0, NULL, NULL, NULL), 0);
     /* Ratios up to 1e30 have answers: of the shift beside a, of the shift beside b, and of the models. */
     for (int k = 0; k < 3; ++k)
         for (int beyond = 0; beyond < 2; ++beyond) {
@@ -296,7 +297,7 @@ static void calls_without_answers(void **state) {
             assert_false(k < 2 && fct_bvh_overlap(m.bvh, m.bvh, &large, NULL, NULL));
         }
     /* A stale hint is not believed. */
-    fct_face_pair hint = {5, 5, 1000000, 3};
+    fct_pair_hint hint = {.pair = {5, 5, 1000000, 3}};
     pose.translation[0] = 9;
     assert_false(fct_bvh_overlap(m.bvh, m.bvh, &pose, &hint, NULL));
     assert_true(fct_bvh_bytes(m.bvh) > fct_bvh_bytes(plain.bvh));
@@ -319,15 +320,16 @@ static void contacts_of_flat_faces(void **state) {
         fct_pose pose = random_pose(&seed, .2);
         for (uint32_t place = 0; place < 2; ++place) {
             fct_face_pair pair = {0, 0, place, 0};
+            fct_pair_hint only = {.pair = pair};
             fct_contact contact;
             assert_false(fct_bvh_contact(a.bvh, b.bvh, &pose, &pair, &contact));
-            assert_false(fct_bvh_overlap(a.bvh, b.bvh, &pose, &pair, NULL));
+            assert_false(fct_bvh_overlap(a.bvh, b.bvh, &pose, &only, NULL));
         }
     }
-    fct_face_pair hint = {777, 888, 0, 0};
+    fct_pair_hint hint = {.pair = {777, 888, 0, 0}};
     assert_true(fct_bvh_overlap(a.bvh, a.bvh, NULL, &hint, NULL));
-    assert_int_equal(hint.face_a, fct_tree_get(a.tree).face_ids[0]);
-    assert_int_equal(hint.face_b, fct_tree_get(a.tree).face_ids[0]);
+    assert_int_equal(hint.pair.face_a, fct_tree_get(a.tree).face_ids[0]);
+    assert_int_equal(hint.pair.face_b, fct_tree_get(a.tree).face_ids[0]);
     model_release(&env, &a);
     model_release(&env, &b);
 }

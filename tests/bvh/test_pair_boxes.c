@@ -83,8 +83,10 @@ static void boxes_meet_or_not(void **state) {
         set_slot(&other, 0, &one);
         one = read_slot(&other, 0);
         fct_placed_box placed = place_plainly(&other, 0, 2e-6f);
-        float depth[8];
-        uint32_t mask = meet_boxes(&placed, &node, depth);
+        float depth[8], gap[8];
+        f8 gaps;
+        uint32_t mask = meet_boxes(&placed, &node, 0, depth, &gaps);
+        f8_store(gap, gaps);
         for (uint32_t k = 0; k < 8; ++k) {
             double face = -INFINITY, cross = -INFINITY;
             for (int r = 0; r < 3; ++r) {
@@ -96,6 +98,9 @@ static void boxes_meet_or_not(void **state) {
             double most = fmax(face, cross);
             if (fabs(most - 2e-6) > 1e-6) assert_int_equal(mask >> k & 1, most < 2e-6);
             assert_true(fabs(depth[k] - face) < 2e-6);
+            /* The largest separation, if the boxes are not told apart by an axis before. */
+            assert_true(gap[k] > face - 2e-6 && gap[k] < fmax(face, cross) + 2e-6);
+            if (mask) assert_true(fabs(gap[k] - most) < 2e-6);
             met += most<0, apart_by_face += face> 0, apart_by_cross += face < 0 && cross > 0;
         }
     }

@@ -86,9 +86,9 @@ static void answers_follow(void **state) {
         fct_pose pose = fct_pose_identity();
         pose.translation[0] = (double)rays[1].origin[0], pose.translation[1] = (double)rays[1].origin[1],
         pose.translation[2] = (double)rays[1].origin[2];
-        size_t count = fct_bvh_pairs(fresh.bvh, other.bvh, &pose, SIZE_MAX, 0, NULL, NULL);
+        size_t count = fct_bvh_pairs(fresh.bvh, other.bvh, &pose, SIZE_MAX, 0, NULL, NULL, NULL);
         assert_true(count > 0);
-        assert_int_equal(fct_bvh_pairs(bvh, other.bvh, &pose, SIZE_MAX, 0, NULL, NULL), count);
+        assert_int_equal(fct_bvh_pairs(bvh, other.bvh, &pose, SIZE_MAX, 0, NULL, NULL, NULL), count);
         free(rays);
         fct_bvh_destroy(bvh);
         model_release(&env, &fresh);

@@ -133,6 +133,11 @@ static fct_result find_touching(const fct_env *env) {
     size_t found;
     fct_result result = STARVE(fct_bodies_touching(env, 3, bodies, 3, pairs, &found));
     assert_int_equal(found, result == FCT_OK ? 3 : 0);
+    fct_body_tracker *tracker = NULL;
+    if (result == FCT_OK) result = STARVE(fct_body_tracker_create(env, &tracker));
+    for (int frame = 0; frame < 2 && result == FCT_OK; ++frame)
+        result = STARVE(fct_body_tracker_touching(tracker, 3, bodies, 3, pairs, &found));
+    fct_body_tracker_destroy(tracker);
     fct_bvh_destroy(bvh);
     return result;
 }

@@ -17,7 +17,7 @@ enum {
     PAIR_SLOTS = 1 << 20 /* pairs: 16 MB. An answer with more than its part is computed again when taken */
 };
 
-static void answer_pose(const collide_answers *a, size_t i, fct_face_pair *hint, fct_visits *visits) {
+static void answer_pose(const collide_answers *a, size_t i, fct_pair_hint *hint, fct_visits *visits) {
     const collide_question *q = a->question;
     const fct_bvh *model_a = q->models->a, *model_b = q->models->b;
     collide_answer *out = a->block + i;
@@ -26,7 +26,7 @@ static void answer_pose(const collide_answers *a, size_t i, fct_face_pair *hint,
     switch (q->kind) {
     case COLLIDE_TOUCH:
         out->found = fct_bvh_overlap(model_a, model_b, &pose, hint, visits);
-        out->nearest.pair = *hint;
+        out->nearest.pair = hint->pair;
         break;
     case COLLIDE_WITHIN:
         out->found = fct_bvh_within(model_a, model_b, &pose, q->distance.max_distance, hint, visits);
@@ -40,9 +40,9 @@ static void answer_pose(const collide_answers *a, size_t i, fct_face_pair *hint,
         break;
     case COLLIDE_PAIRS:
         out->pairs = a->slots + i * a->slot;
-        out->pair_count = model_b
-                              ? fct_bvh_pairs(model_a, model_b, &pose, q->limit, a->slot, out->pairs, visits)
-                              : fct_bvh_self_pairs(model_a, q->limit, a->slot, out->pairs, visits);
+        out->pair_count =
+            model_b ? fct_bvh_pairs(model_a, model_b, &pose, q->limit, a->slot, out->pairs, NULL, visits)
+                    : fct_bvh_self_pairs(model_a, q->limit, a->slot, out->pairs, visits);
         out->found = out->pair_count > 0;
         break;
     }
@@ -50,7 +50,7 @@ static void answer_pose(const collide_answers *a, size_t i, fct_face_pair *hint,
 
 static void answer_chunk(void *user, size_t begin, size_t end, size_t chunk) {
     const collide_answers *a = user;
-    fct_face_pair hint = fct_face_pair_none();
+    fct_pair_hint hint = fct_pair_hint_none();
     fct_visits visits = {0};
     for (size_t i = begin; i < end; ++i) answer_pose(a, i, &hint, &visits);
     a->chunk_visits[chunk] = visits;
@@ -120,7 +120,7 @@ static int fetch_all_pairs(tool *t, collide_answers *a, collide_answer *answer) 
     fct_pose pose = collide_pose(q->poses, a->next);
     double start = tool_seconds();
     if (m->b)
-        fct_bvh_pairs(m->a, m->b, &pose, answer->pair_count, a->large_capacity, a->large, NULL);
+        fct_bvh_pairs(m->a, m->b, &pose, answer->pair_count, a->large_capacity, a->large, NULL, NULL);
     else
         fct_bvh_self_pairs(m->a, answer->pair_count, a->large_capacity, a->large, NULL);
     a->seconds += tool_seconds() - start;
