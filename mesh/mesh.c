@@ -94,21 +94,27 @@ unsigned fct_mesh_bits(const fct_mesh *mesh) {
     return bits;
 }
 
-/* Copies the material names. On failure out owns the names copied so far. */
-static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
-    if (!mesh->material_names) {
-        out->material_count = mesh->material_count;
+fct_result fct_names_copy(const fct_env *env, char *const *names, uint32_t count, char ***out) {
+    *out = NULL;
+    if (!names) return FCT_OK;
+    char **copies = fct_allocate_zero(env, count, sizeof *copies);
+    bool done = copies != NULL;
+    for (uint32_t i = 0; i < count && done; ++i) {
+        copies[i] = fct_copy_text(env, names[i], strlen(names[i]));
+        done = copies[i] != NULL;
+    }
+    if (done) {
+        *out = copies;
         return FCT_OK;
     }
-    out->material_names = fct_allocate_zero(env, mesh->material_count, sizeof(char *));
-    if (!out->material_names) return fct_fail_memory(env, "material names");
-    for (uint32_t i = 0; i < mesh->material_count; ++i) {
-        const char *name = mesh->material_names[i];
-        out->material_names[i] = fct_copy_text(env, name, strlen(name));
-        if (!out->material_names[i]) return fct_fail_memory(env, "material names");
-        out->material_count = i + 1;
-    }
-    return FCT_OK;
+    fct_names_release(env, copies, count);
+    return fct_fail_memory(env, "material names");
+}
+
+/* Copies the number of materials and their names. */
+static fct_result copy_materials(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
+    out->material_count = mesh->material_count;
+    return fct_names_copy(env, mesh->material_names, mesh->material_count, &out->material_names);
 }
 
 /* Copies the arrays that both meshes have behind the first `vertices` and `faces` elements of `to`. */
@@ -133,7 +139,7 @@ fct_result fct_mesh_copy(const fct_env *env, const fct_mesh *mesh, fct_mesh *out
     memcpy(out->origin, mesh->origin, sizeof out->origin);
     out->source_count = mesh->source_count;
     copy_arrays(mesh, out, 0, 0);
-    result = copy_names(env, mesh, out);
+    result = copy_materials(env, mesh, out);
     if (result != FCT_OK) fct_mesh_release(env, out);
     return result;
 }
@@ -233,7 +239,7 @@ fct_result fct_mesh_extract(const fct_env *env, const fct_mesh *mesh, const uint
         memcpy(out->origin, mesh->origin, sizeof out->origin);
         out->source_count = mesh->source_count;
         extract_elements(mesh, &span, faces, count, out, ids);
-        result = copy_names(env, mesh, out);
+        result = copy_materials(env, mesh, out);
     }
     fct_release(env, span.numbers);
     if (result != FCT_OK) {

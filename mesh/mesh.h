@@ -36,6 +36,8 @@ size_t fct_first_not_finite(const float *values, size_t count);
 
 /* A copy of text[0, length) with a final 0, or NULL without memory. */
 char *fct_copy_text(const fct_env *env, const char *text, size_t length);
+/* Copies `count` strings; NULL stays NULL. Errors: MEMORY, with *out = NULL. */
+fct_result fct_names_copy(const fct_env *env, char *const *names, uint32_t count, char ***out);
 /* Releases `count` strings and the array. NULL is allowed. */
 void fct_names_release(const fct_env *env, char **names, uint32_t count);
 

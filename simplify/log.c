@@ -6,6 +6,8 @@
  */
 #include "simplify/log.h"
 
+#include "simplify/topology/ring.h"
+
 fct_result fct_log_create(fct_simplifier *s) {
     fct_log *log = s->log = fct_allocate_zero(s->env, 1, sizeof *log);
     if (!log) return fct_fail_memory(s->env, "a log");
@@ -44,6 +46,26 @@ static uint16_t find_highest_key(const fct_simplifier *s, uint32_t corner, uint1
     return key;
 }
 
+/* Whether a face that remains joins x to the point that replaces a and b. */
+static bool stays_joined(const fct_simplifier *s, uint32_t x, uint32_t a, uint32_t b) {
+    for (uint32_t c = point_at(s, x)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
+        const uint32_t *t = s->triangles + (c - c % 3);
+        if (corner_dead(s, c)) continue;
+        bool at_a = t[0] == a || t[1] == a || t[2] == a, at_b = t[0] == b || t[1] == b || t[2] == b;
+        if (at_a != at_b) return true;
+    }
+    return false;
+}
+
+/* The apexes of the faces between a and b lose these faces. Those that stay joined to the new point meet its
+ * key later; the others need the key themselves. */
+static void raise_apexes(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b, uint16_t key) {
+    for (uint32_t i = 0; i < count_b; ++i) {
+        uint32_t x = fct_simplify_find_apex(s, s->ring_b[i], a);
+        if (x != FCT_NONE && s->log->keys[x] < key && !stays_joined(s, x, a, b)) s->log->keys[x] = key;
+    }
+}
+
 void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) {
     fct_log *log = s->log;
     uint16_t key = (uint16_t)s->queue->current;
@@ -53,6 +75,7 @@ void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) 
         for (uint32_t c = point_at(s, a)->first_corner; c != FCT_NONE; c = s->next_corners[c])
             if (!corner_dead(s, c)) key = find_highest_key(s, c, key);
     log->keys[a] = key;
+    raise_apexes(s, a, b, count_b, key);
     log->records[log->count] =
         (fct_record){.kept = a, .gone = b, .key = key, .first_wedge = (uint32_t)log->wedge_count};
 }

@@ -1,6 +1,7 @@
 /* simplify/output.c: see output.h. Cost: linear in the corners of the input. */
 #include "simplify/output.h"
 
+#include "mesh/mesh.h"
 #include "simplify/cost/constraint.h"
 
 /* Corners with equal keys share an output vertex: their point, or the class of their wedge. */
@@ -26,26 +27,10 @@ static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, 
     }
 }
 
-static void normalize_normal(float *n) {
+void fct_simplify_write_normal(const fct_simplifier *s, uint32_t point, float *n) {
+    if (point_is_locked(s, point)) return;
     v3 unit = v3_unit(v3_load(n));
     if (v3_norm2(unit) > 0) v3_store(n, unit);
-}
-
-static fct_result copy_names(const fct_env *env, const fct_mesh *mesh, fct_mesh *out) {
-    if (!mesh->material_names) {
-        out->material_count = mesh->material_count;
-        return FCT_OK;
-    }
-    out->material_names = fct_allocate_zero(env, mesh->material_count, sizeof *out->material_names);
-    if (!out->material_names) return fct_fail_memory(env, "material names");
-    for (uint32_t i = 0; i < mesh->material_count; ++i) {
-        size_t length = strlen(mesh->material_names[i]) + 1;
-        out->material_names[i] = fct_allocate(env, length, 1);
-        if (!out->material_names[i]) return fct_fail_memory(env, "material names");
-        memcpy(out->material_names[i], mesh->material_names[i], length);
-        out->material_count = i + 1;
-    }
-    return FCT_OK;
 }
 
 static void write_face(const fct_mesh *mesh, fct_mesh *out, uint32_t f, uint32_t to) {
@@ -82,7 +67,10 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
         (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     fct_result result = fct_mesh_create(s->env, vertices, s->live_faces, arrays, out);
     if (result == FCT_OK) memcpy(out->origin, mesh->origin, sizeof out->origin);
-    if (result == FCT_OK) result = copy_names(s->env, mesh, out);
+    if (result == FCT_OK) out->material_count = mesh->material_count;
+    if (result == FCT_OK && mesh->source_faces) out->source_count = mesh->source_count;
+    if (result == FCT_OK)
+        result = fct_names_copy(s->env, mesh->material_names, mesh->material_count, &out->material_names);
     uint32_t to = 0;
     for (uint32_t i = 0; i < mesh->face_count && result == FCT_OK; ++i) {
         uint32_t f = places[i];
@@ -92,8 +80,7 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
             out->triangles[3 * (size_t)to + k] = v;
             write_point(s, s->triangles[c], out->positions + 3 * (size_t)v);
             if (s->channel_count) write_attributes(s, out, 3 * to + k, c, v);
-            if (out->normals && !point_is_locked(s, s->triangles[c]))
-                normalize_normal(out->normals + 3 * (size_t)v);
+            if (out->normals) fct_simplify_write_normal(s, s->triangles[c], out->normals + 3 * (size_t)v);
         }
         write_face(mesh, out, f, to++);
     }

@@ -4,7 +4,11 @@
 
 #include "simplify/state.h"
 
-/* Writes the live faces in the order of the input, with the same arrays as the input. places: per face of the
+/* Gives a normal at a point unit length, unless the point is locked. */
+void fct_simplify_write_normal(const fct_simplifier *s, uint32_t point, float *n);
+
+/* Writes the live faces in the order of the input, with the arrays that the simplifier keeps
+ * (facetree/simplify.h). places: per face of the
  * input its number in s->mesh. Vertices are numbered in the order in which faces first use them. Errors:
  * MEMORY; *out is then partly filled: release it. */
 fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_mesh *out);

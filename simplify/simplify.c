@@ -31,8 +31,9 @@ fct_simplify_def fct_simplify_def_default(void) {
     };
 }
 
+/* Squares of weights, times those of coordinates, must be finite and not vanish. */
 static bool is_weight(double value) {
-    return value >= 0 && value < INFINITY;
+    return value == 0 || (value >= 1e-12 && value <= 1e12);
 }
 
 static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
@@ -52,8 +53,11 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
                    {"regularization", def->regularization}};
     for (size_t i = def->color_weight == FCT_WEIGHT_AUTO; i < sizeof weights / sizeof *weights; ++i)
         if (!is_weight(weights[i].value))
-            return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected a finite number of at least 0",
+            return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected 0 or a number from 1e-12 to 1e12",
                             weights[i].name, weights[i].value);
+    if ((unsigned)def->placement > FCT_PLACE_SUBSET)
+        return fct_fail(env, FCT_ERROR_DATA, "placement is %d, expected a fct_placement",
+                        (int)def->placement);
     if ((unsigned)def->weighting > FCT_WEIGHT_UNIFORM)
         return fct_fail(env, FCT_ERROR_DATA, "weighting is %d, expected a fct_weighting",
                         (int)def->weighting);

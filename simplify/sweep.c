@@ -136,9 +136,9 @@ static fct_result run_sweeps(sweep *w) {
     for (uint32_t e = 0; e < s->edge_count; ++e) w->edges[e] = e;
     w->edge_count = s->edge_count;
     for (uint32_t number = 0;; ++number) {
-        uint32_t most = s->live_faces - target, count, contracted = 0;
-        if (most < LEAST_EDGES) return FCT_OK;
-        w->limit = find_limit(w, most, &count);
+        uint32_t count, contracted = 0;
+        if (s->live_faces < target + LEAST_EDGES) return FCT_OK;
+        w->limit = find_limit(w, s->live_faces - target, &count);
         if (count < LEAST_EDGES) return FCT_OK;
         fct_result result = run_sweep(w, number, &contracted);
         if (result == FCT_OK)

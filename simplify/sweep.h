@@ -13,8 +13,8 @@
 /* Contracts the edges in the queue of a block until it is empty. s is the block's own copy. */
 typedef void fct_block_body(fct_simplifier *s);
 
-/* Sweeps while they pay: the last contractions are left to one queue for all edges. Afterwards at least
- * target_faces remain. Errors: CANCELLED, MEMORY. */
+/* Sweeps while they pay: the last contractions are left to one queue for all edges. Only an edge of more than
+ * four faces can leave fewer than target_faces. Errors: CANCELLED, MEMORY. */
 fct_result fct_simplify_sweep(fct_simplifier *s, fct_block_body *body);
 
 #endif

@@ -54,6 +54,9 @@ static void choose_level(tool *t, const level_options *o, fct_progressive *progr
     fct_progressive_inspect(progressive, &info);
     if (o->error >= 0) {
         fct_progressive_go_error(progressive, o->error);
+        fct_progressive_inspect(progressive, &info);
+        if (info.error > o->error)
+            tool_warn(t, "the finest level has an error of %.3g, %.3g was asked for", info.error, o->error);
         return;
     }
     uint32_t wanted = o->ratio > 0 ? (uint32_t)llround(o->ratio * info.total_faces) : o->faces;

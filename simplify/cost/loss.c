@@ -10,6 +10,7 @@
  */
 #include "simplify/cost/loss.h"
 #include "simplify/cost/nearest.h"
+#include "simplify/topology/ring.h"
 
 /* The area that the quadric of a point has summed. */
 static double sum_area(const fct_simplifier *s, uint32_t point) {
@@ -21,12 +22,6 @@ static void add_lost(fct_loss *loss, v3 lost, v3 at, double weight) {
     loss->lost[k] = lost, loss->nearest[k] = at;
     loss->distance2[k] = v3_norm2(v3_sub(lost, at));
     loss->weights[k] = weight;
-}
-
-/* The apex of a face between b (at `corner`) and a; FCT_NONE if the face does not touch a. */
-static uint32_t find_apex(const fct_simplifier *s, uint32_t corner, uint32_t a) {
-    uint32_t x = s->triangles[corner_next(corner)], y = s->triangles[corner_previous(corner)];
-    return x == a ? y : y == a ? x : FCT_NONE;
 }
 
 /* Whether a face of the ring, other than those at `other`, has a side to `point`. */
@@ -45,12 +40,12 @@ static bool ring_touches(const fct_simplifier *s, const uint32_t *ring, uint32_t
 static void add_apexes(const fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_a, uint32_t count_b,
                        v3 at, fct_loss *loss) {
     for (uint32_t i = 0; i < count_b && loss->count < LOSS_POINTS; ++i) {
-        uint32_t apex = find_apex(s, s->ring_b[i], a), faces = 0;
+        uint32_t apex = fct_simplify_find_apex(s, s->ring_b[i], a), faces = 0;
         if (apex == FCT_NONE || ring_touches(s, s->ring_a, count_a, b, apex) ||
             ring_touches(s, s->ring_b, count_b, a, apex))
             continue;
         v3 p = point_position(s, apex), pa = point_position(s, a), pb = point_position(s, b);
-        for (uint32_t k = 0; k < count_b; ++k) faces += find_apex(s, s->ring_b[k], a) == apex;
+        for (uint32_t k = 0; k < count_b; ++k) faces += fct_simplify_find_apex(s, s->ring_b[k], a) == apex;
         if (faces < point_at(s, apex)->valence) {
             double area = .5 * v3_norm(v3_cross(v3_sub(pa, p), v3_sub(pb, p)));
             add_lost(loss, v3_scale(v3_add(p, at), .5), at, area / 3);

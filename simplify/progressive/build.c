@@ -10,7 +10,9 @@
  * points.
  */
 #include "simplify/progressive/build.h"
+#include "mesh/mesh.h"
 
+#include "simplify/output.h"
 #include "simplify/progressive/progressive.h"
 
 /* A node that has ended, in the order of the contractions. */
@@ -63,19 +65,18 @@ static void sort_records(builder *b) {
 }
 
 /* The values of a corner of the input, as a level has them. */
-static void read_values(const builder *b, size_t corner, float *out) {
+static void read_values(const builder *b, size_t corner, uint32_t point, float *out) {
     const fct_mesh *mesh = b->s->mesh;
     size_t v = mesh->triangles[corner];
     if (mesh->colors) memcpy(out + b->m->color, mesh->colors + 3 * v, 3 * sizeof *out);
     if (mesh->texcoords) memcpy(out + b->m->texcoord, mesh->texcoords + 2 * corner, 2 * sizeof *out);
     if (!mesh->normals) return;
     memcpy(out + b->m->normal, mesh->normals + 3 * v, 3 * sizeof *out);
-    v3 unit = v3_unit(v3_load(out + b->m->normal));
-    if (v3_norm2(unit) > 0) v3_store(out + b->m->normal, unit);
+    fct_simplify_write_normal(b->s, point, out + b->m->normal);
 }
 
 /* The values of an entry of the log, in the order of the nodes. */
-static void read_logged(const builder *b, size_t entry, float *out) {
+static void read_logged(const builder *b, size_t entry, uint32_t point, float *out) {
     const fct_simplifier *s = b->s;
     const float *from = b->log->values + s->channel_count * entry;
     for (uint32_t i = 0; i < s->channel_count; ++i) {
@@ -85,9 +86,7 @@ static void read_logged(const builder *b, size_t entry, float *out) {
                                                              : b->m->texcoord;
         out[first + channel->component] = from[i];
     }
-    if (b->m->normal == FCT_NONE) return;
-    v3 unit = v3_unit(v3_load(out + b->m->normal));
-    if (v3_norm2(unit) > 0) v3_store(out + b->m->normal, unit);
+    if (b->m->normal != FCT_NONE) fct_simplify_write_normal(s, point, out + b->m->normal);
 }
 
 /* Starts a node of a handle at a point; the caller fills in position and values. */
@@ -117,7 +116,7 @@ static void start_corner(builder *b, uint32_t c) {
     uint32_t node = start_node(b, h, p);
     /* The point's source is its lowest vertex; the vertices of a point differ at most in the sign of 0. */
     memcpy(b->positions + 3 * (size_t)node, s->mesh->positions + 3 * (size_t)v, 3 * sizeof *b->positions);
-    if (b->m->value_count) read_values(b, c, b->values + (size_t)b->m->value_count * node);
+    if (b->m->value_count) read_values(b, c, p, b->values + (size_t)b->m->value_count * node);
 }
 
 static void start_faces(builder *b) {
@@ -246,15 +245,14 @@ static void join_rings(builder *b, const fct_record *r) {
 }
 
 /* Starts the node of a wedge of the kept point. Returns FCT_NONE if no face uses it. */
-static uint32_t start_kept_node(builder *b, const fct_record *r, uint32_t handle, size_t entry,
-                                const uint32_t *uses) {
+static uint32_t start_kept_node(builder *b, const fct_record *r, uint32_t handle, size_t entry) {
     uint32_t total = 0;
     for (uint32_t i = 0; i < b->old_count; ++i)
-        if (find_survivor(b, b->old[i]) == handle) total += uses[b->old[i]];
+        if (find_survivor(b, b->old[i]) == handle) total += b->uses[b->old[i]];
     if (total == 0) return FCT_NONE;
     uint32_t node = start_node(b, handle, r->kept);
     memcpy(b->positions + 3 * (size_t)node, r->at, sizeof r->at);
-    if (b->m->value_count) read_logged(b, entry, b->values + (size_t)b->m->value_count * node);
+    if (b->m->value_count) read_logged(b, entry, r->kept, b->values + (size_t)b->m->value_count * node);
     return node;
 }
 
@@ -273,7 +271,7 @@ static fct_result replace_nodes(builder *b, const fct_record *r) {
     uint32_t before[FCT_LENGTH(b->old)];
     for (uint32_t k = 0; k < b->old_count; ++k) before[k] = b->handle_nodes[b->old[k]];
     for (uint32_t i = 0; i < entries; ++i) {
-        started[i] = start_kept_node(b, r, survivors[i], first + i, b->uses);
+        started[i] = start_kept_node(b, r, survivors[i], first + i);
         if (started[i] != FCT_NONE) any = started[i];
     }
     for (uint32_t k = 0; k < b->old_count; ++k) {
@@ -402,27 +400,16 @@ static fct_result allocate_progressive(builder *b) {
     return fct_allocate_all(b->s->env, arrays, FCT_LENGTH(arrays), "a progressive mesh");
 }
 
-static fct_result copy_names(const fct_mesh *mesh, fct_progressive *m) {
-    m->material_count = mesh->material_count;
-    if (!mesh->material_names) return FCT_OK;
-    m->material_names = fct_allocate_zero(m->env, mesh->material_count, sizeof *m->material_names);
-    if (!m->material_names) return fct_fail_memory(m->env, "material names");
-    for (uint32_t i = 0; i < mesh->material_count; ++i) {
-        size_t size = strlen(mesh->material_names[i]) + 1;
-        m->material_names[i] = fct_allocate(m->env, size, 1);
-        if (!m->material_names[i]) return fct_fail_memory(m->env, "material names");
-        memcpy(m->material_names[i], mesh->material_names[i], size);
-    }
-    return FCT_OK;
-}
-
 static fct_result write_progressive(builder *b) {
     fct_progressive *m = b->m;
     uint32_t *face_places, *numbers;
     const fct_array arrays[] = {FCT_ARRAY(face_places, b->s->mesh->face_count),
                                 FCT_ARRAY(numbers, b->node_count)};
     fct_result result = allocate_progressive(b);
-    if (result == FCT_OK) result = copy_names(b->s->mesh, m);
+    const fct_mesh *mesh = b->s->mesh;
+    m->material_count = mesh->material_count;
+    if (result == FCT_OK)
+        result = fct_names_copy(m->env, mesh->material_names, mesh->material_count, &m->material_names);
     if (result == FCT_OK)
         result = fct_allocate_all(b->s->env, arrays, FCT_LENGTH(arrays), "numbers of nodes");
     if (result != FCT_OK) return result;

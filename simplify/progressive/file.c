@@ -156,6 +156,7 @@ static const char *find_head_fault(const file_head *head, const unsigned char *d
         head->material_count >= INT32_MAX)
         return "counts or flags out of range";
     if ((head->flags & HAS_NAMES) && head->material_count > head->names_size) return "names are missing";
+    if (!(head->flags & HAS_NAMES) && head->names_size > 0) return "names without materials";
     for (int i = 0; i < 3; ++i)
         if (!(head->origin[i] - head->origin[i] == 0)) return "the origin is not finite";
     return NULL;
@@ -177,6 +178,7 @@ static fct_result read_names(const fct_env *env, const char *name, const file_he
         memcpy(m->material_names[i], text, length);
         text = nul + 1;
     }
+    if (text != end) return fct_fail(env, FCT_ERROR_DATA, "%s: something follows the material names", name);
     return FCT_OK;
 }
 
@@ -211,6 +213,7 @@ static fct_result read_block(file_reader *r, uint32_t steps, bool *truncated) {
         fct_result result = fct_splits_step(r->k);
         if (result == FCT_ERROR_DATA) return fail_block(r, "malformed");
         if (result != FCT_OK) return result;
+        if (r->k->m->face_count > r->head.face_count) return fail_block(r, "more faces than the head says");
     }
     if (!fct_coder_end_reading(&r->k->coder)) return fail_block(r, "malformed: it has a wrong length");
     r->at += block.size;
@@ -222,8 +225,10 @@ static fct_result check_counts(const file_reader *r, bool truncated) {
     const fct_progressive *m = r->k->m;
     if (m->step_count == 0)
         return fct_fail(r->env, FCT_ERROR_DATA, "%s: truncated in the base mesh", r->name);
-    if (m->step_faces[1] != r->head.base_faces || m->face_count > r->head.face_count ||
-        (!truncated && m->face_count != r->head.face_count))
+    if (m->step_faces[1] != r->head.base_faces)
+        return fct_fail(r->env, FCT_ERROR_DATA, "%s: base mesh of %" PRIu32 " faces, expected %" PRIu32,
+                        r->name, m->step_faces[1], r->head.base_faces);
+    if (!truncated && m->face_count != r->head.face_count)
         return fct_fail(r->env, FCT_ERROR_DATA, "%s: %" PRIu32 " faces, expected %" PRIu32, r->name,
                         m->face_count, r->head.face_count);
     if (!truncated && r->at < r->end)

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/math/vec.h"
+#include "mesh/mesh.h"
 #include "simplify/progressive/progressive.h"
 
 void fct_progressive_forward(fct_progressive *m) {
@@ -41,12 +42,11 @@ fct_result fct_progressive_begin(fct_progressive *m) {
 
 void fct_progressive_destroy(fct_progressive *m) {
     if (!m) return;
-    for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
-        fct_release(m->env, m->material_names[i]);
-    void *arrays[] = {m->material_names, m->step_nodes,    m->step_faces, m->errors,    m->parents,
-                      m->handles,        m->points,        m->corners,    m->positions, m->first_corners,
-                      m->values,         m->triangles,     m->materials,  m->nodes,     m->face_colors,
-                      m->vertices,       m->point_vertices};
+    fct_names_release(m->env, m->material_names, m->material_count);
+    void *arrays[] = {m->step_nodes,    m->step_faces,  m->errors,    m->parents,
+                      m->handles,       m->points,      m->corners,   m->positions,
+                      m->first_corners, m->values,      m->triangles, m->materials,
+                      m->nodes,         m->face_colors, m->vertices,  m->point_vertices};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(m->env, arrays[i]);
     fct_release(m->env, m);
 }
@@ -174,23 +174,6 @@ static void write_corner(level_mesh *l, size_t c) {
                  l->out->texcoords + 2 * c);
 }
 
-static fct_result copy_names(const fct_progressive *m, fct_mesh *out) {
-    if (!m->material_names) {
-        out->material_count = m->material_count;
-        return FCT_OK;
-    }
-    out->material_names = fct_allocate_zero(m->env, m->material_count, sizeof *out->material_names);
-    if (!out->material_names) return fct_fail_memory(m->env, "material names");
-    out->material_count = m->material_count;
-    for (uint32_t i = 0; i < m->material_count; ++i) {
-        size_t size = strlen(m->material_names[i]) + 1;
-        out->material_names[i] = fct_allocate(m->env, size, 1);
-        if (!out->material_names[i]) return fct_fail_memory(m->env, "material names");
-        memcpy(out->material_names[i], m->material_names[i], size);
-    }
-    return FCT_OK;
-}
-
 static fct_result fill_mesh(level_mesh *l) {
     const fct_progressive *m = l->m;
     uint32_t faces = m->step_faces[m->level];
@@ -199,8 +182,10 @@ static fct_result fill_mesh(level_mesh *l) {
                      (m->texcoord != FCT_NONE ? FCT_MESH_TEXCOORDS : 0) |
                      (m->face_colors ? FCT_MESH_FACE_COLORS : 0) | (m->materials ? FCT_MESH_MATERIALS : 0);
     fct_result result = fct_mesh_create(m->env, l->vertex_count, faces, kinds, l->out);
-    if (result == FCT_OK) result = copy_names(m, l->out);
+    if (result == FCT_OK)
+        result = fct_names_copy(m->env, m->material_names, m->material_count, &l->out->material_names);
     if (result != FCT_OK) return result;
+    l->out->material_count = m->material_count;
     memcpy(l->out->origin, m->origin, sizeof l->out->origin);
     for (uint32_t v = 0; v < l->vertex_count; ++v) write_vertex(l, v);
     for (size_t c = 0; c < 3 * (size_t)faces; ++c) write_corner(l, c);

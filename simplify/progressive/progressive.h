@@ -1,9 +1,13 @@
 /* simplify/progressive/progressive.h: the data of a progressive mesh.
  *
- *     corner --> handle --> node       Node: one version of a wedge (state.h): position and attributes at
- * some levels. Nodes never change. The parent of a node is the node that node (parent)        replaces it in
- * the coarser level. /             \       Handle: what corners refer to; it has one node at each level. So a
- * split node             node    only changes the corners that go to the new point.
+ *     corner --> handle --> node            (parent)
+ *                           /  \
+ *                        node  node
+ *
+ * - A node is a position with attributes, at some of the levels. It never changes. Its parent replaces it in
+ * the coarser level.
+ * - A handle is what corners refer to. It has one node at each level. So a split changes only the corners
+ * that go to the new point.
  *
  * Step 0 adds the base mesh. Each further step is a vertex split: it adds nodes and faces and moves corners
  * to the handles of new nodes. The items of all arrays are in the order of the steps. So the faces of a level

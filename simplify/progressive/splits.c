@@ -237,7 +237,8 @@ static void apply_ring(fct_splits *k) {
         if (h == FCT_NONE) h = give_handle(k, node, FCT_NONE);
         m->first_corners[node] = m->corner_count;
         for (uint32_t r = 0; r < k->ring_count && h != k->members[i].group; ++r) {
-            if (k->ring[r].member != i || !GROW(k, m->corners, k->room.corners, m->corner_count + 1))
+            if (k->ring[r].member != i || !check_count(k, (size_t)m->corner_count + 1) ||
+                !GROW(k, m->corners, k->room.corners, m->corner_count + 1))
                 continue;
             m->corners[m->corner_count++] = k->ring[r].corner;
             m->triangles[k->ring[r].corner] = h;
@@ -325,6 +326,10 @@ static void code_end_corner(fct_splits *k, size_t c, bool second) {
     if (!made) {
         uint32_t i = found[fct_code_uniform(&k->coder, count, place)];
         if (!k->names) m->triangles[c] = m->handles[k->members[i].node];
+        return;
+    }
+    if (k->group_count == 0) {
+        fail_stream(k);
         return;
     }
     uint32_t parent = k->names ? m->parents[wanted] : FCT_NONE;
@@ -430,11 +435,12 @@ static bool add_face(fct_splits *k) {
     fct_progressive *m = k->m;
     size_t faces = (size_t)m->face_count + 1;
     if (k->names) return true;
+    if (faces > UINT32_MAX / 3) fail_stream(k);
     if (!check_count(k, faces) || !GROW(k, m->triangles, k->room.triangles, 3 * faces) ||
         !GROW(k, k->next, k->room.next, 3 * faces) || !GROW(k, k->previous, k->room.previous, 3 * faces))
         return false;
-    if (k->has_materials && !GROW(k, m->materials, k->room.materials, faces)) return false;
-    if (k->has_face_colors && !GROW(k, m->face_colors, k->room.face_colors, 3 * faces)) return false;
+    if (m->materials && !GROW(k, m->materials, k->room.materials, faces)) return false;
+    if (m->face_colors && !GROW(k, m->face_colors, k->room.face_colors, 3 * faces)) return false;
     ++m->face_count;
     return true;
 }
@@ -506,6 +512,7 @@ static void code_error(fct_splits *k, uint32_t step) {
     drop = fct_code_number(&k->coder, &k->models.error, drop);
     if (drop > fct_float_bits(before)) fail_stream(k);
     if (!k->names) m->errors[step] = fct_float_of_bits(fct_float_bits(before) - drop);
+    if (!isfinite(m->errors[step])) fail_stream(k);
 }
 
 fct_result fct_splits_step(fct_splits *k) {
@@ -519,6 +526,7 @@ fct_result fct_splits_step(fct_splits *k) {
     uint32_t first = k->names ? m->step_faces[step] : m->face_count;
     if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
     if (k->result == FCT_OK) count = fct_code_number(&k->coder, &k->models.faces, count);
+    if (step > 0 && count == 0) fail_stream(k);
     for (uint32_t i = 0; i < count && !stopped(k); ++i) code_face(k, first + i);
     if (!stopped(k)) code_error(k, step);
     if (stopped(k)) return k->result;
@@ -561,7 +569,6 @@ fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face
     fct_result result = start_splits(m, out);
     if (result != FCT_OK) return result;
     fct_splits *k = *out;
-    k->has_materials = has_materials, k->has_face_colors = has_face_colors;
     /* Also a mesh without faces has its arrays. */
     GROW(k, m->first_corners, k->room.first_corners, 1);
     if (has_materials) GROW(k, m->materials, k->room.materials, 1);

@@ -50,7 +50,6 @@ typedef struct fct_splits {
 
     uint32_t step; /* the next one */
     uint32_t last_point;
-    bool has_materials, has_face_colors;
 
     /* The current step. */
     uint32_t split, born; /* the point that splits and the new one; FCT_NONE: none */

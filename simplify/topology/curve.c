@@ -81,6 +81,7 @@ static void fill_sorted(const fct_mesh *mesh, const uint32_t *vertex_places, con
         for (size_t k = 0; k < 3; ++k)
             out->triangles[3 * (size_t)places[f] + k] = vertex_places[mesh->triangles[3 * f + k]];
     memcpy(out->origin, mesh->origin, sizeof out->origin);
+    out->source_count = mesh->source_count;
     out->material_count = mesh->material_count;
     out->material_names = mesh->material_names;
 }

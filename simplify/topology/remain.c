@@ -234,7 +234,8 @@ bool fct_simplify_remains_good(fct_simplifier *s, const fct_move *move) {
 }
 
 bool fct_simplify_is_level(const fct_simplifier *s) {
-    if (!s->level || s->open_sides > 0) return false;
+    /* Without check_foldover open sides are not counted. */
+    if (s->remaining_count == 0 || !s->level || !s->def->check_foldover || s->open_sides > 0) return false;
     v3 sum = {0, 0, 0};
     for (uint32_t i = 0; i < s->remaining_count; ++i) sum = v3_add(sum, s->remaining[i].normal);
     double sum2 = v3_norm2(sum);

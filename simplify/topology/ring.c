@@ -27,3 +27,8 @@ uint32_t fct_simplify_find_side(const fct_simplifier *s, uint32_t c, uint32_t ot
     }
     return c;
 }
+
+uint32_t fct_simplify_find_apex(const fct_simplifier *s, uint32_t corner, uint32_t a) {
+    uint32_t x = s->triangles[corner_next(corner)], y = s->triangles[corner_previous(corner)];
+    return x == a ? y : y == a ? x : FCT_NONE;
+}

@@ -10,5 +10,7 @@ uint32_t fct_simplify_gather(fct_simplifier *s, uint32_t point, uint32_t *ring);
 /* The first live corner at `point` from corner c on whose face also has a corner at `other`; FCT_NONE if
  * there is none. Start with c = first_corners[point], and continue with the next corner of the result. */
 uint32_t fct_simplify_find_side(const fct_simplifier *s, uint32_t c, uint32_t other);
+/* The apex of a face between b (at `corner`) and a; FCT_NONE if the face does not touch a. */
+uint32_t fct_simplify_find_apex(const fct_simplifier *s, uint32_t corner, uint32_t a);
 
 #endif

@@ -229,7 +229,7 @@ static double weight(fuzz_bytes *b, double usual) {
 }
 
 static bool is_weight(double value) {
-    return value >= 0 && value < INFINITY;
+    return value == 0 || (value >= 1e-12 && value <= 1e12);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -259,7 +259,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                  (is_weight(def.color_weight) || def.color_weight == FCT_WEIGHT_AUTO) &&
                  is_weight(def.texcoord_weight) && is_weight(def.normal_weight) &&
                  is_weight(def.boundary_weight) && is_weight(def.regularization) &&
-                 def.feature_threshold >= 0;
+                 def.placement <= FCT_PLACE_SUBSET && def.feature_threshold >= 0;
     fct_result result = fct_simplify(&env, &mesh, &def, &out, &stats);
     fuzz_require(result == (valid ? FCT_OK : FCT_ERROR_DATA), "valid input is simplified, and no other");
     fuzz_require(result == FCT_OK || (!out.positions && !out.triangles), "a failure leaves nothing behind");

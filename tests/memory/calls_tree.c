@@ -121,24 +121,50 @@ static fct_result build_bvh(const fct_env *env) {
     return result;
 }
 
-static fct_result find_touching(const fct_env *env) {
-    fct_bvh_def def = fct_bvh_def_default();
-    def.parts = FCT_BVH_PAIRS;
-    fct_body bodies[3] = {
-        {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}, {NULL, fct_pose_identity()}};
+/* Three copies of one model at the same place: three pairs touch. */
+typedef struct copies {
     fct_bvh *bvh;
-    assert_int_equal(fct_bvh_build(&inputs.env, inputs.tree, &def, &bvh), FCT_OK);
-    for (int i = 0; i < 3; ++i) bodies[i].bvh = bvh;
+    fct_body bodies[3];
     fct_body_pair pairs[3];
     size_t found;
-    fct_result result = STARVE(fct_bodies_touching(env, 3, bodies, 3, pairs, &found));
-    assert_int_equal(found, result == FCT_OK ? 3 : 0);
-    fct_body_tracker *tracker = NULL;
-    if (result == FCT_OK) result = STARVE(fct_body_tracker_create(env, &tracker));
-    for (int frame = 0; frame < 2 && result == FCT_OK; ++frame)
-        result = STARVE(fct_body_tracker_touching(tracker, 3, bodies, 3, pairs, &found));
+} copies;
+
+static void make_copies(copies *c) {
+    fct_bvh_def def = fct_bvh_def_default();
+    def.parts = FCT_BVH_PAIRS;
+    assert_int_equal(fct_bvh_build(&inputs.env, inputs.tree, &def, &c->bvh), FCT_OK);
+    for (int i = 0; i < 3; ++i) c->bodies[i] = (fct_body){c->bvh, fct_pose_identity()};
+}
+
+static fct_result find_touching(const fct_env *env) {
+    copies c;
+    make_copies(&c);
+    fct_result result = STARVE(fct_bodies_touching(env, 3, c.bodies, 3, c.pairs, &c.found));
+    assert_int_equal(c.found, result == FCT_OK ? 3 : 0);
+    fct_bvh_destroy(c.bvh);
+    return result;
+}
+
+static fct_result create_tracker(const fct_env *env) {
+    fct_body_tracker *tracker;
+    fct_result result = STARVE(fct_body_tracker_create(env, &tracker));
+    assert_int_equal(tracker != NULL, result == FCT_OK);
     fct_body_tracker_destroy(tracker);
-    fct_bvh_destroy(bvh);
+    return result;
+}
+
+/* Two frames: the second one starts from the first. */
+static fct_result track_touching(const fct_env *env) {
+    copies c;
+    make_copies(&c);
+    fct_body_tracker *tracker;
+    fct_result result = fct_body_tracker_create(env, &tracker);
+    for (int frame = 0; frame < 2 && result == FCT_OK; ++frame) {
+        result = STARVE(fct_body_tracker_touching(tracker, 3, c.bodies, 3, c.pairs, &c.found));
+        assert_int_equal(c.found, result == FCT_OK ? 3 : 0);
+    }
+    fct_body_tracker_destroy(tracker);
+    fct_bvh_destroy(c.bvh);
     return result;
 }
 
@@ -187,6 +213,8 @@ const memory_call tree_calls[] = {{"fct_tree_build", "rounds", build_rounds, fal
                                   {"fct_bvh_create", "embree", create_embree, true},
                                   {"fct_bvh_build", "all parts", build_bvh, false},
                                   {"fct_bodies_touching", "", find_touching, false},
+                                  {"fct_body_tracker_create", "", create_tracker, false},
+                                  {"fct_body_tracker_touching", "", track_touching, false},
                                   {"fct_bvh_check", "", check_bvh, false},
                                   {"fct_bvh_refit", "", refit_bvh, false},
                                   {"fct_mesh_hausdorff", "", find_hausdorff, false},

@@ -207,6 +207,7 @@ static bool expect_level(const fct_simplifier *s, uint32_t a, uint32_t b, v3 at,
         after[count] = v3_unit(after[count]);
         ++count;
     }
+    level &= count > 0;
     for (uint32_t j = 0; j < points; ++j) level &= uses[j] == 2;
     for (uint32_t i = 0; i < count; ++i) {
         double turn = v3_dot(before[i], after[i]), away = v3_dot(after[i], v3_unit(sum));
