@@ -2,6 +2,7 @@
  * with at most 64 wedges. */
 #include "simplify/collapse.h"
 
+#include "simplify/classes.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/log.h"
 
@@ -74,9 +75,11 @@ static void remove_face(fct_simplifier *s, uint32_t c, uint32_t a) {
 static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candidate *candidate, uint32_t a,
                          v3 first, v3 second) {
     double values[SIMPLIFY_MAX_WEDGES][SIMPLIFY_MAX_CHANNELS];
+    uint32_t classes[SIMPLIFY_MAX_WEDGES];
     s->wedge_room -= g->group_count;
     for (uint32_t i = 0; i < g->group_count; ++i)
         fct_place_attributes(s, g, i, candidate, first, second, values[i]);
+    fct_classes_find(s, g, classes);
     s->first_wedges[a] = FCT_NONE;
     for (uint32_t i = g->group_count; i-- > 0;) {
         uint32_t keep = FCT_NONE;
@@ -90,9 +93,8 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
             if (s->steering) add_quadric(wedge_quadric(s, keep), wedge_quadric(s, w), s->quadric_size);
             s->wedge_parents[w] = keep;
             s->wedge_uses[keep] += s->wedge_uses[w];
-            uint32_t class_keep = fct_sets_find(s->class_parents, s->wedge_classes[keep]);
-            s->class_parents[fct_sets_find(s->class_parents, s->wedge_classes[w])] = class_keep;
         }
+        s->wedge_classes[keep] = classes[i];
         memcpy(s->attributes + (size_t)s->channel_count * keep, values[i], s->channel_count * sizeof(double));
         s->next_wedges[keep] = s->first_wedges[a];
         s->first_wedges[a] = keep;
@@ -101,6 +103,7 @@ static void merge_wedges(fct_simplifier *s, const fct_groups *g, const fct_candi
         next = s->next_wedges[w];
         if (s->wedge_uses[w] == 0) retire_wedge(s, a, w);
     }
+    fct_classes_unify(s, a);
 }
 
 /* Removes the faces between a and b and moves the other corners of b to a. ring_b holds the corners of b. */

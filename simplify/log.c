@@ -6,19 +6,23 @@
  */
 #include "simplify/log.h"
 
+#include "simplify/cost/constraint.h"
 #include "simplify/topology/ring.h"
 
 fct_result fct_log_create(fct_simplifier *s) {
     fct_log *log = s->log = fct_allocate_zero(s->env, 1, sizeof *log);
     if (!log) return fct_fail_memory(s->env, "a log");
     const fct_array arrays[] = {FCT_ARRAY(log->records, s->point_count),
-                                FCT_ARRAY_ZERO(log->keys, s->point_count)};
-    return fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a log");
+                                FCT_ARRAY_ZERO(log->keys, s->point_count),
+                                FCT_ARRAY(log->locked, s->point_count)};
+    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a log");
+    for (uint32_t p = 0; p < s->point_count && result == FCT_OK; ++p) log->locked[p] = point_is_locked(s, p);
+    return result;
 }
 
 void fct_log_destroy(const fct_env *env, fct_log *log) {
     if (!log) return;
-    void *arrays[] = {log->records, log->wedges, log->values, log->keys, log};
+    void *arrays[] = {log->records, log->wedges, log->values, log->keys, log->locked, log};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(env, arrays[i]);
 }
 
@@ -80,18 +84,9 @@ void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b) 
         (fct_record){.kept = a, .gone = b, .key = key, .first_wedge = (uint32_t)log->wedge_count};
 }
 
-/* Writes the attributes of a wedge. Wedges of one class share a vertex, so they get equal colours and
- * normals: those of the first one. */
-static void write_wedge(fct_simplifier *s, const fct_record *record, uint32_t wedge, float *to) {
-    const fct_log *log = s->log;
+static void write_wedge(const fct_simplifier *s, uint32_t wedge, float *to) {
     const double *from = s->attributes + (size_t)s->channel_count * wedge;
-    uint32_t first = FCT_NONE, class = fct_sets_find(s->class_parents, s->wedge_classes[wedge]);
-    for (uint32_t i = record->first_wedge; i < log->wedge_count && first == FCT_NONE; ++i)
-        if (fct_sets_find(s->class_parents, s->wedge_classes[log->wedges[i]]) == class) first = i;
-    for (uint32_t i = 0; i < s->channel_count; ++i)
-        to[i] = first == FCT_NONE || s->channels[i].source == CHANNEL_TEXCOORD
-                    ? (float)(from[i] / s->channels[i].factor)
-                    : log->values[(size_t)s->channel_count * first + i];
+    for (uint32_t i = 0; i < s->channel_count; ++i) to[i] = (float)(from[i] / s->channels[i].factor);
 }
 
 void fct_log_end(fct_simplifier *s, double error) {
@@ -101,7 +96,7 @@ void fct_log_end(fct_simplifier *s, double error) {
     record->error = (float)(error * s->extent);
     for (uint32_t w = s->channel_count ? s->first_wedges[record->kept] : FCT_NONE; w != FCT_NONE;
          w = s->next_wedges[w]) {
-        write_wedge(s, record, w, log->values + s->channel_count * log->wedge_count);
+        write_wedge(s, w, log->values + s->channel_count * log->wedge_count);
         log->wedges[log->wedge_count++] = w;
         ++record->wedge_count;
     }

@@ -27,6 +27,7 @@ typedef struct fct_log {
     size_t wedge_count, wedge_capacity, value_capacity;
     /* Per point: the highest key of a contraction that changed the faces there; shared by all blocks. */
     uint16_t *keys;
+    bool *locked; /* per point: locked before the first contraction; not in the logs of blocks */
 } fct_log;
 
 /* A log of the contractions of s, which receives it. Errors: MEMORY. */

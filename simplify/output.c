@@ -6,13 +6,11 @@
 
 /* Corners with equal keys share an output vertex: their point, or the class of their wedge. */
 static uint32_t find_vertex_key(fct_simplifier *s, uint32_t c) {
-    if (!s->wedge_classes) return s->triangles[c];
-    return fct_sets_find(s->class_parents, s->wedge_classes[corner_wedge(s, c)]);
+    return s->wedge_classes ? s->wedge_classes[corner_wedge(s, c)] : s->triangles[c];
 }
 
 /* Writes the attributes of a live corner's wedge: c in the input, `corner` and its vertex v in the output.
- * Wedges that share a vertex differ only in texture coordinates, apart from rounding; the last one written
- * counts. */
+ * Wedges that share a vertex differ only in texture coordinates. */
 static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, uint32_t c, uint32_t v) {
     const double *a = s->attributes + (size_t)s->channel_count * corner_wedge(s, c);
     for (uint32_t i = 0; i < s->channel_count; ++i) {
@@ -27,8 +25,7 @@ static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, 
     }
 }
 
-void fct_simplify_write_normal(const fct_simplifier *s, uint32_t point, float *n) {
-    if (point_is_locked(s, point)) return;
+void fct_simplify_write_normal(float *n) {
     v3 unit = v3_unit(v3_load(n));
     if (v3_norm2(unit) > 0) v3_store(n, unit);
 }
@@ -57,7 +54,7 @@ static uint32_t number_vertices(fct_simplifier *s, const uint32_t *places, uint3
 
 fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_mesh *out) {
     const fct_mesh *mesh = s->mesh;
-    uint32_t key_count = s->wedge_classes ? s->class_count : s->point_count;
+    uint32_t key_count = s->wedge_count;
     uint32_t *numbers = fct_allocate(s->env, key_count, sizeof *numbers);
     if (!numbers) return fct_fail_memory(s->env, "output vertices");
     uint32_t vertices = number_vertices(s, places, numbers, key_count);
@@ -80,7 +77,8 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
             out->triangles[3 * (size_t)to + k] = v;
             write_point(s, s->triangles[c], out->positions + 3 * (size_t)v);
             if (s->channel_count) write_attributes(s, out, 3 * to + k, c, v);
-            if (out->normals) fct_simplify_write_normal(s, s->triangles[c], out->normals + 3 * (size_t)v);
+            if (out->normals && !point_is_locked(s, s->triangles[c]))
+                fct_simplify_write_normal(out->normals + 3 * (size_t)v);
         }
         write_face(mesh, out, f, to++);
     }

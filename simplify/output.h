@@ -4,8 +4,8 @@
 
 #include "simplify/state.h"
 
-/* Gives a normal at a point unit length, unless the point is locked. */
-void fct_simplify_write_normal(const fct_simplifier *s, uint32_t point, float *n);
+/* Gives a normal unit length, if it has a length. */
+void fct_simplify_write_normal(float *n);
 
 /* Writes the live faces in the order of the input, with the arrays that the simplifier keeps
  * (facetree/simplify.h). places: per face of the

@@ -27,11 +27,11 @@ static fct_result fill_simplifier(fct_simplifier *s) {
 
 void fct_simplifier_destroy(fct_simplifier *s) {
     if (!s) return;
-    void *arrays[] = {s->point_of,      s->points,        s->point_parents, s->first_wedges, s->triangles,
-                      s->next_corners,  s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,
-                      s->quadrics,      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,
-                      s->wedge_classes, s->class_parents, s->link_marks,    s->side_marks,   s->refused,
-                      s->constraint_of, s->constraints,   s->lines,         s->scratches};
+    void *arrays[] = {s->point_of,      s->points,     s->point_parents, s->first_wedges, s->triangles,
+                      s->next_corners,  s->side_edges, s->corner_wedges, s->edges,        s->edge_flags,
+                      s->quadrics,      s->attributes, s->wedge_parents, s->next_wedges,  s->wedge_uses,
+                      s->wedge_classes, s->link_marks, s->side_marks,    s->refused,      s->constraint_of,
+                      s->constraints,   s->lines,      s->scratches};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_log_destroy(s->env, s->log);
     fct_release(s->env, s);

@@ -117,9 +117,7 @@ typedef struct fct_simplifier {
     double *quadrics;   /* x quadric_size, of the faces alone; NULL if no attribute steers */
     double *attributes; /* x channel_count; NULL without attributes */
     uint32_t *wedge_parents, *next_wedges, *wedge_uses;
-    uint32_t *wedge_classes; /* wedges of one class are one output vertex; resolve with class_parents */
-    uint32_t *class_parents;
-    uint32_t class_count;
+    uint32_t *wedge_classes; /* wedges of one class are one output vertex: a wedge's number (classes.h) */
 
     /* NULL if boundary_weight is 0 and nothing is locked. */
     uint32_t *constraint_of; /* per point: its constraint; FCT_NONE if nothing holds it */

@@ -23,13 +23,12 @@ typedef struct fct_progressive fct_progressive;
 
 /* fct_simplify, and the progressive mesh of its contractions, at its coarsest level (the base mesh).
  *
- * A level has the positions and attributes that the contractions gave, before the refit. (Where faces on both
- * sides of a texture seam share a vertex, its colour and normal may be those of the other side than in *out.)
- * The finest level is what the simplifier makes of the input before its first contraction: the same faces
- * with the same positions; equal vertices are one; normals have unit length, except those of locked points.
- * Faces are in the order in which the splits add them, and the arrays source_faces and source_uv are left
- * out. Every thread count gives the same bits. env must outlive *progressive. Errors: those of fct_simplify,
- * with *progressive = NULL. */
+ * A level has the positions and attributes that the contractions gave, before the refit. The finest level is
+ * what the simplifier makes of the input before its first contraction: the same faces with the same
+ * positions; equal vertices are one; normals have unit length, except those of locked points. Faces are in
+ * the order in which the splits add them, and the arrays source_faces and source_uv are left out. Every
+ * thread count gives the same bits. env must outlive *progressive. Errors: those of fct_simplify, with
+ * *progressive = NULL. */
 FCT_API fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh,
                                             const fct_simplify_def *def, fct_mesh *out,
                                             fct_simplify_stats *stats, fct_progressive **progressive);

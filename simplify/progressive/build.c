@@ -155,6 +155,7 @@ static fct_result run_builder(fct_builder *b) {
                                 FCT_ARRAY(b->first_corners, points),
                                 FCT_ARRAY(b->last_corners, points),
                                 FCT_ARRAY_ZERO(b->faces, points),
+                                FCT_ARRAY(b->locked, points),
                                 FCT_ARRAY(b->handle_nodes, handles),
                                 FCT_ARRAY_ZERO(b->uses, handles),
                                 FCT_ARRAY(b->handle_points, handles),

@@ -17,7 +17,7 @@ static void read_values(const fct_builder *b, size_t corner, uint32_t point, flo
     if (mesh->texcoords) memcpy(out + b->m->texcoord, mesh->texcoords + 2 * corner, 2 * sizeof *out);
     if (!mesh->normals) return;
     memcpy(out + b->m->normal, mesh->normals + 3 * v, 3 * sizeof *out);
-    fct_simplify_write_normal(b->s, point, out + b->m->normal);
+    if (!b->locked[point]) fct_simplify_write_normal(out + b->m->normal);
 }
 
 /* The values of an entry of the log, in the order of the nodes. */
@@ -31,7 +31,7 @@ static void read_logged(const fct_builder *b, size_t entry, uint32_t point, floa
                                                              : b->m->texcoord;
         out[first + channel->component] = from[i];
     }
-    if (b->m->normal != FCT_NONE) fct_simplify_write_normal(s, point, out + b->m->normal);
+    if (b->m->normal != FCT_NONE && !b->locked[point]) fct_simplify_write_normal(out + b->m->normal);
 }
 
 /* Starts a node of a handle at a point; the caller fills in position and values. */
@@ -67,6 +67,7 @@ static void start_corner(fct_builder *b, uint32_t c) {
 void fct_builder_start(fct_builder *b) {
     const fct_simplifier *s = b->s;
     memset(b->first_corners, 0xff, s->point_count * sizeof *b->first_corners);
+    memcpy(b->locked, b->log->locked, s->point_count * sizeof *b->locked);
     memset(b->merged, 0xff, b->handle_count * sizeof *b->merged);
     memset(b->handle_nodes, 0xff, b->handle_count * sizeof *b->handle_nodes);
     for (uint32_t h = 0; h < b->handle_count; ++h) b->wedge_handles[h] = h;
@@ -237,6 +238,7 @@ static fct_result replace_nodes(fct_builder *b, const fct_record *r) {
 fct_result fct_builder_repeat(fct_builder *b, const fct_record *r) {
     uint32_t first_removed = b->removed_count;
     b->ring_count = b->old_count = 0;
+    b->locked[r->kept] |= b->locked[r->gone];
     gather_ring(b, r->gone);
     if (r->body) gather_ring(b, r->kept);
     remove_faces(b, r);

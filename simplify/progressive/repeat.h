@@ -28,6 +28,7 @@ typedef struct fct_builder {
     /* Per face: it was removed, or it is degenerate. */
     bool *dead;
     /* Per point. */
+    bool *locked;
     uint32_t *first_corners, *last_corners, *faces;
     /* Per handle. */
     uint32_t *handle_nodes, *uses, *handle_points, *wedge_handles, *merged; /* merged: FCT_NONE: not merged */

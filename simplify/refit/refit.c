@@ -12,6 +12,7 @@
 #include "simplify/refit/refit.h"
 
 #include "base/parallel.h"
+#include "simplify/classes.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/nearest.h"
 #include "simplify/refit/measure.h"
@@ -211,7 +212,7 @@ static void move_points(fct_refit *r) {
 }
 
 /* Each attribute takes the full step, the mean residual, clamped to the input's range. Those of locked points
- * stay. */
+ * stay, and classes stay equal. */
 static void move_attributes(fct_refit *r) {
     fct_simplifier *s = r->s;
     uint32_t n = s->channel_count;
@@ -227,6 +228,8 @@ static void move_attributes(fct_refit *r) {
             *a = fct_min(fct_max(moved, s->channels[i].lower), s->channels[i].upper);
         }
     }
+    for (uint32_t p = 0; p < s->point_count && n; ++p)
+        if (point_at(s, p)->valence > 0) fct_classes_unify(s, p);
 }
 
 /* The corners of face f of the input were contracted to these points. */

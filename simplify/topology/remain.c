@@ -3,10 +3,11 @@
  * 1. List the remaining faces with their new normals. A face that turns too far or loses its area ends the
  *    test. If a is a hub, of its faces only those at the neighbours of b are listed.
  * 2. Each face marks its two edges from the moved point. The second face of an edge is compared with the
- * first: they may be equal, or folded onto each other. A third face may be the start of a non-manifold edge.
+ *    first: they may be equal, or folded onto each other. A third face may be the start of a non-manifold
+ *    edge.
  * 3. A face that turned by more than 4 degrees in a contraction, or at all in the refit, is compared with the
- * face across its third side, which does not move. Cost: O(faces), plus the valence of a neighbour per turned
- * face and per face at a hub.
+ *    face across its third side, which does not move.
+ * Cost: O(faces), plus the valence of a neighbour per turned face and per face at a hub.
  */
 #include "simplify/topology/remain.h"
 

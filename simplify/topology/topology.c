@@ -170,14 +170,14 @@ static fct_result make_wedges(fct_simplifier *s) {
     size_t corners = 3 * (size_t)mesh->face_count;
     s->corner_wedges = fct_allocate_zero(s->env, corners, sizeof *s->corner_wedges);
     uint32_t *class_of = fct_allocate(s->env, mesh->vertex_count, sizeof *class_of);
+    uint32_t *first_of = NULL, class_count = s->point_count; /* per class: its first wedge */
     fct_result result = s->corner_wedges && class_of ? FCT_OK : fct_fail_memory(s->env, "wedges");
     if (result != FCT_OK) goto done;
     memcpy(class_of, s->point_of, mesh->vertex_count * sizeof *class_of);
-    s->class_count = s->point_count;
     if (mesh->colors || mesh->normals)
-        result = number_keys(s, write_vertex_key, s->point_of, mesh->vertex_count, class_of, &s->class_count);
+        result = number_keys(s, write_vertex_key, s->point_of, mesh->vertex_count, class_of, &class_count);
     if (result != FCT_OK) goto done;
-    s->wedge_count = s->class_count;
+    s->wedge_count = class_count;
     if (mesh->texcoords)
         result =
             number_keys(s, write_corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
@@ -186,23 +186,29 @@ static fct_result make_wedges(fct_simplifier *s) {
     if (result != FCT_OK) goto done;
 
     const fct_array arrays[] = {
-        FCT_ARRAY(s->first_wedges, s->point_count),       FCT_ARRAY(s->wedge_parents, s->wedge_count),
-        FCT_ARRAY(s->next_wedges, s->wedge_count),        FCT_ARRAY_ZERO(s->wedge_uses, s->wedge_count),
-        FCT_ARRAY_ZERO(s->wedge_classes, s->wedge_count), FCT_ARRAY(s->class_parents, s->class_count)};
+        FCT_ARRAY(s->first_wedges, s->point_count), FCT_ARRAY(s->wedge_parents, s->wedge_count),
+        FCT_ARRAY(s->next_wedges, s->wedge_count), FCT_ARRAY_ZERO(s->wedge_uses, s->wedge_count),
+        FCT_ARRAY_ZERO(s->wedge_classes, s->wedge_count)};
     result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "wedges");
+    if (result != FCT_OK) goto done;
+    first_of = fct_allocate(s->env, class_count, sizeof *first_of);
+    result = first_of ? FCT_OK : fct_fail_memory(s->env, "wedges");
     if (result != FCT_OK) goto done;
     memset(s->first_wedges, 0xff, s->point_count * sizeof *s->first_wedges);
     for (uint32_t w = 0; w < s->wedge_count; ++w) s->wedge_parents[w] = w;
-    for (uint32_t k = 0; k < s->class_count; ++k) s->class_parents[k] = k;
+    memset(first_of, 0xff, class_count * sizeof *first_of);
     for (uint32_t c = 0; c < corners; ++c) {
         if (corner_dead(s, c)) continue;
         uint32_t w = s->corner_wedges[c], p = s->triangles[c];
         if (s->wedge_uses[w]++) continue;
-        s->wedge_classes[w] = class_of[mesh->triangles[c]];
+        uint32_t class = class_of[mesh->triangles[c]];
+        if (first_of[class] == FCT_NONE) first_of[class] = w;
+        s->wedge_classes[w] = first_of[class];
         s->next_wedges[w] = s->first_wedges[p];
         s->first_wedges[p] = w;
     }
 done:
+    fct_release(s->env, first_of);
     fct_release(s->env, class_of);
     return result;
 }

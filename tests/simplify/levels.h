@@ -6,8 +6,7 @@
 #include "shapes.h"
 
 /* A face as floats: per corner position, texture coordinates, colour and normal; then face colour and
- * material. With texture coordinates the colours and normals of corners are left out: a vertex on a seam has
- * several wedges, and fct_simplify writes the last one, but a progressive mesh the first one. */
+ * material. */
 enum { FACE_WORDS = 37 };
 
 static inline void describe_face(const fct_mesh *mesh, uint32_t f, float *to) {
@@ -16,7 +15,6 @@ static inline void describe_face(const fct_mesh *mesh, uint32_t f, float *to) {
         size_t c = 3 * (size_t)f + k, v = mesh->triangles[c];
         memcpy(to, mesh->positions + 3 * v, 12);
         if (mesh->texcoords) memcpy(to + 9, mesh->texcoords + 2 * c, 8);
-        if (mesh->texcoords) continue;
         if (mesh->colors) memcpy(to + 3, mesh->colors + 3 * v, 12);
         if (mesh->normals) memcpy(to + 6, mesh->normals + 3 * v, 12);
     }
@@ -118,6 +116,49 @@ static inline fct_mesh make_torus(const fct_env *env, uint32_t n, bool hard, boo
     }
     mesh.material_count = 2;
     mesh.origin[1] = 1000;
+    return mesh;
+}
+
+/* A grid of n x n squares whose columns are flat and rough in turn, ten each, and needles on flat ones. A
+ * needle is three faces at a vertex of the grid that it shares; its texture coordinates are its own:
+ *
+ *     p--q--r--s
+ *      \ | | /
+ *       \||/
+ *     ---v-----   the grid
+ *
+ * In a sweep over blocks, needles go before the cheaper edges of v if those lie in two blocks. */
+static inline fct_mesh make_needles(const fct_env *env, uint32_t n) {
+    enum { BAND = 10, EVERY = 8 };
+    fct_mesh grid = make_grid(env, n), mesh;
+    uint32_t points = grid.vertex_count, needles = points / EVERY, faces = grid.face_count, random = 1;
+    assert_int_equal(
+        fct_mesh_create(env, points + 4 * needles, faces + 3 * needles, FCT_MESH_TEXCOORDS, &mesh), FCT_OK);
+    memcpy(mesh.positions, grid.positions, 12 * (size_t)points);
+    memcpy(mesh.triangles, grid.triangles, 12 * (size_t)faces);
+    for (uint32_t v = 0; v < points; ++v) {
+        random = random * 1664525u + 1013904223u;
+        if (v % (n + 1) / BAND % 2)
+            mesh.positions[3 * v + 2] = .02f * (float)(random >> 8) / (float)(1 << 24);
+    }
+    for (uint32_t i = 0; i < needles; ++i) {
+        uint32_t v = i * EVERY, first = points + 4 * i;
+        while (v % (n + 1) / BAND % 2) v = (v + BAND + 1) % points;
+        for (uint32_t k = 0; k < 4; ++k) {
+            float *p = mesh.positions + 3 * (first + k);
+            memcpy(p, mesh.positions + 3 * v, 12);
+            p[0] += .002f * ((float)k - 1.5f), p[1] += .0006f * (float)(k * k);
+            p[2] += .002f * (.2f + (float)(i * 7 % 31) / 31);
+        }
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t t[3] = {v, first + k, first + k + 1};
+            memcpy(mesh.triangles + 3 * (faces + 3 * i + k), t, sizeof t);
+        }
+    }
+    for (uint32_t c = 0; c < 3 * mesh.face_count; ++c)
+        for (uint32_t k = 0; k < 2; ++k)
+            mesh.texcoords[2 * c + k] = (c < 3 * faces ? 0 : 2) + mesh.positions[3 * mesh.triangles[c] + k];
+    fct_mesh_release(env, &grid);
     return mesh;
 }
 

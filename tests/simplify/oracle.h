@@ -137,6 +137,17 @@ static inline fct_mesh make_sheet(const fct_env *env, unsigned arrays, uint64_t 
     return mesh;
 }
 
+/* Three faces, duplicates of two of them, and a face without area. */
+static inline fct_mesh make_slivers(const fct_env *env) {
+    static const float p[18] = {0, 0, 0, 1, 0, .2f, 1, 1, 0, 0, 1, .1f, 2, 0, .4f, .5f, 0, .1f};
+    static const uint32_t t[18] = {0, 1, 2, 0, 2, 3, 1, 2, 0, 1, 4, 2, 0, 5, 1, 3, 0, 2};
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(env, 6, 6, 0, &mesh), FCT_OK);
+    memcpy(mesh.positions, p, sizeof p);
+    memcpy(mesh.triangles, t, sizeof t);
+    return mesh;
+}
+
 enum {
     ALL_ARRAYS =
         FCT_MESH_COLORS | FCT_MESH_NORMALS | FCT_MESH_TEXCOORDS | FCT_MESH_MATERIALS | FCT_MESH_FACE_COLORS

@@ -52,6 +52,29 @@ static void one_triangle(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Nothing else covers what a contraction of flat open faces takes, so it is an error, also without the checks
+ * of faces. */
+static void flat_open_faces_stay_within_the_error(void **state) {
+    (void)state;
+    const float p[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+    for (uint32_t faces = 1; faces <= 2; ++faces)
+        for (int checked = 0; checked < 2; ++checked) {
+            fct_mesh mesh = make(4, faces);
+            memcpy(mesh.positions, p, sizeof p);
+            for (uint32_t f = 0; f < faces; ++f) set_face(&mesh, f, 0, f + 1, f + 2);
+            fct_simplify_def def = fct_simplify_def_default();
+            def.boundary_weight = 0;
+            def.max_error = 1e-6;
+            def.check_foldover = checked;
+            fct_simplify_stats stats;
+            fct_mesh out = simplified(&env, &mesh, &def, &stats);
+            assert_int_equal(out.face_count, faces);
+            assert_int_equal(stats.stopped_because, FCT_STOP_ERROR);
+            fct_mesh_release(&env, &out);
+            fct_mesh_release(&env, &mesh);
+        }
+}
+
 static void degenerate_faces(void **state) {
     (void)state;
     /* Faces with all corners at one place, with repeated ids, and with corners in line. */
@@ -375,6 +398,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_empty_mesh_stays_empty),
         cmocka_unit_test(one_triangle),
+        cmocka_unit_test(flat_open_faces_stay_within_the_error),
         cmocka_unit_test(degenerate_faces),
         cmocka_unit_test(a_hub_of_a_hundred_thousand_faces),
         cmocka_unit_test(an_edge_of_a_hundred_thousand_faces),

@@ -12,6 +12,11 @@ static uint32_t roll(uint32_t *seed) {
     return *seed >> 8;
 }
 
+static uint32_t roll_below(uint32_t *seed, uint32_t total) {
+    uint64_t high = roll(seed), low = roll(seed);
+    return (uint32_t)((high << 16 ^ low) % total);
+}
+
 /* Bytes of COUNT bits that are 1 with the probability `ones`, with one model. *part: the part that is. */
 static double code_bits(double ones, double *part) {
     bool bits[COUNT];
@@ -56,7 +61,7 @@ static void uniform_values_cost_their_logarithm(void **state) {
         fct_coder coder = {.env = &env}, reader;
         fct_coder_begin_writing(&coder, &env);
         for (int i = 0; i < COUNT; ++i) {
-            uint32_t value = (uint32_t)(((uint64_t)roll(&seed) << 16 ^ roll(&seed)) % total);
+            uint32_t value = roll_below(&seed, total);
             fct_code_uniform(&coder, total, i == 0 ? 0 : i == 1 ? total - 1 : value);
         }
         assert_int_equal(fct_coder_end_writing(&coder), FCT_OK);
@@ -65,14 +70,21 @@ static void uniform_values_cost_their_logarithm(void **state) {
         seed = 3;
         fct_coder_begin_reading(&reader, coder.bytes, coder.count);
         for (int i = 0; i < COUNT; ++i) {
-            uint32_t value = (uint32_t)(((uint64_t)roll(&seed) << 16 ^ roll(&seed)) % total);
+            uint32_t value = roll_below(&seed, total);
             assert_int_equal(fct_code_uniform(&reader, total, 0), i == 0 ? 0 : i == 1 ? total - 1 : value);
         }
         assert_true(fct_coder_end_reading(&reader));
-        /* Without its last bytes the stream is too short, and with one more too long. */
-        fct_coder_begin_reading(&reader, coder.bytes, coder.count - (total > 1));
-        for (int i = 0; i < COUNT; ++i) fct_code_uniform(&reader, total, 0);
-        assert_true(total == 1 || !fct_coder_end_reading(&reader));
+        /* Without its last byte the stream is too short (but not if it has no values), with one more too
+         * long. */
+        for (int change = total > 1 ? -1 : 1; change < 2; change += 2) {
+            size_t count = coder.count + (size_t)change;
+            unsigned char *bytes = calloc(count, 1);
+            memcpy(bytes, coder.bytes, count < coder.count ? count : coder.count);
+            fct_coder_begin_reading(&reader, bytes, count);
+            for (int i = 0; i < COUNT; ++i) fct_code_uniform(&reader, total, 0);
+            assert_false(fct_coder_end_reading(&reader));
+            free(bytes);
+        }
         fct_coder_release(&coder);
     }
 }
@@ -103,11 +115,11 @@ static void numbers_and_floats_come_back(void **state) {
     fct_coder_release(&coder);
 }
 
-/* Any bytes give values in their range. */
+/* Any bytes give values in their range, also counts of bits above 32. */
 static void garbage_stays_in_range(void **state) {
     (void)state;
     unsigned char bytes[400];
-    uint32_t seed = 1;
+    uint32_t seed = 1, largest = 0;
     for (int run = 0; run < 50; ++run) {
         for (size_t i = 0; i < sizeof bytes; ++i) bytes[i] = (unsigned char)(run ? roll(&seed) >> 9 : 255);
         fct_coder reader;
@@ -116,7 +128,17 @@ static void garbage_stays_in_range(void **state) {
             uint32_t total = i % 2 ? 3 + i * i * i : 3 + i;
             assert_true(fct_code_uniform(&reader, total, 0) < total);
         }
+        /* Bytes of 255 begin with a count of 63 bits, which counts as 32. */
+        fct_number_models models;
+        fct_models_begin(models.classes, CODER_CLASSES);
+        fct_coder_begin_reading(&reader, bytes, sizeof bytes);
+        for (int i = 0; i < 50; ++i) {
+            uint32_t number = fct_code_number(&reader, &models, 0);
+            if (run == 0 && i == 0) assert_true(number >> 31);
+            if (number > largest) largest = number;
+        }
     }
+    assert_true(largest > 1u << 31);
 }
 
 int main(void) {

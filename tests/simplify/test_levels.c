@@ -49,6 +49,41 @@ static void attributes_follow(void **state) {
     }
 }
 
+/* Locked vertices are in each level, with the bits of the input. */
+static void locks_hold_in_levels(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 4; ++kind) {
+        fct_mesh torus = make_torus(&env, 10, kind & 1, kind & 2);
+        uint8_t *locks = calloc(torus.vertex_count, 1);
+        for (uint32_t v = 0; v < torus.vertex_count; ++v) locks[v] = v % 23 == 0;
+        for (uint32_t i = 0; i < 3 * torus.vertex_count; ++i) torus.normals[i] *= .5f; /* no unit length */
+        fct_simplify_def def = fct_simplify_def_default();
+        def.locks = locks;
+        check_levels(&torus, def);
+        fct_progressive *progressive = progressive_of(&env, &torus, def, 0);
+        for (uint32_t faces = 0; faces <= torus.face_count; faces += torus.face_count / 4) {
+            fct_mesh level = level_mesh(progressive, faces);
+            for (uint32_t c = 0; c < 3 * torus.face_count; ++c) {
+                size_t v = torus.triangles[c];
+                bool found = !locks[v];
+                for (uint32_t k = 0; k < 3 * level.face_count && !found; ++k) {
+                    size_t w = level.triangles[k];
+                    found =
+                        !memcmp(level.positions + 3 * w, torus.positions + 3 * v, 12) &&
+                        !memcmp(level.colors + 3 * w, torus.colors + 3 * v, 12) &&
+                        !memcmp(level.normals + 3 * w, torus.normals + 3 * v, 12) &&
+                        (!level.texcoords || !memcmp(level.texcoords + 2 * k, torus.texcoords + 2 * c, 8));
+                }
+                assert_true(found);
+            }
+            fct_mesh_release(&env, &level);
+        }
+        fct_progressive_destroy(progressive);
+        free(locks);
+        fct_mesh_release(&env, &torus);
+    }
+}
+
 /* Any way to a level gives the same bytes, also from a file of the same progressive mesh. */
 static void levels_do_not_depend_on_the_way(void **state) {
     (void)state;
@@ -130,7 +165,7 @@ static void blocks_are_joined_in_order(void **state) {
     env.thread_count = 0;
 }
 
-/* A single quad of two triangles contracts to nothing; bodies that touch nothing vanish and come back. */
+/* Five tetrahedra and one triangle, apart from each other: each vanishes as a whole, and comes back. */
 static void bodies_vanish_and_come_back(void **state) {
     (void)state;
     enum { BODIES = 5 };
@@ -207,6 +242,7 @@ int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {cmocka_unit_test(levels_are_simplifications),
                                        cmocka_unit_test(attributes_follow),
+                                       cmocka_unit_test(locks_hold_in_levels),
                                        cmocka_unit_test(levels_do_not_depend_on_the_way),
                                        cmocka_unit_test(levels_are_found_by_their_error),
                                        cmocka_unit_test(blocks_are_joined_in_order),

@@ -76,7 +76,8 @@ static void loads_what_was_saved(void **state) {
                          make_cube(&env, 8),
                          make_torus(&env, 12, false, false),
                          make_torus(&env, 12, false, true),
-                         make_torus(&env, 12, true, true)};
+                         make_torus(&env, 12, true, true),
+                         make_needles(&env, 80)};
     for (size_t i = 0; i < FCT_LENGTH(meshes); ++i) {
         check_round_trip(&meshes[i], 0);
         check_round_trip(&meshes[i], meshes[i].face_count / 3);

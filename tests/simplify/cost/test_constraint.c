@@ -123,12 +123,7 @@ static void strong_seams_are_held_like_boundaries(void **state) {
 /* A duplicate of a boundary face leaves its open sides open; a face without area adds nothing. */
 static void duplicates_and_slivers(void **state) {
     (void)state;
-    fct_mesh mesh;
-    assert_int_equal(fct_mesh_create(&env, 6, 6, 0, &mesh), FCT_OK);
-    const float p[18] = {0, 0, 0, 1, 0, .2f, 1, 1, 0, 0, 1, .1f, 2, 0, .4f, .5f, 0, .1f};
-    const uint32_t t[18] = {0, 1, 2, 0, 2, 3, 1, 2, 0, 1, 4, 2, 0, 5, 1, 3, 0, 2};
-    memcpy(mesh.positions, p, sizeof p);
-    memcpy(mesh.triangles, t, sizeof t);
+    fct_mesh mesh = make_slivers(&env);
     fct_simplify_def def = fct_simplify_def_default();
     check_points(&mesh, &def);
     fct_mesh_release(&env, &mesh);
