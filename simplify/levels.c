@@ -21,6 +21,7 @@ static void report_fit(const fct_simplifier *s, const fct_fit *fit, fct_simplify
     stats->color_rms = sqrt(sums[CHANNEL_COLOR] / 3);
     stats->normal_rms = sqrt(sums[CHANNEL_NORMAL]);
     stats->texcoord_rms = sqrt(sums[CHANNEL_TEXCOORD]);
+    stats->lost_area = fit->lost;
 }
 
 /* Contracts a mesh, and builds its progressive mesh if that is not NULL. */

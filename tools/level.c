@@ -107,13 +107,13 @@ int tool_level(int argc, char **argv) {
         .summary = "write a level of a progressive mesh",
         .text =
             "IN is a progressive mesh, which 'facetree simplify --progressive' writes; OUT is a mesh. A "
-            "level is "
-            "the "
-            "result of 'facetree simplify --refit 0', and the finest level has the faces of the input. Of a "
-            "truncated file the coarse levels can be read.\n\n"
+            "level "
+            "has the positions and attributes of the contractions, which are not fitted to the input. If the "
+            "input has up to about 8,000 faces more than the level, it has the faces of 'facetree simplify "
+            "--refit 0'; else other ones with about the same error. The finest level has the faces of the "
+            "input. Of a truncated file the coarse levels can be read.\n\n"
             "JSON keys: faces, vertices, least_faces and most_faces (of the levels that were read), "
-            "total_faces "
-            "(of the finest level), splits, max_cost (the largest error of a contraction), "
+            "total_faces (of the finest level), splits, max_cost (the largest error of a contraction), "
             "seconds{read, level, write, total}, peak_bytes.",
         .examples = "  facetree level bunny.fpm --faces 5000 -o small.ply\n"
                     "  facetree level bunny.fpm --ratio .5 -o half.glb",

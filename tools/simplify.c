@@ -209,18 +209,21 @@ static const char *const stop_reasons[] = {
 
 /* The keys of one result, without times. */
 static json_t *pack_result(const fct_mesh *mesh, const fct_simplify_stats *s) {
-    return json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "faces_before",
+    return json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "faces_before",
                      (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after, "vertices",
                      (json_int_t)mesh->vertex_count, "stopped_because", stop_reasons[s->stopped_because],
                      "max_cost", s->max_cost, "distance_rms", s->distance_rms, "distance_max",
                      s->distance_max, "color_rms", s->color_rms, "uv_rms", s->texcoord_rms, "normal_rms",
-                     s->normal_rms);
+                     s->normal_rms, "lost_area", s->lost_area);
 }
 
 static void say_result(tool *t, const char *path, const fct_simplify_stats *s) {
-    tool_say(t, "%s%s%u faces to %u (stopped by %s), distance %.3g (largest %.3g), %.2f s", path ? path : "",
-             path ? ": " : "", s->faces_before, s->faces_after, stop_reasons[s->stopped_because],
-             s->distance_rms, s->distance_max, tool_seconds() - t->start);
+    char lost[48] = "";
+    if (s->lost_area > 0) snprintf(lost, sizeof lost, ", %.2g %% of the area vanished", 100 * s->lost_area);
+    tool_say(t, "%s%s%u faces to %u (stopped by %s), distance %.3g (largest %.3g)%s, %.2f s",
+             path ? path : "", path ? ": " : "", s->faces_before, s->faces_after,
+             stop_reasons[s->stopped_because], s->distance_rms, s->distance_max, lost,
+             tool_seconds() - t->start);
 }
 
 static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_stats *s) {
@@ -360,20 +363,18 @@ int tool_simplify(int argc, char **argv) {
         .synopsis = "IN -o OUT",
         .summary = "reduce a mesh, keeping its shape and colours",
         .text =
-            "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. "
-            "If both are "
-            "glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
-            "counts once, "
-            "however many nodes place it. "
-            "Edges are contracted in the "
-            "order of their quadric error until the faces are as few as --faces or --ratio says, or "
-            "until the error would "
-            "exceed --max-error.\n\n"
-            "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or "
-            "exhausted), max_cost (the largest "
-            "error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms (errors "
-            "of the result), seconds{init, contract, refit, total}, peak_bytes. With --levels: levels[] with "
-            "these keys up to normal_rms and file, seconds{total}, peak_bytes.",
+            "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. If "
+            "both "
+            "are glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
+            "counts once, however many nodes place it. Edges are contracted in the order of their quadric "
+            "error "
+            "until the faces are as few as --faces or --ratio says, or until the error would exceed "
+            "--max-error.\n\n"
+            "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or exhausted), "
+            "max_cost (the largest error of a contraction), distance_rms, distance_max, color_rms, uv_rms, "
+            "normal_rms (errors of the result), lost_area (the share of the area of IN that has no faces in "
+            "OUT; the errors do not cover it), seconds{init, contract, refit, total}, peak_bytes. With "
+            "--levels: levels[] with these keys up to lost_area and file, seconds{total}, peak_bytes.",
         .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
                     "  facetree simplify bunny.obj --levels 20000,5000,1000 -o lod.ply\n"

@@ -94,6 +94,9 @@ typedef struct fct_simplify_stats {
     double color_rms;    /* of one component */
     double texcoord_rms; /* length of the difference of (u, v); 0 if the mesh has no such attribute */
     double normal_rms;   /* length of the difference of normals, before they get unit length */
+    /* The share of the input's area (0 to 1) that these errors do not cover, because the result has no faces
+     * there: bodies that vanished, and corners that lost their last face. */
+    double lost_area;
     double seconds_init, seconds_contract, seconds_refit;
 } fct_simplify_stats;
 

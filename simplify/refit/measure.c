@@ -51,6 +51,25 @@ static void measure_samples(void *user, size_t begin, size_t end, size_t chunk, 
     }
 }
 
+/* The share of the area at points without faces: a third of each face counts at each corner. Not of samples,
+ * because these may skip a body. */
+static double find_lost(const fct_simplifier *s) {
+    double lost = 0, all = 0;
+    for (uint32_t f = 0; f < s->mesh->face_count; ++f) {
+        v3 ends[3];
+        uint32_t gone = 0;
+        if (is_degenerate(s, f)) continue;
+        for (uint32_t k = 0; k < 3; ++k) {
+            ends[k] = find_input_position(s, 3 * f + k);
+            uint32_t p = s->point_of[s->mesh->triangles[3 * (size_t)f + k]];
+            gone += point_at(s, s->point_parents[p])->valence == 0;
+        }
+        double area = find_area(ends);
+        lost += area * gone / 3, all += area;
+    }
+    return all > 0 ? lost / all : 0;
+}
+
 fct_result fct_refit_measure(const fct_refit *r, size_t samples, fct_fit *out) {
     const fct_simplifier *s = r->s;
     size_t chunks = fct_chunk_count(samples, CHUNK);
@@ -67,6 +86,7 @@ fct_result fct_refit_measure(const fct_refit *r, size_t samples, fct_fit *out) {
     fct_release(s->env, m.parts);
     *out =
         (fct_fit){.distance2 = all.weight > 0 ? all.distance2 / all.weight : 0, .farthest2 = all.farthest2};
+    out->lost = find_lost(s);
     for (uint32_t i = 0; i < s->channel_count && all.channel_weight > 0; ++i)
         out->channels2[i] = all.channels2[i] / all.channel_weight;
     return FCT_OK;

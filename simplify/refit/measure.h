@@ -8,6 +8,7 @@
  * The mean square of the difference of each channel, times its factor. */
 typedef struct fct_fit {
     double distance2, farthest2, channels2[SIMPLIFY_MAX_CHANNELS];
+    double lost; /* the share of the input's area at points without faces in the result */
 } fct_fit;
 
 /* Compares the samples with the points on which they landed. Errors: MEMORY. */

@@ -60,11 +60,64 @@ static void errors_are_those_of_a_bump(void **state) {
     /* one component: the mean over light, 2 light and 3 light squared */
     assert_true(fabs(stats.color_rms - light * sqrt(14 / 3. * share)) < 1e-5);
     assert_true(fabs(stats.texcoord_rms - .2 * sqrt(share)) < 1e-5);
-    assert_true(stats.normal_rms == 0);
+    assert_true(stats.normal_rms == 0 && stats.lost_area == 0);
     fct_mesh_release(&env, &out);
     def.target_faces = mesh.face_count; /* nothing to do, no error */
     out = simplified(&env, &mesh, &def, &stats);
     assert_true(stats.distance_rms == 0 && stats.distance_max == 0 && stats.color_rms == 0);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
+/* Tetrahedra with legs of 1 to 5: their areas are as the squares of these. The smaller ones vanish first. */
+static void the_area_of_vanished_bodies_is_lost(void **state) {
+    (void)state;
+    enum { BODIES = 5 };
+    static const uint32_t faces[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 4 * BODIES, 4 * BODIES, 0, &mesh), FCT_OK);
+    for (uint32_t i = 0; i < BODIES; ++i) {
+        float size = 1 + (float)i;
+        for (uint32_t v = 0; v < 4; ++v)
+            for (uint32_t k = 0; k < 3; ++k)
+                mesh.positions[3 * (4 * i + v) + k] = (v == k + 1 ? size : 0) + (k == 0 ? 10 * size : 0);
+        for (uint32_t c = 0; c < 12; ++c) mesh.triangles[12 * i + c] = 4 * i + faces[c];
+    }
+    for (uint32_t left = 0; left <= BODIES; ++left) {
+        fct_simplify_def def = fct_simplify_def_default();
+        def.target_faces = 4 * left;
+        fct_simplify_stats stats;
+        fct_mesh out = simplified(&env, &mesh, &def, &stats);
+        assert_int_equal(out.face_count, 4 * left);
+        double lost = 0;
+        for (uint32_t size = 1; size <= BODIES - left; ++size) lost += size * size / 55.;
+        assert_float_equal(stats.lost_area, lost, 1e-6);
+        assert_true(stats.distance_max < 1e-6);
+        fct_mesh_release(&env, &out);
+    }
+    fct_mesh_release(&env, &mesh);
+}
+
+/* Two triangles that share a vertex, of the areas 8 and 1/2. The shortest side of the small one goes, and
+ * with it two of its corners. */
+static void a_lost_corner_counts_a_third(void **state) {
+    (void)state;
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 5, 2, 0, &mesh), FCT_OK);
+    const float p[15] = {0, 0, 0, 4, 0, 0, 4, 4, 0, 6, 4, 0, 6, 4.5f, 0};
+    const uint32_t t[6] = {0, 1, 2, 2, 3, 4};
+    memcpy(mesh.positions, p, sizeof p);
+    memcpy(mesh.triangles, t, sizeof t);
+    fct_simplify_def def = fct_simplify_def_default();
+    def.target_faces = 1;
+    fct_simplify_stats stats;
+    fct_mesh out = simplified(&env, &mesh, &def, &stats);
+    assert_int_equal(out.face_count, 1);
+    assert_float_equal(stats.lost_area, 2 / 3. * .5 / 8.5, 1e-12);
+    fct_mesh_release(&env, &out);
+    def.target_faces = 0;
+    out = simplified(&env, &mesh, &def, &stats);
+    assert_true(stats.lost_area == 1 && stats.distance_max == 0);
     fct_mesh_release(&env, &out);
     fct_mesh_release(&env, &mesh);
 }
@@ -152,8 +205,8 @@ static void levels_continue_one_run(void **state) {
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_are_those_of_a_bump),
-        cmocka_unit_test(blocks_give_the_same_on_all_threads),
+        cmocka_unit_test(errors_are_those_of_a_bump),   cmocka_unit_test(the_area_of_vanished_bodies_is_lost),
+        cmocka_unit_test(a_lost_corner_counts_a_third), cmocka_unit_test(blocks_give_the_same_on_all_threads),
         cmocka_unit_test(levels_continue_one_run),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

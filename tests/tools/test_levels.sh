@@ -48,7 +48,7 @@ leftovers
 finish
 # several levels in one run
 expect 0 simplify sphere.off --levels .5,300,60 -o chain.ply --json
-keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because max_cost distance_rms distance_max color_rms uv_rms normal_rms file
+keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because max_cost distance_rms distance_max color_rms uv_rms normal_rms lost_area file
 holds "$("$program" info chain-1.ply --json | sed -n 's/.*"faces": \([0-9]*\).*/\1/p' | head -n 1) == 760"
 expect 0 simplify sphere.off --ratio .5 -o half.ply
 check "the first level is that of a run of its own" cmp -s half.ply chain-1.ply
