@@ -34,7 +34,7 @@ FCT_API fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *
                                             fct_simplify_stats *stats, fct_progressive **progressive);
 
 /* Writes a progressive mesh. Replaces the file as a whole. Does not change the level. Errors: OUTPUT, MEMORY,
- * CANCELLED. */
+ * CANCELLED; DATA, if a level has values that a file cannot have: infinite ones, or errors that fall. */
 FCT_API fct_result fct_progressive_save(fct_progressive *progressive, const char *path);
 /* Reads a file, at its coarsest level. Of a file that ends too early, the complete blocks of splits are read,
  * and a warning says so; an incomplete base mesh is an error. "-" is standard input. Errors: INPUT, DATA,

@@ -100,6 +100,9 @@ static fct_result write_blocks(fct_splits *k, FILE *stream) {
         fct_coder_begin_writing(&k->coder, m->env);
         for (uint32_t i = 0; i < steps; ++i) {
             fct_result result = fct_splits_step(k);
+            if (result == FCT_ERROR_DATA)
+                return fct_fail(m->env, result, "level %" PRIu32 " has values that a file cannot have",
+                                k->step);
             if (result != FCT_OK) return result;
         }
         fct_result result = fct_coder_end_writing(&k->coder);

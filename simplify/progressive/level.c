@@ -100,10 +100,10 @@ typedef struct level_mesh {
     fct_progressive *m;
     fct_mesh *out;
     uint32_t vertex_count;
-    uint32_t *nodes; /* per vertex */
-    uint32_t *next;  /* per vertex: the vertex before it at the same point */
-    uint32_t least;  /* of a geomorph: the nodes below exist in the coarser level */
-    double t;        /* 1: no geomorph */
+    uint32_t *nodes;     /* per vertex */
+    uint32_t *next;      /* per vertex: the vertex before it at the same point */
+    uint32_t *ancestors; /* of a geomorph: per node that of the coarser level; else NULL */
+    double t;            /* 1: no geomorph */
 } level_mesh;
 
 static bool same_floats(const float *a, const float *b) {
@@ -140,10 +140,18 @@ static void number_vertices(level_mesh *l) {
     }
 }
 
-/* The node of the coarser level that a node belongs to. */
+/* The nodes of the coarser level that nodes belong to. Those below `least` exist there. A parent comes before
+ * its children. */
+static void find_ancestors(level_mesh *l, uint32_t least) {
+    const fct_progressive *m = l->m;
+    for (uint32_t n = 0; n < m->step_nodes[m->level]; ++n) {
+        uint32_t parent = m->parents[n];
+        l->ancestors[n] = n < least || parent == FCT_NONE ? n : l->ancestors[parent];
+    }
+}
+
 static uint32_t find_ancestor(const level_mesh *l, uint32_t node) {
-    while (l->t < 1 && node >= l->least && l->m->parents[node] != FCT_NONE) node = l->m->parents[node];
-    return node;
+    return l->ancestors ? l->ancestors[node] : node;
 }
 
 static void blend_floats(const level_mesh *l, const float *a, const float *b, size_t count, float *out) {
@@ -196,14 +204,16 @@ static fct_result fill_mesh(level_mesh *l) {
 }
 
 static fct_result make_mesh(fct_progressive *m, uint32_t least, double t, fct_mesh *out) {
-    level_mesh l = {.m = m, .out = out, .least = least, .t = t};
+    level_mesh l = {.m = m, .out = out, .t = t};
     size_t corners = 3 * (size_t)m->step_faces[m->level];
     const fct_array arrays[] = {FCT_ARRAY(l.nodes, corners),
-                                FCT_ARRAY(l.next, m->texcoord == FCT_NONE ? 0 : corners)};
+                                FCT_ARRAY(l.next, m->texcoord == FCT_NONE ? 0 : corners),
+                                FCT_ARRAY_IF(t < 1, l.ancestors, m->step_nodes[m->level])};
     *out = (fct_mesh){0};
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a level");
     if (result != FCT_OK) return result;
     number_vertices(&l);
+    if (l.ancestors) find_ancestors(&l, least);
     result = fill_mesh(&l);
     for (size_t c = 0; c < corners; ++c) {
         m->vertices[m->triangles[c]] = FCT_NONE;

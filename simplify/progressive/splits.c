@@ -10,6 +10,7 @@
  */
 #include "simplify/progressive/splits.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -102,11 +103,12 @@ static void find_split(const fct_progressive *m, uint32_t *split, uint32_t *born
             *born = m->points[n];
 }
 
-/* The writer's position of a point in the step that it has just done. */
+/* The writer's position of a point in the step that it has just done, which has a node there. */
 static const float *find_position(const fct_progressive *m, uint32_t point) {
-    for (uint32_t n = m->step_nodes[m->level - 1]; n < m->step_nodes[m->level]; ++n)
-        if (m->points[n] == point) return m->positions + 3 * (size_t)n;
-    return m->positions;
+    uint32_t n = m->step_nodes[m->level - 1], end = m->step_nodes[m->level];
+    while (n < end && m->points[n] != point) ++n;
+    assert(n < end);
+    return m->positions + 3 * (size_t)n;
 }
 
 /* Codes the point that splits, its new position and the new point: opposite to it. */
