@@ -46,32 +46,26 @@ static const struct argp_option simplify_options_table[] = {
     {"ratio", KEY_RATIO, "R", 0, "Stop at R times the faces of the input, above 0 and at most 1", 0},
     {"levels", KEY_LEVELS, "LIST", 0,
      "Write several levels in one run, such as 100000,10000,1000: faces, or ratios below 1, in descending "
-     "order. "
-     "With -o small.ply they are small-1.ply, small-2.ply and so on",
+     "order. With -o small.ply they are small-1.ply, small-2.ply and so on",
      0},
     {"max-error", KEY_MAX_ERROR, "E", 0,
      "Make no contraction whose error is above E, a distance in the mesh's unit: the root mean square from "
-     "the "
-     "planes of the faces and of the boundary (default: no limit)",
+     "the planes of the faces and of the boundary (default: no limit)",
      0},
     {"attributes", KEY_ATTRIBUTES, "LIST", 0,
      "The attributes that count in the error, with optional weights, such as color=.02,uv=.1,normal=.01; "
-     "none: "
-     "only the shape counts. Default: all attributes of the mesh; uv and normal have the weights of this "
-     "example, "
-     "color has 2 / sqrt(faces of the result), at most .1",
+     "none: only the shape counts. Default: all attributes of the mesh; uv and normal have the weights of "
+     "this example, color has 2 / sqrt(faces of the result), at most .1",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
-     "midpoint) or subset "
-     "(either end)",
+     "midpoint) or subset (either end)",
      0},
     {"weights", KEY_WEIGHTS, "HOW", 0,
      "How much a face weighs at its corners: area (default), angle or uniform (the same for all faces)", 0},
     {"boundary", KEY_BOUNDARY, "W", 0,
      "How many times the squared distance of boundaries and borders from their place counts, relative to "
-     "that of "
-     "the surface; 0: nothing holds them (default 3)",
+     "that of the surface; 0: nothing holds them (default 3)",
      0},
     {"feature-threshold", KEY_FEATURE, "T", 0,
      "Two faces whose colours differ by more than T in |dr| + |dg| + |db| make a border (default .1; inf: "
