@@ -12,7 +12,6 @@
 #include "simplify/refit/refit.h"
 
 #include "base/parallel.h"
-#include "simplify/classes.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/nearest.h"
 #include "simplify/refit/measure.h"
@@ -211,25 +210,55 @@ static void move_points(fct_refit *r) {
     }
 }
 
-/* Each attribute takes the full step, the mean residual, clamped to the input's range. Those of locked points
- * stay, and classes stay equal. */
-static void move_attributes(fct_refit *r) {
+/* The first wedge of a live point; FCT_NONE if the point has no faces. */
+static uint32_t find_first_wedge(const fct_simplifier *s, uint32_t point) {
+    return point_at(s, point)->valence > 0 ? s->first_wedges[point] : FCT_NONE;
+}
+
+/* Adds the residuals of the wedges of each class at the class's number, except those of texture coordinates.
+ */
+static void sum_classes(fct_refit *r) {
     fct_simplifier *s = r->s;
     uint32_t n = s->channel_count;
-    for (uint32_t p = 0; p < s->point_count && n && s->constraint_of; ++p)
-        for (uint32_t w = s->first_wedges[p];
-             point_at(s, p)->valence > 0 && point_is_locked(s, p) && w != FCT_NONE; w = s->next_wedges[w])
-            r->weights[w] = 0;
-    for (uint32_t w = 0; w < s->wedge_count && n; ++w) {
-        if (!(r->weights[w] > 0)) continue;
-        for (uint32_t i = 0; i < n; ++i) {
-            double *a = &s->attributes[(size_t)n * w + i];
-            double moved = *a + r->sums[(size_t)n * w + i] / r->weights[w];
-            *a = fct_min(fct_max(moved, s->channels[i].lower), s->channels[i].upper);
+    for (uint32_t p = 0; p < s->point_count; ++p)
+        for (uint32_t w = find_first_wedge(s, p); w != FCT_NONE; w = s->next_wedges[w]) {
+            uint32_t class = s->wedge_classes[w];
+            if (class == w) continue;
+            r->weights[class] += r->weights[w];
+            for (uint32_t i = 0; i < n; ++i)
+                if (s->channels[i].source != CHANNEL_TEXCOORD)
+                    r->sums[(size_t)n * class + i] += r->sums[(size_t)n * w + i];
         }
-    }
-    for (uint32_t p = 0; p < s->point_count && n; ++p)
-        if (point_at(s, p)->valence > 0) fct_classes_unify(s, p);
+}
+
+/* Moves the texture coordinates, or else the other attributes, of all wedges. */
+static void move_channels(fct_refit *r, bool texcoords) {
+    fct_simplifier *s = r->s;
+    uint32_t n = s->channel_count;
+    for (uint32_t p = 0; p < s->point_count; ++p)
+        for (uint32_t w = find_first_wedge(s, p); w != FCT_NONE; w = s->next_wedges[w]) {
+            uint32_t from = texcoords ? w : s->wedge_classes[w];
+            for (uint32_t i = 0; i < n && r->weights[from] > 0; ++i) {
+                if ((s->channels[i].source == CHANNEL_TEXCOORD) != texcoords) continue;
+                double *a = &s->attributes[(size_t)n * w + i];
+                double moved = *a + r->sums[(size_t)n * from + i] / r->weights[from];
+                *a = fct_min(fct_max(moved, s->channels[i].lower), s->channels[i].upper);
+            }
+        }
+}
+
+/* Each attribute takes the full step, the mean residual, clamped to the input's range. Those of locked points
+ * stay. The wedges of a class share a step, so they stay equal. */
+static void move_attributes(fct_refit *r) {
+    fct_simplifier *s = r->s;
+    if (!s->channel_count) return;
+    for (uint32_t p = 0; p < s->point_count && s->constraint_of; ++p)
+        for (uint32_t w = find_first_wedge(s, p); point_is_locked(s, p) && w != FCT_NONE;
+             w = s->next_wedges[w])
+            r->weights[w] = 0;
+    move_channels(r, true);
+    sum_classes(r);
+    move_channels(r, false);
 }
 
 /* The corners of face f of the input were contracted to these points. */
