@@ -26,6 +26,7 @@ bool fct_splits_check_count(fct_splits *k, size_t count) {
 
 void fct_splits_append_corner(fct_splits *k, uint32_t point, uint32_t c) {
     stream_point *p = &k->points[point];
+    if (k->recent) k->recent[k->m->triangles[c]] = c;
     k->next[c] = FCT_NONE;
     k->previous[c] = p->last;
     if (p->last == FCT_NONE)
@@ -227,8 +228,9 @@ void fct_splits_code_point_corner(fct_splits *k, size_t c, uint32_t point) {
         code_new_handle(k, c, m->nodes[first], point);
         return;
     }
-    uint32_t other = k->names ? p->first : 0;
-    while (k->names && m->triangles[other] != wanted) other = k->next[other];
+    uint32_t other = k->names ? k->recent[wanted] : 0;
+    if (k->names && (p->count <= STREAM_LIST || other == FCT_NONE || m->triangles[other] != wanted))
+        for (other = p->first; m->triangles[other] != wanted;) other = k->next[other];
     if (p->count > STREAM_LIST)
         other = fct_code_uniform(&k->coder, 3 * (uint32_t)(c / 3), other);
     else {

@@ -39,6 +39,7 @@ typedef struct fct_splits {
     uint32_t point_count;
     uint32_t *names;           /* a writer's: per point of m its number in `points`; NULL: this is a reader */
     bool *coded;               /* a writer's: per node */
+    uint32_t *recent;          /* a writer's: per handle a corner that had it once; FCT_NONE: none */
     uint32_t *next, *previous; /* per corner: in the list of its point */
     /* Room of the arrays that grow while reading. */
     struct {

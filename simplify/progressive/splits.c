@@ -284,12 +284,16 @@ fct_result fct_splits_write(fct_progressive *m, fct_splits **out) {
     if (result != FCT_OK) return result;
     fct_splits *k = *out;
     size_t corners = 3 * (size_t)m->face_count;
-    const fct_array arrays[] = {FCT_ARRAY(k->points, m->point_count), FCT_ARRAY(k->names, m->point_count),
-                                FCT_ARRAY(k->next, corners), FCT_ARRAY(k->previous, corners),
-                                FCT_ARRAY_ZERO(k->coded, m->node_count)};
+    const fct_array arrays[] = {FCT_ARRAY(k->points, m->point_count),
+                                FCT_ARRAY(k->names, m->point_count),
+                                FCT_ARRAY(k->next, corners),
+                                FCT_ARRAY(k->previous, corners),
+                                FCT_ARRAY_ZERO(k->coded, m->node_count),
+                                FCT_ARRAY(k->recent, m->handle_count)};
     result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a progressive mesh");
     if (result == FCT_OK) {
         memset(k->names, 0xff, m->point_count * sizeof *k->names);
+        memset(k->recent, 0xff, m->handle_count * sizeof *k->recent);
         return FCT_OK;
     }
     fct_splits_close(k);
@@ -315,7 +319,7 @@ fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face
 void fct_splits_close(fct_splits *k) {
     if (!k) return;
     fct_coder_release(&k->coder);
-    void *arrays[] = {k->points, k->names, k->next, k->previous, k->ring, k->coded};
+    void *arrays[] = {k->points, k->names, k->next, k->previous, k->ring, k->coded, k->recent};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(k->m->env, arrays[i]);
     fct_release(k->m->env, k);
 }

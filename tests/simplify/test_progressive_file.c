@@ -69,6 +69,26 @@ static void check_round_trip(const fct_mesh *mesh, uint32_t faces) {
     fct_progressive_destroy(read);
 }
 
+/* A cone whose tip has more corners than a list of the stream names; two faces share texture coordinates
+ * there.
+ */
+static fct_mesh make_cone(uint32_t n) {
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, n + 1, n, FCT_MESH_TEXCOORDS, &mesh), FCT_OK);
+    for (uint32_t v = 0; v <= n; ++v) {
+        double a = 2 * 3.14159265358979 * v / n;
+        const float p[3] = {v < n ? (float)cos(a) : 0, v < n ? (float)sin(a) : 0, v == n};
+        memcpy(mesh.positions + 3 * v, p, sizeof p);
+    }
+    for (uint32_t f = 0; f < n; ++f) {
+        const uint32_t t[3] = {n, f, (f + 1) % n};
+        const float uv[6] = {(float)(f / 2), 0, (float)f, 1, (float)f + 1, 1};
+        memcpy(mesh.triangles + 3 * f, t, sizeof t);
+        memcpy(mesh.texcoords + 6 * f, uv, sizeof uv);
+    }
+    return mesh;
+}
+
 static void loads_what_was_saved(void **state) {
     (void)state;
     fct_mesh meshes[] = {make_sphere(&env, 20),
@@ -77,7 +97,8 @@ static void loads_what_was_saved(void **state) {
                          make_torus(&env, 12, false, false),
                          make_torus(&env, 12, false, true),
                          make_torus(&env, 12, true, true),
-                         make_needles(&env, 80)};
+                         make_needles(&env, 80),
+                         make_cone(300)};
     for (size_t i = 0; i < FCT_LENGTH(meshes); ++i) {
         check_round_trip(&meshes[i], 0);
         check_round_trip(&meshes[i], meshes[i].face_count / 3);
