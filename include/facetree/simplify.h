@@ -87,8 +87,9 @@ typedef struct fct_simplify_stats {
     fct_stop stopped_because;
     double max_cost; /* the largest error of a contraction that was made, as max_error measures it */
     /* Errors of the result: root mean square, by area, over samples of the input (vertices and centroids of
-     * faces, at least 16 per vertex of the result if there are as many), and the largest. A sample's distance
-     * is that to the faces of the result around it, so the nearest one may be nearer. In units of the mesh.
+     * faces: up to 12 per vertex of the result all of them, then one of eight, and at most 32), and the
+     * largest. A sample's distance is that to the faces of the result around it, so the nearest one may be
+     * nearer. In units of the mesh.
      */
     double distance_rms, distance_max;
     double color_rms;    /* of one component */
