@@ -132,7 +132,7 @@ static v3 solve_damped(const fct_system *system) {
     double d = xx * zz - xz * xz, e = xy * xz - xx * yz, f = xx * yy - xy * xy;
     return (v3){(a * g[0] + b * g[1] + c * g[2]) / det, (b * g[0] + d * g[1] + e * g[2]) / det,
                 (c * g[0] + e * g[1] + f * g[2]) / det};
-};
+}
 
 /* Adds the planes that hold a point. */
 static void add_planes(const fct_simplifier *s, const fct_constraint *held, v3 at, fct_system *system) {
