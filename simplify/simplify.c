@@ -1,4 +1,4 @@
-/* simplify/simplify.c: the public function: checks the input and runs the phases.
+/* simplify/simplify.c: the public functions without a handle: check the input and run the phases.
  *
  * 1. Sort the input along a curve (topology/curve.c).
  * 2. Create points, wedges, edges and quadrics (simplifier.c).
@@ -7,13 +7,13 @@
  * 5. Refit the remaining points (refit.c).
  * 6. Write the output mesh (output.c).
  */
+#include "simplify/simplify.h"
+
 #include "simplify/contract.h"
 #include "simplify/log.h"
 #include "simplify/output.h"
 #include "simplify/progressive/build.h"
 #include "simplify/refit/refit.h"
-#include "simplify/simplifier.h"
-#include "simplify/topology/curve.h"
 
 fct_simplify_def fct_simplify_def_default(void) {
     return (fct_simplify_def){
@@ -36,11 +36,16 @@ static bool is_weight(double value) {
     return value == 0 || (value >= 1e-12 && value <= 1e12);
 }
 
-static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
-    if (def->size != sizeof *def)
-        return fct_fail(env, FCT_ERROR_DATA,
-                        "fct_simplify_def has size %u, expected %zu: fill it with fct_simplify_def_default",
-                        def->size, sizeof *def);
+static fct_result check_size(const fct_env *env, const fct_simplify_def *def) {
+    if (def->size == sizeof *def) return FCT_OK;
+    return fct_fail(env, FCT_ERROR_DATA,
+                    "fct_simplify_def has size %u, expected %zu: fill it with fct_simplify_def_default",
+                    def->size, sizeof *def);
+}
+
+fct_result fct_simplify_check(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
+    fct_result result = check_size(env, def);
+    if (result != FCT_OK) return result;
     if (!(def->max_error >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "max_error is %g, expected at least 0", def->max_error);
     const struct {
@@ -112,24 +117,55 @@ static void exchange(fct_simplifier *s, kept *k, bool restore) {
         memcpy(restore ? s->attributes : k->attributes, restore ? k->attributes : s->attributes, bytes);
 }
 
-/* Contracts, refits and writes a sorted mesh. keep: room for what the refit changes, which is then undone;
- * NULL: the refit stays. */
-static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out, bool measure,
-                                 fct_simplify_stats *stats, fct_progressive **progressive, kept *keep) {
+/* Refits and writes the mesh. keep: room for what the refit changes, which is then undone; NULL: the refit
+ * stays. */
+static fct_result write_refitted(fct_simplifier *s, fct_mesh *out, bool measure, fct_simplify_stats *stats,
+                                 kept *keep) {
     double start = fct_seconds();
     fct_fit fit = {0};
-    fct_result result = run_contractions(s, &stats->stopped_because, progressive);
-    double contracted = fct_seconds();
-    stats->seconds_contract = contracted - start;
+    fct_result result = FCT_OK;
     bool changed = s->live_faces < s->face_count;
-    if (result == FCT_OK && keep) exchange(s, keep, false);
-    if (result == FCT_OK && changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
-    if (result == FCT_OK) result = fct_simplify_output(s, places, out);
-    if (result == FCT_OK && keep) exchange(s, keep, true);
-    stats->seconds_refit = fct_seconds() - contracted;
+    if (keep) exchange(s, keep, false);
+    if (changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
+    if (result == FCT_OK) result = fct_simplify_output(s, s->sorted.places, out);
+    if (keep) exchange(s, keep, true);
+    stats->seconds_refit = fct_seconds() - start;
+    report_fit(s, &fit, stats);
+    return result;
+}
+
+/* Contracts, refits and writes a level. */
+static fct_result run_simplifier(fct_simplifier *s, fct_mesh *out, bool measure, fct_simplify_stats *stats,
+                                 fct_progressive **progressive, kept *keep) {
+    double start = fct_seconds();
+    fct_result result = run_contractions(s, &stats->stopped_because, progressive);
+    stats->seconds_contract = fct_seconds() - start;
+    if (result == FCT_OK) result = write_refitted(s, out, measure, stats, keep);
     stats->faces_after = out->face_count;
     stats->max_cost = sqrt(s->max_error2) * s->extent;
-    report_fit(s, &fit, stats);
+    return result;
+}
+
+static fct_result allocate_kept(const fct_simplifier *s, kept *k) {
+    const fct_array arrays[] = {FCT_ARRAY(k->positions, s->point_count),
+                                FCT_ARRAY(k->sources, s->point_count),
+                                FCT_ARRAY(k->attributes, (size_t)s->wedge_count * s->channel_count)};
+    return fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a copy of the positions");
+}
+
+static void release_kept(const fct_env *env, kept *k) {
+    fct_release(env, k->positions);
+    fct_release(env, k->sources);
+    fct_release(env, k->attributes);
+}
+
+fct_result fct_simplify_write(fct_simplifier *s, fct_mesh *out, fct_simplify_stats *stats) {
+    kept k;
+    fct_simplify_stats unused;
+    fct_result result = allocate_kept(s, &k);
+    if (result != FCT_OK) return result;
+    result = write_refitted(s, out, stats != NULL, stats ? stats : &unused, &k);
+    release_kept(s->env, &k);
     return result;
 }
 
@@ -143,44 +179,35 @@ typedef struct wanted {
 } wanted;
 
 /* Each level begins where the contractions of the level before ended, without its refit. */
-static fct_result run_levels(fct_simplifier *s, fct_simplify_def *def, const uint32_t *places,
-                             const wanted *w, const fct_simplify_stats *start) {
-    kept k;
+static fct_result run_levels(fct_simplifier *s, const wanted *w, const fct_simplify_stats *start) {
+    kept k = {0};
     bool several = w->count > 1;
-    const fct_array arrays[] = {
-        FCT_ARRAY_IF(several, k.positions, s->point_count), FCT_ARRAY_IF(several, k.sources, s->point_count),
-        FCT_ARRAY_IF(several, k.attributes, (size_t)s->wedge_count * s->channel_count)};
-    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "levels");
+    fct_result result = several ? allocate_kept(s, &k) : FCT_OK;
     for (uint32_t i = 0; i < w->count && result == FCT_OK; ++i) {
         fct_simplify_stats found = *start;
-        def->target_faces = w->target_faces[i];
-        result = run_simplifier(s, places, &w->out[i], w->stats != NULL, &found, w->progressive,
-                                several ? &k : NULL);
+        s->own.target_faces = w->target_faces[i];
+        result = run_simplifier(s, &w->out[i], w->stats != NULL, &found, w->progressive, several ? &k : NULL);
         if (result == FCT_OK && w->stats) w->stats[i] = found;
     }
-    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
+    release_kept(s->env, &k);
     return result;
 }
 
 static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                            const wanted *w) {
-    for (uint32_t i = 0; i < w->count; ++i) w->out[i] = (fct_mesh){0};
-    fct_result result = check_input(env, mesh, def);
-    if (result != FCT_OK) return result;
     double start = fct_seconds();
     fct_simplify_stats found = {.faces_before = mesh->face_count};
-    fct_sorted sorted;
-    result = fct_simplify_sort(env, mesh, def->locks, &sorted);
-    if (result != FCT_OK) return result;
-    fct_simplify_def own = *def;
-    own.locks = sorted.locks;
-    own.target_faces = w->target_faces[0];
     fct_simplifier *s;
-    result = fct_simplifier_create(env, &sorted.mesh, &own, &s);
+    for (uint32_t i = 0; i < w->count; ++i) w->out[i] = (fct_mesh){0};
+    fct_result result = check_size(env, def);
+    if (result != FCT_OK) return result;
+    fct_simplify_def first = *def;
+    first.target_faces = w->target_faces[0];
+    result = fct_simplifier_create(env, mesh, &first, &s);
+    if (result != FCT_OK) return result;
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = run_levels(s, &own, sorted.places, w, &found);
+    result = run_levels(s, w, &found);
     fct_simplifier_destroy(s);
-    fct_simplify_release_sorted(env, &sorted);
     for (uint32_t i = 0; i < w->count && result != FCT_OK; ++i) fct_mesh_release(env, &w->out[i]);
     return result;
 }

@@ -135,11 +135,19 @@ static void add_planes(const fct_simplifier *s, const fct_constraint *held, v3 a
     system[6] -= weight * g.x, system[7] -= weight * g.y, system[8] -= weight * g.z;
 }
 
+/* Adds the point constraints of a point. */
+static void add_pins(const double pins[10], v3 at, double system[9]) {
+    v3 g = quadric_gradient(pins, at);
+    for (int k = 0; k < 6; ++k) system[k] += pins[k];
+    system[6] -= g.x, system[7] -= g.y, system[8] -= g.z;
+}
+
 /* The step of a point, as far as its constraint allows it. */
 static v3 find_step(const fct_refit *r, uint32_t point) {
     const fct_simplifier *s = r->s;
     const fct_constraint *held = constraint_at(s, point);
     double *q = r->systems[point];
+    if (point_is_pinned(s, point)) add_pins(s->pins[point], point_position(s, point), q);
     if (!held) return v3_scale(solve_damped(q), STEP);
     if (held->hold >= HOLD_POINT) return (v3){0, 0, 0};
     if (held->hold == HOLD_LINE) {

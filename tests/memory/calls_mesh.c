@@ -1,4 +1,4 @@
-/* tests/memory/calls_mesh.c: calls of base.h, mesh.h, dual.h, simplify.h and progressive.h. */
+/* tests/memory/calls_mesh.c: calls of base.h, mesh.h, dual.h, simplify.h, simplifier.h and progressive.h. */
 #include "tests/memory/calls.h"
 
 static fct_result check_simd(const fct_env *env) {
@@ -304,6 +304,56 @@ static fct_result write_morph(const fct_env *env) {
     return result;
 }
 
+static fct_result create_simplifier(const fct_env *env) {
+    fct_simplifier *s;
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_result result = STARVE(fct_simplifier_create(env, &inputs.sheet, &def, &s));
+    assert_int_equal(s == NULL, result != FCT_OK);
+    fct_simplifier_destroy(s);
+    return result;
+}
+
+/* A simplifier of `env` after one run. */
+static fct_simplifier *make_simplifier(const fct_env *env) {
+    fct_simplifier *s;
+    fct_simplify_def def = fct_simplify_def_default();
+    assert_int_equal(fct_simplifier_create(env, &inputs.sheet, &def, &s), FCT_OK);
+    assert_int_equal(fct_simplifier_run(s, 40, INFINITY, NULL), FCT_OK);
+    return s;
+}
+
+static fct_result run_simplifier(const fct_env *env) {
+    fct_simplifier *s = make_simplifier(env);
+    uint32_t before = fct_simplifier_faces(s);
+    fct_result result = STARVE(fct_simplifier_run(s, 10, INFINITY, NULL));
+    assert_int_equal(fct_simplifier_faces(s) == before, result != FCT_OK);
+    fct_simplifier_destroy(s);
+    return result;
+}
+
+static fct_result write_simplifier(const fct_env *env) {
+    fct_mesh mesh;
+    fct_simplifier *s = make_simplifier(env);
+    fct_result result = STARVE(fct_simplifier_mesh(s, true, &mesh, NULL));
+    fct_simplifier_destroy(s);
+    return finish_mesh(env, &mesh, result);
+}
+
+static fct_result save_simplifier(const fct_env *env) {
+    fct_simplifier *s = make_simplifier(env);
+    fct_result result = STARVE(fct_simplifier_save(s, OUT "sheet.fst"));
+    fct_simplifier_destroy(s);
+    return result;
+}
+
+static fct_result load_simplifier(const fct_env *env) {
+    fct_simplifier *s;
+    fct_result result = STARVE(fct_simplifier_load(env, IN "sheet.fst", &s));
+    assert_int_equal(s == NULL, result != FCT_OK);
+    fct_simplifier_destroy(s);
+    return result;
+}
+
 const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_writer_open", "", open_writer, false},
                                   {"fct_writer_close", "", close_writer, false},
@@ -344,6 +394,11 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_simplify", "", simplify, false},
                                   {"fct_simplify_levels", "", simplify_levels, false},
                                   {"fct_simplify_progressive", "", simplify_progressive, false},
+                                  {"fct_simplifier_create", "", create_simplifier, false},
+                                  {"fct_simplifier_run", "", run_simplifier, false},
+                                  {"fct_simplifier_mesh", "", write_simplifier, false},
+                                  {"fct_simplifier_save", "", save_simplifier, false},
+                                  {"fct_simplifier_load", "", load_simplifier, false},
                                   {"fct_progressive_save", "", save_progressive, false},
                                   {"fct_progressive_load", "", load_progressive, false},
                                   {"fct_progressive_mesh", "", write_level, false},

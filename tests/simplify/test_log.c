@@ -56,7 +56,7 @@ static void sorted_contractions_have_the_same_surroundings(void **state) {
     def.target_faces = 100;
     fct_simplifier *s;
     fct_stop stop;
-    assert_int_equal(fct_simplifier_create(&env, &torus, &def, &s), FCT_OK);
+    assert_int_equal(fct_simplifier_build(&env, &torus, &def, &s), FCT_OK);
     assert_int_equal(fct_log_create(s), FCT_OK);
     assert_int_equal(fct_simplify_contract(s, &stop), FCT_OK);
     uint32_t count = s->log->count, later = 0;
