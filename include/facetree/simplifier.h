@@ -60,7 +60,7 @@ FCT_API fct_result fct_simplifier_mesh(fct_simplifier *s, bool refit, fct_mesh *
  * would have left with `faces` as its target. So it has at most `faces` faces, and all of the beginning if
  * that has fewer. Does nothing if the mesh has as many faces. The state is restored bit by bit: a run that is
  * repeated gives the same bytes, and the state after undo(N) is that after run(N). Weights and constraints
- * stay: the result is as if the caller had painted and constrained there. Cost: at most that of a
+ * stay: the result is as if the caller had painted and then constrained there. Cost: at most that of a
  * simplification from twice as many faces, or from the last change of weights or constraints. After an error
  * nothing has changed. Errors: DATA (after fct_simplifier_forget), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplifier_undo(fct_simplifier *s, uint32_t faces);

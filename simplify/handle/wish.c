@@ -14,10 +14,11 @@ fct_result fct_wishes_copy(const fct_simplifier *s, fct_wishes *out) {
 
 fct_result fct_wishes_apply(fct_simplifier *s, const fct_wishes *wishes) {
     size_t known = s->mark_count;
-    fct_result result = fct_mark_add(s, wishes->marks + known, wishes->mark_count - known);
+    fct_result result = FCT_OK;
     bool same = !s->paint == !wishes->paint &&
                 (!s->paint || !memcmp(s->paint, wishes->paint, s->point_count * sizeof *s->paint));
-    return result == FCT_OK && !same ? fct_paint_points(s, wishes->paint) : result;
+    if (!same) result = fct_paint_points(s, wishes->paint);
+    return result == FCT_OK ? fct_mark_add(s, wishes->marks + known, wishes->mark_count - known) : result;
 }
 
 void fct_wishes_release(const fct_env *env, fct_wishes *wishes) {
