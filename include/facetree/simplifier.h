@@ -34,6 +34,8 @@ FCT_API void fct_simplifier_destroy(fct_simplifier *s);
 
 /* The current number of faces. At first: those of the input with three distinct points. */
 FCT_API uint32_t fct_simplifier_faces(const fct_simplifier *s);
+/* The faces of the mesh that was given to fct_simplifier_create. */
+FCT_API uint32_t fct_simplifier_input_faces(const fct_simplifier *s);
 
 /* Contracts until at most target_faces are left, or until every contraction has an error above max_error
  * (INFINITY: no limit). Does nothing if there are no more faces than that.

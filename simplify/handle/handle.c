@@ -55,6 +55,10 @@ uint32_t fct_simplifier_faces(const fct_simplifier *s) {
     return s->live_faces;
 }
 
+uint32_t fct_simplifier_input_faces(const fct_simplifier *s) {
+    return s->mesh->face_count;
+}
+
 /* A larger max_error allows edges again that were too expensive. */
 static void allow_edges(fct_simplifier *s) {
     for (uint32_t e = 0; e < s->edge_count; ++e)
