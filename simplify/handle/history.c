@@ -1,6 +1,9 @@
 /* simplify/handle/history.c: see history.h. */
 #include "simplify/handle/history.h"
 
+/* A state without attributes has 110 to 117 bytes per face that is left. */
+#define BYTES_PER_FACE 120
+
 void fct_history_cut(const fct_env *env, fct_history *history, size_t first) {
     while (history->count > first) fct_release(env, history->entries[--history->count].snapshot);
 }
@@ -26,7 +29,9 @@ void fct_history_add(fct_history *history, fct_history_entry run, fct_sink *snap
 
 fct_result fct_guard_open(fct_simplifier *s, fct_guard *guard) {
     *guard = (fct_guard){.bytes = {.env = s->env}};
-    fct_result result = fct_live_write(s, &guard->bytes);
+    size_t usual = (size_t)s->point_count * sizeof(uint32_t) + BYTES_PER_FACE * (size_t)s->live_faces;
+    fct_result result = fct_grow(s->env, (void **)&guard->bytes.data, &guard->bytes.capacity, usual, 1);
+    if (result == FCT_OK) result = fct_live_write(s, &guard->bytes);
     if (result != FCT_OK) return fct_fail_memory(s->env, "a way back");
     return fct_live_reserve(s, &guard->room);
 }
