@@ -89,6 +89,24 @@ static void malformed_states_are_harmless(void **state) {
     }
 }
 
+/* A ring that has one corner twice would never end. */
+static void corners_occur_once(void **state) {
+    (void)state;
+    fct_mesh sphere = make_sphere(&env, 6);
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_simplifier *s = made(&env, &sphere, &def);
+    state_bytes whole = state_of(s);
+    /* The head, the input, the live head and the roots; then the record of the first root, and its ring. */
+    size_t ring = 144 + 16 * (size_t)sphere.face_count + 16 * (size_t)sphere.vertex_count + 56 +
+                  4 * (size_t)sphere.vertex_count + 128;
+    memcpy(whole.data + ring + 4, whole.data + ring, 4);
+    mend_state(whole.data, whole.size);
+    check_refused(whole.data, whole.size, "a corner occurs twice");
+    free(whole.data);
+    fct_simplifier_destroy(s);
+    fct_mesh_release(&env, &sphere);
+}
+
 /* Counts that the file has no room for are refused before anything is allocated for them. */
 static void large_counts_need_large_files(void **state) {
     (void)state;
@@ -146,9 +164,11 @@ int main(void) {
     env = fct_env_default();
     env.message = recorder_message;
     env.message_user = &heard;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(truncated_and_damaged_files_are_refused),
-        cmocka_unit_test(malformed_states_are_harmless), cmocka_unit_test(large_counts_need_large_files),
-        cmocka_unit_test(failed_writes_change_no_file), cmocka_unit_test(sizes_follow_the_current_mesh)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(truncated_and_damaged_files_are_refused),
+                                       cmocka_unit_test(malformed_states_are_harmless),
+                                       cmocka_unit_test(corners_occur_once),
+                                       cmocka_unit_test(large_counts_need_large_files),
+                                       cmocka_unit_test(failed_writes_change_no_file),
+                                       cmocka_unit_test(sizes_follow_the_current_mesh)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -280,6 +280,30 @@ static void wishes_survive_the_way_back(void **state) {
     fct_mesh_release(&env, &ball);
 }
 
+/* Runs over few faces, of which only the first one would keep a snapshot without the paint between them. */
+static void runs_are_repeated_with_their_own_paint(void **state) {
+    (void)state;
+    fct_mesh ball = make_round(12);
+    fct_simplify_def def = fct_simplify_def_default();
+    uint32_t f = ball.face_count;
+    float *paint = malloc(ball.vertex_count * sizeof *paint);
+    for (uint32_t v = 0; v < ball.vertex_count; ++v) paint[v] = ball.positions[3 * v] > 0 ? 64 : 1;
+    fct_simplifier *s = made(&env, &ball, &def), *other = made(&env, &ball, &def);
+    for (int i = 0; i < 2; ++i) {
+        fct_simplifier *which = i ? other : s;
+        run_to(which, f - f / 10);
+        assert_int_equal(fct_simplifier_paint(which, FCT_PAINT_INPUT, paint, ball.vertex_count), FCT_OK);
+        run_to(which, f - f / 5);
+        run_to(which, i ? f - f / 4 : f - f / 3);
+    }
+    assert_int_equal(fct_simplifier_undo(s, f - f / 4), FCT_OK);
+    assert_true(has_state(s, state_of(other)));
+    free(paint);
+    fct_simplifier_destroy(s);
+    fct_simplifier_destroy(other);
+    fct_mesh_release(&env, &ball);
+}
+
 static recorder heard;
 
 static void check_refused(fct_simplifier *s, fct_constrain_def marks, const char *message) {
@@ -335,6 +359,7 @@ int main(void) {
                                        cmocka_unit_test(point_constraints_pull_by_their_quadric),
                                        cmocka_unit_test(pinned_points_stay),
                                        cmocka_unit_test(wishes_survive_the_way_back),
+                                       cmocka_unit_test(runs_are_repeated_with_their_own_paint),
                                        cmocka_unit_test(bad_constraints_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
