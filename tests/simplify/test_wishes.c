@@ -164,6 +164,30 @@ static void contours_stay(void **state) {
     fct_mesh_release(&env, &grid);
 }
 
+/* The planes of a contour that is marked after a contraction are those of one that is marked before. */
+static void late_contours_have_the_same_planes(void **state) {
+    (void)state;
+    fct_mesh ball = make_round(8);
+    fct_simplify_def def = fct_simplify_def_default();
+    fct_constrain_def marks = fct_constrain_def_default();
+    marks.contour = ball.triangles, marks.contour_count = 1, marks.contour_weight = .125;
+    fct_simplifier *early = made(&env, &ball, &def), *late = made(&env, &ball, &def);
+    assert_int_equal(fct_simplifier_constrain(early, &marks), FCT_OK);
+    run_to(late, ball.face_count - 2);
+    assert_int_equal(fct_simplifier_constrain(late, &marks), FCT_OK);
+    for (int k = 0; k < 2; ++k) {
+        uint32_t p = early->point_of[early->sorted.vertex_places[ball.triangles[k]]];
+        assert_int_equal(late->point_parents[p], p);
+        const double *a = early->constraints[early->constraint_of[p]].planes;
+        const double *b = late->constraints[late->constraint_of[p]].planes;
+        for (int i = 0; i < POSITION_QUADRIC; ++i) assert_true(fabs(a[i] - b[i]) <= 1e-9 * a[10]);
+        assert_true(a[10] > 0);
+    }
+    fct_simplifier_destroy(early);
+    fct_simplifier_destroy(late);
+    fct_mesh_release(&env, &ball);
+}
+
 /* The position of a contraction with a point constraint minimises the sum of both quadrics, w |v - p|^2 and
  * the midpoint's ridge: a 3 x 3 system from the paper. */
 static void point_constraints_pull_by_their_quadric(void **state) {
@@ -356,6 +380,7 @@ int main(void) {
                                        cmocka_unit_test(paint_acts_between_runs),
                                        cmocka_unit_test(equal_weights_change_nothing),
                                        cmocka_unit_test(contours_stay),
+                                       cmocka_unit_test(late_contours_have_the_same_planes),
                                        cmocka_unit_test(point_constraints_pull_by_their_quadric),
                                        cmocka_unit_test(pinned_points_stay),
                                        cmocka_unit_test(wishes_survive_the_way_back),
