@@ -158,6 +158,8 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     if (s->corner_wedges) merge_wedges(s, &g, candidate, a, first, second);
     add_quadric(point_at(s, a)->quadric, point_at(s, b)->quadric, POSITION_QUADRIC);
     fct_constraint_merge(s, a, b);
+    if (s->pins) add_quadric(s->pins[a], s->pins[b], POSITION_QUADRIC);
+    if (s->weights && s->weights[b] > s->weights[a]) s->weights[a] = s->weights[b];
     point_at(s, a)->at = candidate->at;
     if (s->log) fct_log_end(s, fct_candidate_error(candidate));
 }

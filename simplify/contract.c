@@ -123,7 +123,8 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
                       ? 0
                       : fct_loss_measure(s, a, b, count_a, count_b, candidate, &loss);
     if (cost > 0) {
-        candidate->error += cost, candidate->distance2 += cost, candidate->key += cost;
+        candidate->error += cost, candidate->distance2 += cost;
+        candidate->key += cost * paint_factor(s, a, b);
         if (!confirm_cost(s, e, ends, candidate)) return false;
     }
     fct_simplify_drop_edge(s, e);
@@ -152,6 +153,7 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
         refuse_edge(s, e, ends, EDGE_REFUSED);
         return false;
     }
+    candidate.key *= paint_factor(s, ends[0], ends[1]);
     if (!confirm_cost(s, e, ends, &candidate)) return false;
     if (!try_contraction(s, e, ends, &candidate)) return false;
     if (candidate.distance2 > 0) s->max_error2 = fct_max(s->max_error2, candidate.distance2 / candidate.area);
@@ -164,8 +166,10 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
     fct_simplifier *s = user;
     for (size_t e = begin; e < end; ++e) {
         fct_candidate candidate;
-        bool placed = fct_place(s, s->edges[e].ends[0], s->edges[e].ends[1], false, &candidate);
-        s->edges[e].bucket = (uint16_t)(placed ? queue_bucket(candidate.key) : 0);
+        const uint32_t *ends = s->edges[e].ends;
+        bool placed = fct_place(s, ends[0], ends[1], false, &candidate);
+        double key = placed ? candidate.key * paint_factor(s, ends[0], ends[1]) : 0;
+        s->edges[e].bucket = (uint16_t)queue_bucket(key);
     }
 }
 

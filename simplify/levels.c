@@ -54,42 +54,68 @@ static void exchange(fct_simplifier *s, kept *k, bool restore) {
         memcpy(restore ? s->attributes : k->attributes, restore ? k->attributes : s->attributes, bytes);
 }
 
-/* Contracts, refits and writes a sorted mesh. keep: room for what the refit changes, which is then undone;
- * NULL: the refit stays. */
-static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_mesh *out, bool measure,
-                                 fct_simplify_stats *stats, fct_progressive **progressive, kept *keep) {
+/* Refits and writes the mesh. keep: room for what the refit changes, which is then undone; NULL: the refit
+ * stays. */
+static fct_result write_refitted(fct_simplifier *s, fct_mesh *out, bool measure, fct_simplify_stats *stats,
+                                 kept *keep) {
     double start = fct_seconds();
     fct_fit fit = {0};
-    fct_result result = run_contractions(s, &stats->stopped_because, progressive);
-    double contracted = fct_seconds();
-    stats->seconds_contract = contracted - start;
+    fct_result result = FCT_OK;
     bool changed = s->live_faces < s->face_count;
-    if (result == FCT_OK && keep) exchange(s, keep, false);
-    if (result == FCT_OK && changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
-    if (result == FCT_OK) result = fct_simplify_output(s, places, out);
-    if (result == FCT_OK && keep) exchange(s, keep, true);
-    stats->seconds_refit = fct_seconds() - contracted;
-    stats->faces_after = out->face_count;
-    stats->max_cost = sqrt(s->max_error2) * s->extent;
+    if (keep) exchange(s, keep, false);
+    if (changed) result = fct_simplify_refit(s, measure ? &fit : NULL);
+    if (result == FCT_OK) result = fct_simplify_output(s, s->sorted.places, out);
+    if (keep) exchange(s, keep, true);
+    stats->seconds_refit = fct_seconds() - start;
     report_fit(s, &fit, stats);
     return result;
 }
 
-fct_result fct_simplify_run(fct_simplifier *s, fct_simplify_def *def, const uint32_t *places,
-                            const fct_wanted *w, const fct_simplify_stats *start) {
+/* Contracts, refits and writes a level. */
+static fct_result run_level(fct_simplifier *s, fct_mesh *out, bool measure, fct_simplify_stats *stats,
+                            fct_progressive **progressive, kept *keep) {
+    double start = fct_seconds();
+    fct_result result = run_contractions(s, &stats->stopped_because, progressive);
+    stats->seconds_contract = fct_seconds() - start;
+    if (result == FCT_OK) result = write_refitted(s, out, measure, stats, keep);
+    stats->faces_after = out->face_count;
+    stats->max_cost = sqrt(s->max_error2) * s->extent;
+    return result;
+}
+
+static fct_result allocate_kept(const fct_simplifier *s, kept *k) {
+    const fct_array arrays[] = {FCT_ARRAY(k->positions, s->point_count),
+                                FCT_ARRAY(k->sources, s->point_count),
+                                FCT_ARRAY(k->attributes, (size_t)s->wedge_count * s->channel_count)};
+    return fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a copy of the positions");
+}
+
+static void release_kept(const fct_env *env, kept *k) {
+    fct_release(env, k->positions);
+    fct_release(env, k->sources);
+    fct_release(env, k->attributes);
+}
+
+fct_result fct_simplify_write(fct_simplifier *s, fct_mesh *out, fct_simplify_stats *stats) {
     kept k;
+    fct_simplify_stats unused;
+    fct_result result = allocate_kept(s, &k);
+    if (result != FCT_OK) return result;
+    result = write_refitted(s, out, stats != NULL, stats ? stats : &unused, &k);
+    release_kept(s->env, &k);
+    return result;
+}
+
+fct_result fct_simplify_run(fct_simplifier *s, const fct_wanted *w, const fct_simplify_stats *start) {
+    kept k = {0};
     bool several = w->count > 1;
-    const fct_array arrays[] = {
-        FCT_ARRAY_IF(several, k.positions, s->point_count), FCT_ARRAY_IF(several, k.sources, s->point_count),
-        FCT_ARRAY_IF(several, k.attributes, (size_t)s->wedge_count * s->channel_count)};
-    fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "levels");
+    fct_result result = several ? allocate_kept(s, &k) : FCT_OK;
     for (uint32_t i = 0; i < w->count && result == FCT_OK; ++i) {
         fct_simplify_stats found = *start;
-        def->target_faces = w->target_faces[i];
-        result = run_simplifier(s, places, &w->out[i], w->stats != NULL, &found, w->progressive,
-                                several ? &k : NULL);
+        s->own.target_faces = w->target_faces[i];
+        result = run_level(s, &w->out[i], w->stats != NULL, &found, w->progressive, several ? &k : NULL);
         if (result == FCT_OK && w->stats) w->stats[i] = found;
     }
-    fct_release_all(s->env, arrays, FCT_LENGTH(arrays));
+    release_kept(s->env, &k);
     return result;
 }

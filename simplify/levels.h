@@ -15,9 +15,11 @@ typedef struct fct_wanted {
 } fct_wanted;
 
 /* Makes the results. Each level begins where the contractions of the level before ended, without its refit. s
- * is new, and def, which it uses, receives the targets. places: as for fct_simplify_output. start: the stats
- * so far. Errors: MEMORY, CANCELLED; results of earlier levels then remain: release them. */
-fct_result fct_simplify_run(fct_simplifier *s, fct_simplify_def *def, const uint32_t *places,
-                            const fct_wanted *w, const fct_simplify_stats *start);
+ * is new; its options receive the targets. start: the stats so far. Errors: MEMORY, CANCELLED; results of
+ * earlier levels then remain: release them. */
+fct_result fct_simplify_run(fct_simplifier *s, const fct_wanted *w, const fct_simplify_stats *start);
+/* Writes the mesh of a handle, with its refit, which is then undone. stats: NULL, or receives the errors of
+ * the result. On failure *out may be filled in part. Errors: MEMORY, CANCELLED. */
+fct_result fct_simplify_write(fct_simplifier *s, fct_mesh *out, fct_simplify_stats *stats);
 
 #endif

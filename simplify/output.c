@@ -52,6 +52,24 @@ static uint32_t number_vertices(fct_simplifier *s, const uint32_t *places, uint3
     return vertices;
 }
 
+fct_result fct_simplify_spread(fct_simplifier *s, const uint32_t *places, const float *values, uint32_t count,
+                               float *out) {
+    uint32_t key_count = s->wedge_count;
+    uint32_t *numbers = fct_allocate(s->env, key_count, sizeof *numbers);
+    if (!numbers) return fct_fail_memory(s->env, "output vertices");
+    uint32_t vertices = number_vertices(s, places, numbers, key_count);
+    memset(out, 0, s->point_count * sizeof *out);
+    for (uint32_t c = 0; c < 3 * s->mesh->face_count && vertices == count; ++c) {
+        if (corner_dead(s, c)) continue;
+        float value = values[numbers[find_vertex_key(s, c)]], *to = &out[s->triangles[c]];
+        *to = value > *to ? value : *to;
+    }
+    fct_release(s->env, numbers);
+    if (vertices == count) return FCT_OK;
+    return fct_fail(s->env, FCT_ERROR_DATA, "%u weights, expected %u, one per vertex of the current mesh",
+                    count, vertices);
+}
+
 fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_mesh *out) {
     const fct_mesh *mesh = s->mesh;
     uint32_t key_count = s->wedge_count;

@@ -1,4 +1,4 @@
-/* simplify/simplify.c: the public functions: check the input and run the phases.
+/* simplify/simplify.c: the public functions without a handle: check the input and run the phases.
  *
  * 1. Sort the input along a curve (topology/curve.c).
  * 2. Create points, wedges, edges and quadrics (simplifier.c).
@@ -8,9 +8,10 @@
  *    - refit the remaining points (refit.c);
  *    - write the output mesh (output.c).
  */
+#include "simplify/simplify.h"
+
 #include "simplify/levels.h"
 #include "simplify/simplifier.h"
-#include "simplify/topology/curve.h"
 
 fct_simplify_def fct_simplify_def_default(void) {
     return (fct_simplify_def){
@@ -33,11 +34,16 @@ static bool is_weight(double value) {
     return value == 0 || (value >= 1e-12 && value <= 1e12);
 }
 
-static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
-    if (def->size != sizeof *def)
-        return fct_fail(env, FCT_ERROR_DATA,
-                        "fct_simplify_def has size %u, expected %zu: fill it with fct_simplify_def_default",
-                        def->size, sizeof *def);
+static fct_result check_size(const fct_env *env, const fct_simplify_def *def) {
+    if (def->size == sizeof *def) return FCT_OK;
+    return fct_fail(env, FCT_ERROR_DATA,
+                    "fct_simplify_def has size %u, expected %zu: fill it with fct_simplify_def_default",
+                    def->size, sizeof *def);
+}
+
+fct_result fct_simplify_check(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def) {
+    fct_result result = check_size(env, def);
+    if (result != FCT_OK) return result;
     if (!(def->max_error >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "max_error is %g, expected at least 0", def->max_error);
     const struct {
@@ -69,23 +75,19 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
 
 static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                            const fct_wanted *w) {
-    for (uint32_t i = 0; i < w->count; ++i) w->out[i] = (fct_mesh){0};
-    fct_result result = check_input(env, mesh, def);
-    if (result != FCT_OK) return result;
     double start = fct_seconds();
     fct_simplify_stats found = {.faces_before = mesh->face_count};
-    fct_sorted sorted;
-    result = fct_simplify_sort(env, mesh, def->locks, &sorted);
-    if (result != FCT_OK) return result;
-    fct_simplify_def own = *def;
-    own.locks = sorted.locks;
-    own.target_faces = w->target_faces[0];
     fct_simplifier *s;
-    result = fct_simplifier_create(env, &sorted.mesh, &own, &s);
+    for (uint32_t i = 0; i < w->count; ++i) w->out[i] = (fct_mesh){0};
+    fct_result result = check_size(env, def);
+    if (result != FCT_OK) return result;
+    fct_simplify_def first = *def;
+    first.target_faces = w->target_faces[0];
+    result = fct_simplifier_create(env, mesh, &first, &s);
+    if (result != FCT_OK) return result;
     found.seconds_init = fct_seconds() - start;
-    if (result == FCT_OK) result = fct_simplify_run(s, &own, sorted.places, w, &found);
+    result = fct_simplify_run(s, w, &found);
     fct_simplifier_destroy(s);
-    fct_simplify_release_sorted(env, &sorted);
     for (uint32_t i = 0; i < w->count && result != FCT_OK; ++i) fct_mesh_release(env, &w->out[i]);
     return result;
 }

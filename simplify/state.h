@@ -19,9 +19,10 @@
 #include "base/env.h"
 #include "base/math/vec.h"
 #include "base/union_find.h"
-#include "facetree/simplify.h"
+#include "facetree/simplifier.h"
 #include "simplify/cost/quadric.h"
 #include "simplify/queue.h"
+#include "simplify/topology/curve.h"
 
 enum {
     SIMPLIFY_MAX_CHANNELS = QUADRIC_MAX_ATTRIBUTES,
@@ -78,6 +79,13 @@ typedef struct fct_point {
     double quadric[POSITION_QUADRIC]; /* of the planes of its faces, without attributes */
 } fct_point;
 
+/* A contour edge or a point constraint of the caller. */
+typedef struct fct_mark {
+    double weight;
+    double at[3];       /* of a point constraint, in the unit cube */
+    uint32_t points[2]; /* of the input; a point constraint has FCT_NONE as the second */
+} fct_mark;
+
 /* What one thread needs for the contraction of an edge. */
 typedef struct fct_scratch {
     fct_queue queue;
@@ -85,7 +93,7 @@ typedef struct fct_scratch {
     fct_remaining remaining[2 * SIMPLIFY_HUB];           /* the faces after the current move */
 } fct_scratch;
 
-typedef struct fct_simplifier {
+struct fct_simplifier {
     const fct_env *env;
     const fct_mesh *mesh;
     const fct_simplify_def *def;
@@ -125,7 +133,15 @@ typedef struct fct_simplifier {
     fct_line *lines;
     uint32_t constraint_count, line_count;
 
+    /* What the caller asks for between runs (handle/paint.h, handle/mark.h). */
+    float *paint;                     /* per point of the input: its weight; NULL: all 1 */
+    float *weights;                   /* per point: the largest of those it was contracted from; NULL */
+    double (*pins)[POSITION_QUADRIC]; /* per point: the sum of its point constraints; NULL: none */
+    struct fct_mark *marks;
+    size_t mark_count, mark_capacity;
+
     fct_scratch *scratches; /* one per thread */
+    uint32_t scratch_count;
     /* The scratch in use. */
     fct_queue *queue;
     uint32_t *ring_a, *ring_b;
@@ -145,7 +161,13 @@ typedef struct fct_simplifier {
     double max_error2;   /* largest squared error of a contraction that was made */
     bool priced;         /* the edges have their first costs */
     struct fct_log *log; /* log.h; NULL: nothing is recorded */
-} fct_simplifier;
+
+    /* Only of a handle (handle/): the sorted input, the options as given, and the snapshots for undo. */
+    fct_sorted sorted;
+    fct_simplify_def own, given;
+    double last_error; /* max_error of the run before */
+    struct fct_history *history;
+};
 
 static inline void use_scratch(fct_simplifier *s, fct_scratch *scratch) {
     s->queue = &scratch->queue;
@@ -192,6 +214,13 @@ static inline void write_point(const fct_simplifier *s, uint32_t point, float ou
         memcpy(out, s->mesh->positions + 3 * (size_t)source, 3 * sizeof *out);
     else
         store_written(s, point_position(s, point), out);
+}
+/* The factor of the cost of contracting a and b. */
+static inline double paint_factor(const fct_simplifier *s, uint32_t a, uint32_t b) {
+    return s->weights ? fct_max(s->weights[a], s->weights[b]) : 1;
+}
+static inline bool point_is_pinned(const fct_simplifier *s, uint32_t point) {
+    return s->pins && s->pins[point][0] > 0;
 }
 static inline uint32_t corner_wedge(fct_simplifier *s, uint32_t c) {
     return s->corner_wedges ? fct_sets_find(s->wedge_parents, s->corner_wedges[c]) : s->triangles[c];

@@ -46,7 +46,7 @@ function allowed(from, to) {
         sub(/\..*/, "", from)
         if (from == "facetree") next
         if (from == "collide") from = "bvh" # the second header of bvh/
-        if (from == "progressive") from = "simplify" # that of simplify/
+        if (from == "progressive" || from == "simplifier") from = "simplify" # that of simplify/
         if (target[1] != "facetree") fail("a public header includes a private one: " path)
     }
     if (parts < 2) { fail("an include without its folder: " path); next }
@@ -55,7 +55,7 @@ function allowed(from, to) {
         to = target[2]
         sub(/\..*/, "", to)
         if (to == "collide") to = "bvh"
-        if (to == "progressive") to = "simplify"
+        if (to == "progressive" || to == "simplifier") to = "simplify"
         # all subfolders of cluster/ know the types of fct_tree
         if (to == "cluster" && index(FILENAME, "cluster/") == 1) next
     } else {

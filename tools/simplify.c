@@ -11,6 +11,7 @@
 #include "tools/kit/file.h"
 #include "tools/kit/model.h"
 #include "tools/kit/options.h"
+#include "tools/wishes.h"
 
 enum { MOST_LEVELS = 32 };
 
@@ -19,6 +20,8 @@ typedef struct simplify_options {
     bool faces_given, error_given, attributes_given;
     double ratio; /* 0: not given */
     const char *progressive;
+    const char *resume, *save_state, *contour, *paint;
+    const char *shaping;        /* an option that a state has of its own; NULL: none was given */
     double weights[3];          /* of color, uv, normal; negative: the default; NAN: not in the list */
     double levels[MOST_LEVELS]; /* faces, or ratios below 1 */
     uint32_t level_count;
@@ -38,7 +41,11 @@ enum {
     KEY_TOPOLOGY,
     KEY_REFIT,
     KEY_PROGRESSIVE,
-    KEY_LEVELS
+    KEY_LEVELS,
+    KEY_RESUME,
+    KEY_SAVE_STATE,
+    KEY_CONTOUR,
+    KEY_PAINT
 };
 
 static const struct argp_option simplify_options_table[] = {
@@ -82,6 +89,19 @@ static const struct argp_option simplify_options_table[] = {
      "Also write a progressive mesh (.fpm): every level from the result, without refit, to the input. "
      "'facetree level' reads it",
      0},
+    {"save-state", KEY_SAVE_STATE, "FILE", 0,
+     "Also write the state (.fst): a later run with --resume goes on as if there had been no stop", 0},
+    {"resume", KEY_RESUME, "STATE", 0,
+     "Go on from a state instead of IN. It keeps its options; --faces, --ratio, --levels, --max-error, "
+     "--contour, --paint and --save-state may follow",
+     0},
+    {"contour", KEY_CONTOUR, "FILE", 0,
+     "Edges that hold like a boundary: two vertex numbers of IN per line, from 0", 0},
+    {"paint", KEY_PAINT, "FILE", 0,
+     "Weights from 1e-6 to 1e6 for the cost at each vertex, one per line: of IN or, with --resume, of the "
+     "mesh that was written with the state. A region of weight W keeps about the cube root of W times as "
+     "many faces",
+     0},
     {0}};
 
 static const char *const attribute_names[] = {"color", "uv", "normal", NULL};
@@ -124,6 +144,28 @@ static error_t parse_levels(simplify_options *o, char *list, struct argp_state *
     return 0;
 }
 
+/* Notes options that a state has of its own. */
+static void note_shaping(simplify_options *o, int key) {
+    static const int keys[] = {KEY_ATTRIBUTES, KEY_PLACEMENT,   KEY_WEIGHTS,  KEY_BOUNDARY, KEY_FEATURE,
+                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i)
+        for (const struct argp_option *option = simplify_options_table; keys[i] == key && option->name;
+             ++option)
+            if (option->key == key) o->shaping = option->name;
+}
+
+static error_t check_options(const simplify_options *o, struct argp_state *state) {
+    if (o->faces_given && o->ratio > 0)
+        return tool_usage(state, "expected either --faces or --ratio, found both");
+    if (o->level_count > 0 && (o->faces_given || o->ratio > 0 || o->progressive))
+        return tool_usage(state, "--levels: expected neither --faces, --ratio nor --progressive");
+    if (o->progressive && (o->resume || o->save_state || o->contour || o->paint))
+        return tool_usage(state,
+                          "--progressive: expected neither --resume, --save-state, --contour nor --paint");
+    if (o->resume && o->shaping) return tool_usage(state, "--resume: the state has its own --%s", o->shaping);
+    return 0;
+}
+
 static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
     static const char *const weightings[] = {"area", "angle", "uniform", NULL}; /* in the order of the enum */
@@ -132,6 +174,7 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     simplify_options *o = state->input;
     int index = 0;
     error_t error;
+    note_shaping(o, key);
     switch (key) {
     case KEY_FACES:
         o->faces_given = true;
@@ -170,12 +213,20 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_LEVELS:
         return parse_levels(o, text, state);
-    case ARGP_KEY_END:
-        if (o->faces_given && o->ratio > 0)
-            return tool_usage(state, "expected either --faces or --ratio, found both");
-        if (o->level_count > 0 && (o->faces_given || o->ratio > 0 || o->progressive))
-            return tool_usage(state, "--levels: expected neither --faces, --ratio nor --progressive");
+    case KEY_RESUME:
+        o->resume = text;
         return 0;
+    case KEY_SAVE_STATE:
+        o->save_state = text;
+        return 0;
+    case KEY_CONTOUR:
+        o->contour = text;
+        return 0;
+    case KEY_PAINT:
+        o->paint = text;
+        return 0;
+    case ARGP_KEY_END:
+        return check_options(o, state);
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -231,11 +282,12 @@ static int report_simplify(tool *t, const fct_mesh *mesh, const fct_simplify_sta
     return tool_json(t, all);
 }
 
-static int check_progressive(tool *t, const char *path) {
+/* Whether a second output can be written. option: its name; ending: its kind. */
+static int check_second(tool *t, const char *option, const char *path, const char *ending) {
     if (!path) return TOOL_DONE;
-    int code = tool_check_kind(t, path, "fpm", NULL);
+    int code = tool_check_kind(t, path, ending, NULL);
     if (code == TOOL_DONE && tool_same_output(path, t->output))
-        code = tool_fail(t, TOOL_USAGE, "%s: --progressive and -o are the same file", path);
+        code = tool_fail(t, TOOL_USAGE, "%s: %s and -o are the same file", path, option);
     return code == TOOL_DONE ? tool_check_output(t, path) : code;
 }
 
@@ -292,6 +344,12 @@ static int save_level(tool *t, fct_gltf *gltf, uint32_t level, const fct_mesh *m
     return code;
 }
 
+/* Takes the reference to the results. */
+static int report_levels(tool *t, json_t *results) {
+    return tool_json(t, json_pack("{s:o, s:{s:f}, s:I}", "levels", results, "seconds", "total",
+                                  tool_seconds() - t->start, "peak_bytes", (json_int_t)tool_peak_bytes()));
+}
+
 static int run_levels(tool *t, simplify_options *o, fct_gltf *gltf, const fct_mesh *mesh) {
     uint32_t targets[MOST_LEVELS] = {0}, count = o->level_count;
     fct_mesh levels[MOST_LEVELS];
@@ -312,8 +370,94 @@ static int run_levels(tool *t, simplify_options *o, fct_gltf *gltf, const fct_me
         json_decref(results);
         return code;
     }
-    return tool_json(t, json_pack("{s:o, s:{s:f}, s:I}", "levels", results, "seconds", "total",
-                                  tool_seconds() - t->start, "peak_bytes", (json_int_t)tool_peak_bytes()));
+    return report_levels(t, results);
+}
+
+/* The faces that level i of the options asks for, of `all` faces of the input. */
+static uint32_t find_target(const simplify_options *o, uint32_t i, uint32_t all) {
+    double level = o->level_count > 0 ? o->levels[i] : o->ratio > 0 ? o->ratio : o->def.target_faces;
+    bool ratio = o->level_count > 0 ? level < 1 : o->ratio > 0;
+    return (uint32_t)(ratio ? (double)llround(level * all) : level);
+}
+
+static int check_targets(tool *t, const simplify_options *o, uint32_t all) {
+    for (uint32_t i = 1; i < o->level_count; ++i) {
+        uint32_t faces = find_target(o, i, all), before = find_target(o, i - 1, all);
+        if (faces >= before)
+            return tool_fail(t, TOOL_DATA, "level %u has %u faces, expected fewer than the %u of level %u",
+                             i + 1, faces, before, i);
+    }
+    return TOOL_DONE;
+}
+
+/* Loads the state, or makes one of the mesh; then contour and paint. */
+static int open_state(tool *t, simplify_options *o, const fct_mesh *mesh, fct_simplifier **s) {
+    int code;
+    *s = NULL;
+    if (o->resume)
+        code = tool_result(t, fct_simplifier_load(&t->env, o->resume, s));
+    else {
+        o->def.target_faces = find_target(o, 0, mesh->face_count);
+        code = tool_result(t, fct_simplifier_create(&t->env, mesh, &o->def, s));
+    }
+    if (code != TOOL_DONE) return code;
+    fct_simplifier_forget(*s);
+    fct_paint_level level = o->resume ? FCT_PAINT_CURRENT : FCT_PAINT_INPUT;
+    if (o->contour) code = tool_read_contour(t, o->contour, *s);
+    if (o->paint && code == TOOL_DONE) code = tool_read_paint(t, o->paint, level, *s);
+    return code;
+}
+
+/* Runs to one target, and writes its mesh and its report. results: of several levels; NULL: there is one. */
+static int run_target(tool *t, const simplify_options *o, fct_gltf *gltf, fct_simplifier *s, uint32_t i,
+                      double init, json_t *results) {
+    fct_mesh mesh = {0};
+    fct_simplify_stats stats;
+    uint32_t target = find_target(o, i, fct_simplifier_input_faces(s));
+    int code = tool_result(t, fct_simplifier_run(s, target, o->def.max_error, &stats));
+    if (code == TOOL_DONE) code = tool_result(t, fct_simplifier_mesh(s, true, &mesh, &stats));
+    if (code != TOOL_DONE) return code;
+    stats.seconds_init = init;
+    warn_exhausted(t, target, &stats);
+    if (results)
+        code = save_level(t, gltf, i + 1, &mesh, &stats, results);
+    else {
+        code = gltf ? tool_save_gltf(t, gltf, t->output, &mesh) : tool_save_mesh(t, t->output, &mesh, 1);
+        if (code == TOOL_DONE && o->save_state) code = tool_result(t, fct_simplifier_save(s, o->save_state));
+        if (code == TOOL_DONE) code = report_simplify(t, &mesh, &stats);
+    }
+    fct_mesh_release(&t->env, &mesh);
+    return code;
+}
+
+static int run_with_state(tool *t, simplify_options *o, fct_gltf *gltf, const fct_mesh *mesh) {
+    fct_simplifier *s;
+    double start = tool_seconds();
+    json_t *results = o->level_count > 0 ? json_array() : NULL;
+    int code = open_state(t, o, mesh, &s);
+    double init = tool_seconds() - start;
+    if (code == TOOL_DONE) {
+        t->bar.items = fct_simplifier_faces(s);
+        code = check_targets(t, o, fct_simplifier_input_faces(s));
+    }
+    for (uint32_t i = 0; i < (results ? o->level_count : 1) && code == TOOL_DONE; ++i)
+        code = run_target(t, o, gltf, s, i, init, results);
+    if (code == TOOL_DONE && results && o->save_state)
+        code = tool_result(t, fct_simplifier_save(s, o->save_state));
+    if (code == TOOL_DONE && results) code = report_levels(t, json_incref(results));
+    json_decref(results);
+    fct_simplifier_destroy(s);
+    return code;
+}
+
+/* Either IN or a state. */
+static int check_inputs(tool *t, const simplify_options *o) {
+    if (!t->input_count == !o->resume)
+        return tool_fail(t, TOOL_USAGE, "expected either IN or --resume STATE, found %s",
+                         o->resume ? "both" : "none");
+    if (o->resume && t->flip_inward)
+        return tool_fail(t, TOOL_USAGE, "--resume: the state has its own --flip-inward");
+    return TOOL_DONE;
 }
 
 static int run_simplify(tool *t, void *options) {
@@ -323,16 +467,23 @@ static int run_simplify(tool *t, void *options) {
     fct_mesh mesh, simple = {0};
     fct_gltf *gltf = NULL; /* the document that is kept, if both files are glTF */
     fct_simplify_stats stats;
-    bool keeps = tool_is_gltf(t, t->inputs[0]) && tool_ends(t->output, "glb");
-    int code = check_progressive(t, o->progressive);
+    int code = check_inputs(t, o);
+    if (code == TOOL_DONE) code = check_second(t, "--progressive", o->progressive, "fpm");
+    if (code == TOOL_DONE) code = check_second(t, "--save-state", o->save_state, "fst");
     if (code == TOOL_DONE) code = check_levels(t, o);
     if (code != TOOL_DONE) return code;
+    if (o->resume) return run_with_state(t, o, NULL, NULL);
+    bool keeps = tool_is_gltf(t, t->inputs[0]) && tool_ends(t->output, "glb");
     code = keeps ? tool_open_gltf(t, t->inputs[0], &gltf, &mesh) : tool_load_mesh(t, t->inputs[0], &mesh);
     if (code != TOOL_DONE) return code;
     if (o->ratio > 0) o->def.target_faces = (uint32_t)llround(o->ratio * mesh.face_count);
     t->bar.items = mesh.face_count;
     t->bar.unit = "faces";
     code = set_attribute_weights(t, o, &mesh);
+    if (code == TOOL_DONE && (o->save_state || o->contour || o->paint)) {
+        code = run_with_state(t, o, gltf, &mesh);
+        goto done;
+    }
     if (code == TOOL_DONE && o->level_count > 0) {
         code = run_levels(t, o, gltf, &mesh);
         goto done;
@@ -354,7 +505,7 @@ int tool_simplify(int argc, char **argv) {
                                         {"refit", 12}, {"write", 2}, {0}};
     static const tool_command command = {
         .name = "simplify",
-        .synopsis = "IN -o OUT",
+        .synopsis = "IN -o OUT\n--resume STATE -o OUT",
         .summary = "reduce a mesh, keeping its shape and colours",
         .text =
             "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. If "
@@ -369,7 +520,9 @@ int tool_simplify(int argc, char **argv) {
             "normal_rms (errors of the result), lost_area (the share of the area of IN that has no faces in "
             "OUT; the errors do not cover it), seconds{init, contract, refit, total}, peak_bytes. With "
             "--levels: levels[] with these keys up to lost_area and file, seconds{total}, peak_bytes.",
-        .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
+        .examples = "  facetree simplify bunny.obj --faces 10000 -o small.ply --save-state bunny.fst\n"
+                    "  facetree simplify --resume bunny.fst --faces 1000 -o smaller.ply\n"
+                    "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
                     "  facetree simplify bunny.obj --levels 20000,5000,1000 -o lod.ply\n"
                     "  facetree simplify bunny.obj --faces 200 -o small.ply --progressive bunny.fpm",
@@ -378,7 +531,7 @@ int tool_simplify(int argc, char **argv) {
         .run = run_simplify,
         .stages = stages,
         .turns_bodies = true,
-        .inputs_min = 1,
+        .inputs_min = 0,
         .inputs_max = 1,
         .output = TOOL_OUTPUT_REQUIRED,
         .endings = TOOL_MESHES};

@@ -12,6 +12,7 @@
 #include "facetree/progressive.h"
 #include "facetree/radiosity.h"
 #include "facetree/scene.h"
+#include "facetree/simplifier.h"
 #include "facetree/simplify.h"
 
 #endif

@@ -2,6 +2,7 @@
  *
  * 1. The strength of an edge: 1 at open boundaries and at borders between materials or face colours; at
  *    seams, where both sides have different attributes, the squared difference.
+ *    Contours that the caller marks have their weight.
  * 2. Each face at a held edge adds a plane to both ends: through the edge, perpendicular to the face,
  *    weighted by the strength and the length of the edge.
  * 3. lines.c finds the straight parts of the held curves.
@@ -44,6 +45,22 @@ static void find_strengths(const fct_simplifier *s, float *strength, uint32_t *f
         double gap =
             fct_max(squared_gap(s, here, same_way ? from : to), squared_gap(s, there, same_way ? to : from));
         if (gap > strength[e]) strength[e] = (float)gap;
+    }
+}
+
+/* Contours of the caller hold like boundaries, times their weight. The rings are those of the input. */
+static void add_contours(const fct_simplifier *s, float *strength) {
+    for (size_t i = 0; i < s->mark_count; ++i) {
+        const fct_mark *mark = &s->marks[i];
+        uint32_t a = mark->points[0], b = mark->points[1];
+        if (b == FCT_NONE) continue;
+        for (uint32_t c = point_at(s, a)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
+            uint32_t next = corner_next(c), previous = corner_previous(c);
+            uint32_t side = s->triangles[next] == b ? c : s->triangles[previous] == b ? previous : FCT_NONE;
+            if (side == FCT_NONE) continue;
+            float *held = &strength[s->side_edges[side]];
+            *held = mark->weight > *held ? (float)mark->weight : *held;
+        }
     }
 }
 
@@ -115,6 +132,7 @@ fct_result fct_simplify_constraints(fct_simplifier *s) {
         find_strengths(s, strength, first_sides);
     else
         memset(strength, 0, s->edge_count * sizeof *strength);
+    if (held) add_contours(s, strength);
     number_held_points(s, strength);
     s->constraints = fct_allocate_zero(s->env, s->constraint_count, sizeof *s->constraints);
     if (!s->constraints) {

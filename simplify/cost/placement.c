@@ -133,13 +133,20 @@ static void place_point(const fct_simplifier *s, const double *r, const fct_join
         place_by_policy(s, r, a, b, ends_only, out);
 }
 
-/* Subset placement takes the attributes of the chosen end too, so they are part of its cost. */
+/* The value of the point constraints of both ends. */
+static double pins_at(const fct_simplifier *s, uint32_t a, uint32_t b, v3 at) {
+    return s->pins ? quadric_at(s->pins[a], at) + quadric_at(s->pins[b], at) : 0;
+}
+
+/* Subset placement takes the attributes of the chosen end too, so they are part of its cost. pins: the values
+ * of the point constraints at both ends. */
 static void place_subset(const fct_simplifier *s, const fct_groups *g, double sums[][MAX_QUADRIC],
-                         const fct_joint *joint, double weight, v3 a, v3 b, fct_candidate *out) {
+                         const fct_joint *joint, double weight, const double pins[2], v3 a, v3 b,
+                         fct_candidate *out) {
     bool found = false;
     for (uint32_t end = 0; end < 2; ++end) {
         if (joint && !joint->ends[end]) continue;
-        double error = joint ? weight * quadric_at(joint->held.planes, end ? b : a) : 0;
+        double error = pins[end] + (joint ? weight * quadric_at(joint->held.planes, end ? b : a) : 0);
         for (uint32_t i = 0; i < g->group_count; ++i)
             error += fct_quadric_value(sums[i], s->steering, end ? b : a, fct_groups_end(s, g, i, end));
         if (!found || error < out->error)
@@ -207,7 +214,7 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     if (!s->steering && s->def->placement == FCT_PLACE_OPTIMAL && !ends_only &&
         (!s->corner_wedges || fct_groups_fit(s, a, b)) && first->valence <= SIMPLIFY_HUB &&
         second->valence <= SIMPLIFY_HUB && !constraint_at(s, a) && !constraint_at(s, b) &&
-        place_freely(s, first, second, out))
+        !point_is_pinned(s, a) && !point_is_pinned(s, b) && place_freely(s, first, second, out))
         return true;
     double r[POSITION_QUADRIC], sums[SIMPLIFY_MAX_WEDGES][MAX_QUADRIC];
     fct_groups g;
@@ -220,6 +227,7 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
     bool held = fct_constraint_join(s, a, b, &joint);
     double weight = held ? constraint_weight(s, &joint.held, r[10]) : 0;
     for (int k = 0; k < 10 && held; ++k) r[k] += weight * joint.held.planes[k];
+    for (int k = 0; k < 10 && s->pins; ++k) r[k] += s->pins[a][k] + s->pins[b][k];
     if (held && ((hub_a && !joint.ends[0]) || (hub_b && !joint.ends[1]))) return false;
     bool locked = held && joint.held.hold == HOLD_LOCK;
     if (locked && !joint.ends[0] && !joint.ends[1]) return false;
@@ -230,9 +238,10 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
         if (count_at_end(&g, i, joint.ends[1]) != 1) return false;
     if (hub_a || hub_b)
         *out = (fct_candidate){.at = hub_a ? pa : pb, .end = hub_b, .error = quadric_at(r, hub_a ? pa : pb)};
-    else if (s->steering && (locked || s->def->placement == FCT_PLACE_SUBSET))
-        place_subset(s, &g, sums, held ? &joint : NULL, weight, pa, pb, out);
-    else
+    else if (s->steering && (locked || s->def->placement == FCT_PLACE_SUBSET)) {
+        const double pins[2] = {pins_at(s, a, b, pa), pins_at(s, a, b, pb)};
+        place_subset(s, &g, sums, held ? &joint : NULL, weight, pins, pa, pb, out);
+    } else
         place_point(s, r, held ? &joint : NULL, pa, pb, ends_only, out);
     if (!(out->error > 0)) out->error = 0;
     out->locked = locked;

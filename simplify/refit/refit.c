@@ -142,11 +142,19 @@ static void add_planes(const fct_simplifier *s, const fct_constraint *held, v3 a
     system->side[0] -= weight * g.x, system->side[1] -= weight * g.y, system->side[2] -= weight * g.z;
 }
 
+/* Adds the point constraints of a point. */
+static void add_pins(const double pins[10], v3 at, fct_system *system) {
+    v3 g = quadric_gradient(pins, at);
+    for (int k = 0; k < 6; ++k) system->matrix[k] += pins[k];
+    system->side[0] -= g.x, system->side[1] -= g.y, system->side[2] -= g.z;
+}
+
 /* The step of a point, as far as its constraint allows it. */
 static v3 find_step(const fct_refit *r, uint32_t point) {
     const fct_simplifier *s = r->s;
     const fct_constraint *held = constraint_at(s, point);
     fct_system *system = &r->systems[point];
+    if (point_is_pinned(s, point)) add_pins(s->pins[point], point_position(s, point), system);
     if (!held) return v3_scale(solve_damped(system), STEP);
     if (held->hold >= HOLD_POINT) return (v3){0, 0, 0};
     if (held->hold == HOLD_LINE) {

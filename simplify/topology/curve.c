@@ -88,16 +88,16 @@ static void fill_sorted(const fct_mesh *mesh, const uint32_t *vertex_places, con
 
 fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, const uint8_t *locks,
                              fct_sorted *out) {
-    uint32_t vertices = mesh->vertex_count, *vertex_places, *starts;
+    uint32_t vertices = mesh->vertex_count, *starts;
     uint64_t *items;
     unsigned kinds =
         (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
         (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
         (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
-    const fct_array scratch[] = {FCT_ARRAY(items, vertices), FCT_ARRAY(vertex_places, vertices),
-                                 FCT_ARRAY(starts, (size_t)vertices + 1)};
+    const fct_array scratch[] = {FCT_ARRAY(items, vertices), FCT_ARRAY(starts, (size_t)vertices + 1)};
     *out = (fct_sorted){0};
     const fct_array results[] = {FCT_ARRAY(out->places, mesh->face_count),
+                                 FCT_ARRAY(out->vertex_places, vertices),
                                  FCT_ARRAY_IF(locks, out->locks, vertices)};
     fct_result result = fct_allocate_all(env, scratch, FCT_LENGTH(scratch), "sorted vertices");
     if (result != FCT_OK) return result;
@@ -105,10 +105,10 @@ fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, const uin
     if (result == FCT_OK) result = sort_vertices(env, mesh, items);
     if (result == FCT_OK) result = fct_mesh_create(env, vertices, mesh->face_count, kinds, &out->mesh);
     if (result == FCT_OK) {
-        for (uint32_t i = 0; i < vertices; ++i) vertex_places[(uint32_t)items[i]] = i;
-        for (uint32_t v = 0; v < vertices && locks; ++v) out->locks[vertex_places[v]] = locks[v];
-        sort_faces(mesh, vertex_places, starts, out->places);
-        fill_sorted(mesh, vertex_places, out->places, &out->mesh);
+        for (uint32_t i = 0; i < vertices; ++i) out->vertex_places[(uint32_t)items[i]] = i;
+        for (uint32_t v = 0; v < vertices && locks; ++v) out->locks[out->vertex_places[v]] = locks[v];
+        sort_faces(mesh, out->vertex_places, starts, out->places);
+        fill_sorted(mesh, out->vertex_places, out->places, &out->mesh);
     } else
         fct_release_all(env, results, FCT_LENGTH(results));
     fct_release_all(env, scratch, FCT_LENGTH(scratch));
@@ -120,5 +120,6 @@ void fct_simplify_release_sorted(const fct_env *env, fct_sorted *sorted) {
     sorted->mesh.material_count = 0;
     fct_mesh_release(env, &sorted->mesh);
     fct_release(env, sorted->places);
+    fct_release(env, sorted->vertex_places);
     fct_release(env, sorted->locks);
 }

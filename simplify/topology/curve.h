@@ -7,9 +7,10 @@
 #include "facetree/mesh.h"
 
 typedef struct fct_sorted {
-    fct_mesh mesh;    /* borrows the material names */
-    uint32_t *places; /* per face of the input: its place in `mesh` */
-    uint8_t *locks;   /* per vertex of `mesh`; NULL without locks */
+    fct_mesh mesh;           /* borrows the material names */
+    uint32_t *places;        /* per face of the input: its place in `mesh` */
+    uint32_t *vertex_places; /* per vertex of the input */
+    uint8_t *locks;          /* per vertex of `mesh`; NULL without locks */
 } fct_sorted;
 
 /* Sorts the vertices and faces of a valid mesh along the curve, and the locks of its vertices (NULL: none).

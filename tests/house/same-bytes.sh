@@ -56,7 +56,7 @@ write_outputs() {
         # shellcheck disable=SC2086 # a list of words
         "$@" bake "$in/cornell/scene.json" $light -o "$out/lit.ply" --also "$out/lit.glb" --quiet
         "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --progressive "$out/fewer.fpm" --quiet
-        "$@" simplify "$out/lit.ply" --ratio .3 -o "$out/fewer-lit.glb" --quiet
+        "$@" simplify "$out/lit.ply" --ratio .3 -o "$out/fewer-lit.glb" --save-state "$out/fewer-lit.fst" --quiet
         "$@" compare "$in/mesh.ply" "$out/fewer.ply" --samples 2 | grep -vE 'seconds|bytes' >"$out/compare.txt"
     } 2>"$out.err"
 }

@@ -80,6 +80,11 @@ static void write_inputs(void) {
     assert_int_equal(fct_progressive_save(progressive, IN "sheet.fpm"), FCT_OK);
     fct_progressive_destroy(progressive);
     fct_mesh_release(&inputs.env, &simple);
+    fct_simplifier *simplifier;
+    assert_int_equal(fct_simplifier_create(&inputs.env, &inputs.sheet, &def, &simplifier), FCT_OK);
+    assert_int_equal(fct_simplifier_run(simplifier, 40, INFINITY, NULL), FCT_OK);
+    assert_int_equal(fct_simplifier_save(simplifier, IN "sheet.fst"), FCT_OK);
+    fct_simplifier_destroy(simplifier);
     static const unsigned char corners[12] = {0, 0, 0, 0, 0, 0, 128, 63, 0, 0, 128, 63};
     FILE *file = fopen(IN "corner coordinates.bin", "wb"); /* (0 0 0), (1 0 0), (1 1 0) as floats */
     assert_non_null(file);

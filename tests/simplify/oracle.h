@@ -167,7 +167,7 @@ enum { ARRAY_SETS = sizeof array_sets / sizeof *array_sets };
 static inline fct_simplifier *open_simplifier(const fct_env *env, const fct_mesh *mesh,
                                               const fct_simplify_def *def) {
     fct_simplifier *s;
-    assert_int_equal(fct_simplifier_create(env, mesh, def, &s), FCT_OK);
+    assert_int_equal(fct_simplifier_build(env, mesh, def, &s), FCT_OK);
     return s;
 }
 

@@ -55,7 +55,7 @@ static void check_surroundings(const fct_mesh *mesh, uint32_t faces) {
     def.target_faces = faces;
     fct_simplifier *s;
     fct_stop stop;
-    assert_int_equal(fct_simplifier_create(&env, mesh, &def, &s), FCT_OK);
+    assert_int_equal(fct_simplifier_build(&env, mesh, &def, &s), FCT_OK);
     assert_int_equal(fct_log_create(s), FCT_OK);
     assert_int_equal(fct_simplify_contract(s, &stop), FCT_OK);
     uint32_t count = s->log->count, later = 0;

@@ -130,7 +130,7 @@ expect 64 simplify cube.off -o x.ply --faces 4 --placement best
 expect 64 simplify cube.off -o x.ply --faces 4 --weights heavy
 says "expected area, angle or uniform, found 'heavy'"
 expect 64 simplify cube.off -o x.doc --faces 4
-for later in --primitive=face --pairs=1 --resume=x; do
+for later in --primitive=face --pairs=1; do
     expect 64 simplify cube.off -o x.ply --faces 4 "$later"
     says "unknown option"
 done

@@ -61,7 +61,7 @@ void tool_stem(const char *path, char *stem, size_t size) {
 /* --- Kinds of files --- */
 
 /* Endings of kinds of files. An output with one of them holds that kind. */
-static const char kinds[] = "ply obj off stl om glb gltf fct fpm json png bin mtl "
+static const char kinds[] = "ply obj off stl om glb gltf fct fpm fst json png bin mtl "
                             "fbx dae 3ds usd usda usdc usdz blend step stp iges igs "
                             "jpg jpeg bmp gif tga tif tiff webp exr hdr ppm pgm svg pdf zip gz";
 

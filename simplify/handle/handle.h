@@ -1,0 +1,14 @@
+/* simplify/handle/handle.h: what the handle of facetree/simplifier.h has beyond the data of one run. */
+#ifndef FCT_SIMPLIFY_HANDLE_H
+#define FCT_SIMPLIFY_HANDLE_H
+
+#include "simplify/state.h"
+
+/* A zeroed simplifier with these options, without a mesh. Errors: MEMORY. */
+fct_result fct_handle_open(const fct_env *env, const fct_simplify_def *def, fct_simplifier **out);
+/* fct_simplifier_run, with a way back if there is a history. */
+fct_result fct_handle_run(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop);
+/* Contracts without a way back. */
+fct_result fct_handle_contract(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop);
+
+#endif
