@@ -5,6 +5,7 @@
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/fundamental.h"
 #include "simplify/log.h"
+#include "simplify/pairs/candidates.h"
 #include "simplify/topology/topology.h"
 
 static fct_result fill_simplifier(fct_simplifier *s) {
@@ -13,6 +14,7 @@ static fct_result fill_simplifier(fct_simplifier *s) {
     if (result == FCT_OK) result = fct_simplify_attributes(s);
     if (result == FCT_OK) result = fct_simplify_quadrics(s);
     if (result == FCT_OK) result = fct_simplify_constraints(s);
+    if (result == FCT_OK) result = fct_simplify_pairs(s);
     if (result != FCT_OK) return result;
     s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
     s->side_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->side_marks);
@@ -31,7 +33,8 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->next_corners,  s->side_edges,    s->corner_wedges, s->edges,        s->edge_flags,
                       s->quadrics,      s->attributes,    s->wedge_parents, s->next_wedges,  s->wedge_uses,
                       s->wedge_classes, s->class_parents, s->link_marks,    s->side_marks,   s->refused,
-                      s->constraint_of, s->constraints,   s->lines,         s->scratches};
+                      s->constraint_of, s->constraints,   s->lines,         s->scratches,    s->first_pairs,
+                      s->last_pairs,    s->next_pairs,    s->solids,        s->walled};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_log_destroy(s->env, s->log);
     fct_release(s->env, s);

@@ -55,6 +55,12 @@ static fct_result check_input(const fct_env *env, const fct_mesh *mesh, const fc
         if (!is_weight(weights[i].value))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected 0 or a number from 1e-12 to 1e12",
                             weights[i].name, weights[i].value);
+    if (!(def->pair_distance >= 0))
+        return fct_fail(env, FCT_ERROR_DATA, "pair_distance is %g, expected at least 0", def->pair_distance);
+    if (def->pair_distance > 0 && def->keep_topology)
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "pair_distance is %g with keep_topology, expected one of them: pairs join bodies",
+                        def->pair_distance);
     if ((unsigned)def->placement > FCT_PLACE_SUBSET)
         return fct_fail(env, FCT_ERROR_DATA, "placement is %d, expected a fct_placement",
                         (int)def->placement);
@@ -129,6 +135,7 @@ static fct_result run_simplifier(fct_simplifier *s, const uint32_t *places, fct_
     stats->seconds_refit = fct_seconds() - contracted;
     stats->faces_after = out->face_count;
     stats->max_cost = sqrt(s->max_error2) * s->extent;
+    stats->pairs_found = s->edge_count - s->first_pair, stats->pairs_joined = s->pairs_joined;
     report_fit(s, &fit, stats);
     return result;
 }
