@@ -207,6 +207,7 @@ static bool try_pair(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candid
     if (s->blocks && s->live_faces < s->least_faces + fct_simplify_count_walls(&walls)) return false;
     fct_simplify_drop_edge(s, e);
     fct_simplify_collapse(s, ends, candidate, keep, count_b);
+    fct_simplify_join_classes(s, a);
     fct_simplify_remove_walls(s, &walls);
     ++s->pairs_joined;
     requeue_rings(s, &move);

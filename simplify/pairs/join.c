@@ -54,6 +54,14 @@ uint32_t fct_simplify_count_walls(const fct_walls *walls) {
     return count;
 }
 
+void fct_simplify_join_classes(fct_simplifier *s, uint32_t point) {
+    if (!s->class_parents || s->mesh->colors || s->mesh->normals) return;
+    uint32_t first = s->first_wedges[point];
+    for (uint32_t w = s->next_wedges[first]; w != FCT_NONE; w = s->next_wedges[w])
+        s->class_parents[fct_sets_find(s->class_parents, s->wedge_classes[w])] =
+            fct_sets_find(s->class_parents, s->wedge_classes[first]);
+}
+
 static void remove_face(fct_simplifier *s, uint32_t corner) {
     for (uint32_t k = 0; k < 3; ++k) s->walled[s->triangles[corner - corner % 3 + k]] = 1;
     fct_simplify_remove_face(s, corner / 3);

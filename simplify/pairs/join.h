@@ -20,8 +20,10 @@ typedef struct fct_walls {
  * only if both belonged to closed bodies with the volume on the same side of their faces, and faces at a
  * locked point stay. */
 bool fct_simplify_find_walls(fct_simplifier *s, const fct_move *move, fct_walls *out);
-/* The number of faces that vanish. */
+/* The number of faces of the walls. */
 uint32_t fct_simplify_count_walls(const fct_walls *walls);
+/* Without colours and normals the wedges of the point that replaced a pair become one output vertex. */
+void fct_simplify_join_classes(fct_simplifier *s, uint32_t point);
 /* Removes them, after the contraction. */
 void fct_simplify_remove_walls(fct_simplifier *s, const fct_walls *walls);
 /* Appends the pairs of b to those of a. */

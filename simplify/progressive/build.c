@@ -295,8 +295,9 @@ static void end_step(builder *b, float error) {
         (ended_step){b->ended_count, b->removed_count, error > before ? error : before};
 }
 
-/* Removes the faces of an inner wall. */
-static fct_result repeat_wall(builder *b, const fct_record *r) {
+/* Removes the faces of an inner wall. continues: the record before is a wall of the same pair, and both are
+ * one step. */
+static fct_result repeat_wall(builder *b, const fct_record *r, bool continues) {
     static const fct_record apart = {.kept = FCT_NONE, .gone = FCT_NONE};
     uint32_t first_removed = b->removed_count;
     b->ring_count = 0;
@@ -308,6 +309,7 @@ static fct_result repeat_wall(builder *b, const fct_record *r) {
         for (uint32_t k = 3 * f; k < 3 * f + 3; ++k) --b->uses[b->handles[k]], --b->faces[b->points[k]];
     }
     fct_result result = end_apexes(b, &apart, first_removed);
+    if (continues) --b->step_count;
     end_step(b, r->error);
     return result;
 }
@@ -481,7 +483,8 @@ static fct_result run_builder(builder *b) {
     start_faces(b);
     for (uint32_t i = 0; i < records && result == FCT_OK; ++i) {
         const fct_record *r = &b->log->records[b->order[i]];
-        result = r->wall ? repeat_wall(b, r) : repeat_contraction(b, r);
+        result =
+            r->wall ? repeat_wall(b, r, b->log->records[b->order[i - 1]].wall) : repeat_contraction(b, r);
     }
     if (result == FCT_OK) result = write_progressive(b);
     fct_release(s->env, b->moved);
