@@ -18,6 +18,7 @@
 #include "simplify/cost/loss.h"
 #include "simplify/log.h"
 #include "simplify/pairs/join.h"
+#include "simplify/pairs/release.h"
 #include "simplify/sweep.h"
 #include "simplify/topology/link.h"
 #include "simplify/topology/remain.h"
@@ -264,6 +265,13 @@ static void retry_pairs(fct_simplifier *s) {
     }
 }
 
+static void fill_queue(fct_simplifier *s) {
+    fct_simplify_reprice(s);
+    queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);
+    for (uint32_t e = s->edge_count; e-- > 0;)
+        if (s->edges[e].state == EDGE_QUEUED) queue_push(s->queue, e, s->edges[e].bucket);
+}
+
 fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     uint32_t before = s->live_faces, contractions = 0;
     *stop = FCT_STOP_FACES;
@@ -276,13 +284,15 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     result = fct_simplify_sweep(s, contract_block);
     if (result != FCT_OK) return result;
     retry_pairs(s);
-    queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);
-    for (uint32_t e = s->edge_count; e-- > 0;)
-        if (s->edges[e].state == EDGE_QUEUED) queue_push(s->queue, e, s->edges[e].bucket);
+    fill_queue(s);
     while (s->live_faces > s->def->target_faces) {
         uint32_t e = queue_pop(s->queue);
         if (e == FCT_NONE) break;
         if (s->edges[e].state != EDGE_QUEUED) continue;
+        if (s->released && s->queue->current > s->released_bucket) {
+            fill_queue(s);
+            continue;
+        }
         if (s->log && (result = fct_log_reserve(s)) != FCT_OK) return result;
         if (!process_edge(s, e) || ++contractions % PROGRESS_PERIOD) continue;
         double goal = (double)before - s->def->target_faces;

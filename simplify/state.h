@@ -122,6 +122,8 @@ typedef struct fct_simplifier {
     uint8_t *solids;                    /* per point of the input: SOLID_NONE and so on */
     uint8_t *walled;                    /* per point: 1 if a face there vanished as an inner wall */
     uint32_t pairs_joined;
+    bool released;            /* planes of walls left quadrics, so costs in the queue may be too high */
+    uint32_t released_bucket; /* `current` of the queue at that time */
 
     /* Per wedge. The first `steering` channels are dimensions of the quadrics; the others are interpolated.
      */

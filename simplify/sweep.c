@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "simplify/log.h"
+#include "simplify/pairs/release.h"
 
 enum {
     BLOCK_POINTS = 4096,
@@ -132,6 +133,9 @@ static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
         s->live_faces -= before - r->live_faces;
         s->max_error2 = fct_max(s->max_error2, r->max_error2);
         s->pairs_joined += r->pairs_joined - joined;
+        if (r->released && (!s->released || r->released_bucket > s->released_bucket))
+            s->released_bucket = r->released_bucket;
+        s->released |= r->released;
         if (r->side_epoch > side_epoch) side_epoch = r->side_epoch;
         if (r->link_epoch > link_epoch) link_epoch = r->link_epoch;
     }
@@ -151,6 +155,7 @@ static fct_result run_sweeps(sweep *w) {
     for (uint32_t number = 0;; ++number) {
         uint32_t count, contracted = 0;
         if (s->live_faces < target + LEAST_EDGES) return FCT_OK;
+        fct_simplify_reprice(s);
         w->limit = find_limit(w, s->live_faces - target, &count);
         if (count < LEAST_EDGES) return FCT_OK;
         fct_result result = run_sweep(w, number, &contracted);

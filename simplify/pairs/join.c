@@ -5,6 +5,7 @@
 #include "simplify/collapse.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/log.h"
+#include "simplify/pairs/release.h"
 
 static uint8_t find_solid(const fct_simplifier *s, uint32_t corner) {
     return s->solids[s->point_of[s->mesh->triangles[corner]]];
@@ -70,9 +71,13 @@ static void remove_face(fct_simplifier *s, uint32_t corner) {
 void fct_simplify_remove_walls(fct_simplifier *s, const fct_walls *walls) {
     for (uint32_t i = 0; i < walls->count; ++i) {
         if (s->log) fct_log_wall(s, walls->first[i], walls->second[i]);
-        if (walls->first[i] != FCT_NONE) remove_face(s, walls->first[i]);
+        bool wall = walls->first[i] != FCT_NONE;
+        if (wall) fct_simplify_release_face(s, walls->first[i] / 3);
+        if (wall) fct_simplify_release_face(s, walls->second[i] / 3);
+        if (wall) remove_face(s, walls->first[i]);
         remove_face(s, walls->second[i]);
     }
+    s->released_bucket = s->queue->current;
     s->wall_room -= walls->count;
 }
 

@@ -4,6 +4,7 @@
 #include "simplify/contract.h"
 #include "simplify/log.h"
 #include "simplify/pairs/candidates.h"
+#include "simplify/pairs/release.h"
 
 static fct_env env;
 
@@ -393,6 +394,68 @@ static void a_plate_stays(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Planes that stand across the others leave a quadric as if they had never been there. From others no more is
+ * taken than leaves it at least 0, and the minimum stays where it is. */
+static void planes_of_walls_leave_the_quadrics(void **state) {
+    (void)state;
+    uint64_t seed = 3;
+    for (int round = 0; round < 200; ++round) {
+        double with[POSITION_QUADRIC] = {0}, without[POSITION_QUADRIC] = {0};
+        v3 at = random_vector(&seed), n = v3_unit(random_vector(&seed));
+        double weight = between(&seed, .1, 2);
+        for (int k = 0; k < 2; ++k) {
+            v3 side = v3_unit(v3_cross(n, random_vector(&seed)));
+            quadric_add_plane(with, side, at, 1 + k), quadric_add_plane(without, side, at, 1 + k);
+        }
+        quadric_add_plane(with, n, at, weight);
+        with[10] = 3 + weight;
+        fct_simplify_release_plane(with, with, n, weight * (round % 2 ? 1 : 1.5));
+        for (int k = 0; k < 10; ++k) assert_float_equal(with[k], without[k], 1e-6);
+        assert_float_equal(with[10], 3, 1e-6);
+
+        double half[POSITION_QUADRIC] = {0};
+        for (int k = 0; k < 3; ++k)
+            quadric_add_plane(half, (v3){k == 0, k == 1, k == 2}, random_vector(&seed), .1);
+        for (int k = 0; k < 4; ++k)
+            quadric_add_plane(half, v3_unit(random_vector(&seed)), random_vector(&seed),
+                              between(&seed, .1, 1));
+        half[10] = 5;
+        double before[POSITION_QUADRIC], rows[9], x[3] = {-half[6], -half[7], -half[8]};
+        memcpy(before, half, sizeof before);
+        const int place[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+        for (int k = 0; k < 9; ++k) rows[k] = half[place[k]];
+        solve_dense(3, rows, x);
+        v3 least = {x[0], x[1], x[2]};
+        fct_simplify_release_plane(half, half, n, round % 2 ? .01 : 100);
+        assert_float_equal(quadric_at(half, least), quadric_at(before, least), 1e-5);
+        if (round % 2) assert_float_equal(before[10] - half[10], .01, 1e-9);
+        for (int k = 0; k < 20; ++k) {
+            v3 p = v3_scale(random_vector(&seed), 3);
+            double height = v3_dot(n, v3_sub(p, least)), taken = quadric_at(before, p) - quadric_at(half, p);
+            assert_true(quadric_at(half, p) > -1e-5);
+            if (round % 2) assert_float_equal(taken, .01 * height * height, 1e-5);
+        }
+    }
+}
+
+/* The seams between boxes and between cylinders disappear, with and without attributes in the error. */
+static void seams_disappear(void **state) {
+    (void)state;
+    for (int colored = 0; colored < 2; ++colored) {
+        fct_mesh mesh = make_row(&env, 4, .01, 1, colored ? FCT_MESH_COLORS : 0);
+        for (uint32_t c = 0; c < 3 * mesh.vertex_count && colored; ++c) mesh.colors[c] = .5f;
+        fct_simplify_stats stats;
+        fct_simplify_def def = with_pairs(.01, 12);
+        def.color_weight = .1;
+        fct_mesh out = simplified(&env, &mesh, &def, &stats);
+        assert_int_equal(out.face_count, 12);
+        assert_close(mesh_volume(&out), 4.03, 1e-4);
+        assert_true(stats.max_cost < .006);
+        fct_mesh_release(&env, &out);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 /* ---- Attributes and locks ---- */
 
 /* A red and a blue body join without a mixture of their colours. */
@@ -502,6 +565,8 @@ int main(void) {
         cmocka_unit_test(boxes_join_at_their_distance),
         cmocka_unit_test(the_cheapest_pair_goes_first),
         cmocka_unit_test(walls_vanish_between_closed_bodies),
+        cmocka_unit_test(planes_of_walls_leave_the_quadrics),
+        cmocka_unit_test(seams_disappear),
         cmocka_unit_test(sheets_stay),
         cmocka_unit_test(copies_become_one),
         cmocka_unit_test(bodies_inside_out_stay),
