@@ -4,7 +4,7 @@
 
 #include "simplify/cost/constraint.h"
 #include "simplify/log.h"
-#include "simplify/pairs/join.h"
+#include "simplify/pairs/list.h"
 
 /* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
 #define RETIRED_RIDGE 1e-12

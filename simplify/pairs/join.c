@@ -77,17 +77,6 @@ void fct_simplify_remove_walls(fct_simplifier *s, const fct_walls *walls) {
         if (wall) remove_face(s, walls->first[i]);
         remove_face(s, walls->second[i]);
     }
-    s->released_bucket = s->queue->current;
+    if (walls->count) s->released_bucket = s->queue->current;
     s->wall_room -= walls->count;
-}
-
-void fct_simplify_join_pairs(fct_simplifier *s, uint32_t a, uint32_t b) {
-    s->walled[a] |= s->walled[b];
-    if (s->first_pairs[b] == FCT_NONE) return;
-    if (s->first_pairs[a] == FCT_NONE)
-        s->first_pairs[a] = s->first_pairs[b];
-    else
-        s->next_pairs[s->last_pairs[a]] = s->first_pairs[b];
-    s->last_pairs[a] = s->last_pairs[b];
-    s->first_pairs[b] = s->last_pairs[b] = FCT_NONE;
 }

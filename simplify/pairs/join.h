@@ -26,7 +26,5 @@ uint32_t fct_simplify_count_walls(const fct_walls *walls);
 void fct_simplify_join_classes(fct_simplifier *s, uint32_t point);
 /* Removes them, after the contraction. */
 void fct_simplify_remove_walls(fct_simplifier *s, const fct_walls *walls);
-/* Appends the pairs of b to those of a. */
-void fct_simplify_join_pairs(fct_simplifier *s, uint32_t a, uint32_t b);
 
 #endif
