@@ -99,7 +99,7 @@ void fct_log_end(fct_simplifier *s, double error) {
     fct_log *log = s->log;
     fct_record *record = &log->records[log->count];
     write_point(s, record->kept, record->at);
-    record->error = (float)(error * s->extent);
+    record->error = (float)fct_min(error * s->extent, (double)FLT_MAX);
     for (uint32_t w = s->channel_count ? s->first_wedges[record->kept] : FCT_NONE; w != FCT_NONE;
          w = s->next_wedges[w]) {
         write_wedge(s, record, w, log->values + s->channel_count * log->wedge_count);

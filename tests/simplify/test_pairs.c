@@ -363,6 +363,26 @@ static void copies_become_one(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Open boxes keep the faces between them. */
+static void walls_of_open_bodies_stay(void **state) {
+    (void)state;
+    fct_mesh mesh = make_row(&env, 2, .01, 1, 0);
+    uint32_t count = 0;
+    for (uint32_t f = 0; f < mesh.face_count; ++f) {
+        v3 n = v3_unit(face_cross(&mesh, f));
+        if (n.z < .5) memmove(mesh.triangles + 3 * (size_t)count++, mesh.triangles + 3 * (size_t)f, 12);
+    }
+    assert_int_equal(count, 20);
+    mesh.face_count = count;
+    fct_simplify_stats stats;
+    fct_simplify_def def = with_pairs(.02, 0);
+    def.max_error = .01;
+    fct_mesh out = simplified(&env, &mesh, &def, &stats);
+    assert_true(stats.pairs_joined > 0 && mesh_area(&out) > 9.9);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
 /* A body and its inside-out copy do not cancel each other out. */
 static void bodies_inside_out_stay(void **state) {
     (void)state;
@@ -530,6 +550,21 @@ static fct_mesh make_city(uint32_t side, uint32_t n, unsigned arrays) {
     return mesh;
 }
 
+/* 100 cubes become one box: all pairs of a wall are contracted before its seams are. */
+static void a_hundred_cubes_become_a_box(void **state) {
+    (void)state;
+    fct_mesh mesh = make_city(10, 1, 0);
+    fct_simplify_stats stats;
+    fct_simplify_def def = with_pairs(.06, 12);
+    fct_mesh out = simplified(&env, &mesh, &def, &stats);
+    assert_int_equal(out.face_count, 12);
+    assert_int_equal(stats.pairs_joined, 558); /* 3 at each of 162 places inside, 1 at each of 72 outside */
+    assert_close(mesh_volume(&out), 10.45 * 10.45, 1e-5);
+    assert_close(mesh_area(&out), 2 * 10.45 * 10.45 + 4 * 10.45, 1e-5);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
 static void every_thread_count_gives_the_same_bits(void **state) {
     (void)state;
     for (unsigned arrays = 0; arrays <= FCT_MESH_COLORS; arrays += FCT_MESH_COLORS) {
@@ -569,11 +604,13 @@ int main(void) {
         cmocka_unit_test(seams_disappear),
         cmocka_unit_test(sheets_stay),
         cmocka_unit_test(copies_become_one),
+        cmocka_unit_test(walls_of_open_bodies_stay),
         cmocka_unit_test(bodies_inside_out_stay),
         cmocka_unit_test(a_plate_stays),
         cmocka_unit_test(both_sides_keep_their_attributes),
         cmocka_unit_test(locked_points_make_no_pairs),
         cmocka_unit_test(options_are_checked),
+        cmocka_unit_test(a_hundred_cubes_become_a_box),
         cmocka_unit_test(every_thread_count_gives_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
