@@ -186,7 +186,7 @@ static bool is_pair(const fct_simplifier *s, uint32_t a, uint32_t b) {
            fct_simplify_find_side(s, point_at(s, b)->first_corner, a) == FCT_NONE;
 }
 
-/* Contracts the pair if the checks allow it. Points at the same place stay there. */
+/* Contracts the pair if the checks allow it. */
 static bool try_pair(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
     uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
     uint32_t a = ends[keep], b = ends[1 - keep];
@@ -197,8 +197,6 @@ static bool try_pair(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candid
     uint32_t count_a = fct_simplify_gather(s, a, s->ring_a), count_b = fct_simplify_gather(s, b, s->ring_b);
     if (s->blocks && (!is_in_block(s, s->ring_a, count_a) || !is_in_block(s, s->ring_b, count_b)))
         return false;
-    if (candidate->end == 2 && v3_norm2(v3_sub(point_position(s, a), point_position(s, b))) == 0)
-        candidate->end = 0, candidate->at = point_position(s, ends[0]);
     const fct_move move = {a, b, count_a, count_b, candidate->at};
     fct_walls walls;
     if (!fct_simplify_joins_well(s, &move) || !fct_simplify_find_walls(s, &move, &walls)) {
