@@ -5,6 +5,7 @@
 #include "simplify/classes.h"
 #include "simplify/cost/constraint.h"
 #include "simplify/log.h"
+#include "simplify/pairs/list.h"
 
 /* The ridge of a retired wedge's attributes, relative to the trace: it only keeps the pivots above 0. */
 #define RETIRED_RIDGE 1e-12
@@ -135,6 +136,16 @@ static void move_corners(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t cou
     point_at(s, a)->last_corner = last;
 }
 
+void fct_simplify_remove_face(fct_simplifier *s, uint32_t f) {
+    for (uint32_t c = 3 * f; c < 3 * f + 3; ++c) {
+        count_corner_out(s, c);
+        if (s->corner_wedges && s->wedge_uses[corner_wedge(s, c)] == 0)
+            retire_wedge(s, s->triangles[c], corner_wedge(s, c));
+    }
+    s->triangles[3 * f] = FCT_NONE;
+    --s->live_faces;
+}
+
 void fct_simplify_remove_faces(fct_simplifier *s, uint32_t point) {
     if (s->log) s->log->records[s->log->count - 1].body = true;
     for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
@@ -160,6 +171,7 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
     fct_constraint_merge(s, a, b);
     if (s->pins) add_quadric(s->pins[a], s->pins[b], POSITION_QUADRIC);
     if (s->weights && s->weights[b] > s->weights[a]) s->weights[a] = s->weights[b];
+    if (s->next_pairs) fct_simplify_join_pairs(s, a, b);
     point_at(s, a)->at = candidate->at;
     if (s->log) fct_log_end(s, fct_candidate_error(candidate));
 }

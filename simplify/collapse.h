@@ -10,6 +10,8 @@ void fct_simplify_collapse(fct_simplifier *s, const uint32_t ends[2], const fct_
                            uint32_t keep, uint32_t count_b);
 /* Removes the faces at the point that was contracted last. */
 void fct_simplify_remove_faces(fct_simplifier *s, uint32_t point);
+/* Removes one face. */
+void fct_simplify_remove_face(fct_simplifier *s, uint32_t f);
 /* Takes an edge out of the queue for good. */
 void fct_simplify_drop_edge(fct_simplifier *s, uint32_t e);
 

@@ -17,6 +17,8 @@
 #include "simplify/cost/constraint.h"
 #include "simplify/cost/loss.h"
 #include "simplify/log.h"
+#include "simplify/pairs/join.h"
+#include "simplify/pairs/release.h"
 #include "simplify/sweep.h"
 #include "simplify/topology/link.h"
 #include "simplify/topology/remain.h"
@@ -42,6 +44,30 @@ static void requeue_edge(fct_simplifier *s, uint32_t side) {
     queue_push(s->queue, e, s->queue->current);
 }
 
+/* Returns the refused pairs of a point to the queue, and drops dead ones from its list. A block leaves pairs
+ * with other blocks alone. */
+static void requeue_pairs(fct_simplifier *s, uint32_t point) {
+    uint32_t *link = &s->first_pairs[point], last = FCT_NONE;
+    while (*link != FCT_NONE) {
+        uint32_t entry = *link, e = s->first_pair + entry / 2;
+        fct_edge *edge = &s->edges[e];
+        uint32_t other = edge->ends[1 - entry % 2]; /* in a block: resolved when the sweep began */
+        bool own = !s->blocks || s->blocks[other] == s->block;
+        if (own && edge->state == EDGE_DEAD) {
+            *link = s->next_pairs[entry];
+            continue;
+        }
+        if (own && edge->state == EDGE_REFUSED) {
+            edge->state = EDGE_QUEUED;
+            edge->ends_only = false;
+            queue_push(s->queue, e, s->queue->current);
+        }
+        last = entry;
+        link = &s->next_pairs[entry];
+    }
+    s->last_pairs[point] = last;
+}
+
 /* Returns the refused edges of the faces of a ring to the queue. `refused` marks the points that may have
  * some. */
 static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t count) {
@@ -51,6 +77,27 @@ static void requeue_around(fct_simplifier *s, const uint32_t *ring, uint32_t cou
         for (uint32_t k = 0; k < 3; ++k)
             if (s->refused[s->triangles[f + k]] && s->refused[s->triangles[f + (k + 1) % 3]])
                 requeue_edge(s, f + k);
+        for (uint32_t k = 0; k < 3 && s->next_pairs; ++k)
+            if (s->refused[s->triangles[f + k]]) requeue_pairs(s, s->triangles[f + k]);
+    }
+}
+
+/* Returns what was refused around the point that replaced a and b. */
+static void requeue_rings(fct_simplifier *s, const fct_move *move) {
+    s->refused[move->a] |= s->refused[move->b];
+    if (!s->refused[move->a]) return;
+    requeue_around(s, s->ring_a, move->count_a);
+    requeue_around(s, s->ring_b, move->count_b);
+}
+
+/* Refuses an edge whose best position is not allowed, or tries it again at its ends. */
+static void refuse_position(fct_simplifier *s, uint32_t e, const uint32_t ends[2]) {
+    fct_edge *edge = &s->edges[e];
+    if (edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
+        refuse_edge(s, e, ends, EDGE_REFUSED);
+    else {
+        edge->ends_only = true;
+        queue_push(s->queue, e, s->queue->current);
     }
 }
 
@@ -94,7 +141,6 @@ static bool is_in_block(const fct_simplifier *s, const uint32_t *ring, uint32_t 
 /* Contracts the edge if the checks and the loss allow it. Gathers both rings, or only that of the smaller end
  * if the larger one is a hub. An edge of two hubs is dropped, and so is one without faces. */
 static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
-    fct_edge *edge = &s->edges[e];
     uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
     uint32_t a = ends[keep], b = ends[1 - keep];
     bool hub = point_at(s, a)->valence > SIMPLIFY_HUB, two_hubs = point_at(s, b)->valence > SIMPLIFY_HUB,
@@ -109,12 +155,10 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
         return false;
     const fct_move move = {a, b, count_a, count_b, candidate->at};
     if (!check_contraction(s, &move, &body)) {
-        if (hub || edge->ends_only || s->def->placement > FCT_PLACE_SEGMENT)
+        if (hub)
             refuse_edge(s, e, ends, EDGE_REFUSED);
-        else {
-            edge->ends_only = true;
-            queue_push(s->queue, e, s->queue->current);
-        }
+        else
+            refuse_position(s, e, ends);
         return false;
     }
     fct_loss loss;
@@ -132,11 +176,41 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     if (body) fct_simplify_remove_faces(s, a);
     if (cost > 0) fct_loss_add(&loss, point_at(s, a)->quadric);
     if (cost > 0 && s->steering) fct_loss_add(&loss, wedge_quadric(s, s->first_wedges[a]));
-    s->refused[a] |= s->refused[b];
-    if (s->refused[a]) {
-        requeue_around(s, s->ring_a, count_a);
-        requeue_around(s, s->ring_b, count_b);
+    requeue_rings(s, &move);
+    return true;
+}
+
+/* Whether the ends of a pair are still apart, have faces and are no hubs. */
+static bool is_pair(const fct_simplifier *s, uint32_t a, uint32_t b) {
+    uint32_t most = point_at(s, a)->valence, least = point_at(s, b)->valence;
+    return least > 0 && most <= SIMPLIFY_HUB &&
+           fct_simplify_find_side(s, point_at(s, b)->first_corner, a) == FCT_NONE;
+}
+
+/* Contracts the pair if the checks allow it. */
+static bool try_pair(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
+    uint32_t keep = point_at(s, ends[1])->valence > point_at(s, ends[0])->valence;
+    uint32_t a = ends[keep], b = ends[1 - keep];
+    if (!is_pair(s, a, b)) {
+        fct_simplify_drop_edge(s, e);
+        return false;
     }
+    uint32_t count_a = fct_simplify_gather(s, a, s->ring_a), count_b = fct_simplify_gather(s, b, s->ring_b);
+    if (s->blocks && (!is_in_block(s, s->ring_a, count_a) || !is_in_block(s, s->ring_b, count_b)))
+        return false;
+    const fct_move move = {a, b, count_a, count_b, candidate->at};
+    fct_walls walls;
+    if (!fct_simplify_joins_well(s, &move) || !fct_simplify_find_walls(s, &move, &walls)) {
+        refuse_position(s, e, ends);
+        return false;
+    }
+    if (s->blocks && s->live_faces < s->least_faces + fct_simplify_count_walls(&walls)) return false;
+    fct_simplify_drop_edge(s, e);
+    fct_simplify_collapse(s, ends, candidate, keep, count_b);
+    fct_simplify_join_classes(s, a);
+    fct_simplify_remove_walls(s, &walls);
+    ++s->pairs_joined;
+    requeue_rings(s, &move);
     return true;
 }
 
@@ -155,7 +229,8 @@ static bool process_edge(fct_simplifier *s, uint32_t e) {
     }
     candidate.key *= paint_factor(s, ends[0], ends[1]);
     if (!confirm_cost(s, e, ends, &candidate)) return false;
-    if (!try_contraction(s, e, ends, &candidate)) return false;
+    if (e >= s->first_pair ? !try_pair(s, e, ends, &candidate) : !try_contraction(s, e, ends, &candidate))
+        return false;
     if (candidate.distance2 > 0) s->max_error2 = fct_max(s->max_error2, candidate.distance2 / candidate.area);
     return true;
 }
@@ -175,11 +250,28 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
 
 /* The loop of a block in a sweep. It ends while a body of four faces may still vanish. */
 static void contract_block(fct_simplifier *s) {
-    while (s->live_faces >= s->least_faces + 4 && s->wedge_room >= SIMPLIFY_MAX_WEDGES) {
+    while (s->live_faces >= s->least_faces + 4 && s->wedge_room >= SIMPLIFY_MAX_WEDGES &&
+           s->wall_room >= SIMPLIFY_HUB) {
         uint32_t e = queue_pop(s->queue);
         if (e == FCT_NONE) return;
         if (s->edges[e].state == EDGE_QUEUED) process_edge(s, e);
     }
+}
+
+/* Sweeps do not requeue pairs between two blocks. */
+static void retry_pairs(fct_simplifier *s) {
+    for (uint32_t e = s->first_pair; e < s->edge_count; ++e) {
+        if (s->edges[e].state != EDGE_REFUSED) continue;
+        s->edges[e].state = EDGE_QUEUED;
+        s->edges[e].ends_only = false;
+    }
+}
+
+static void fill_queue(fct_simplifier *s) {
+    fct_simplify_reprice(s);
+    queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);
+    for (uint32_t e = s->edge_count; e-- > 0;)
+        if (s->edges[e].state == EDGE_QUEUED) queue_push(s->queue, e, s->edges[e].bucket);
 }
 
 fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
@@ -193,13 +285,16 @@ fct_result fct_simplify_contract(fct_simplifier *s, fct_stop *stop) {
     s->priced = true;
     result = fct_simplify_sweep(s, contract_block);
     if (result != FCT_OK) return result;
-    queue_clear(s->queue, s->edges, QUEUE_BUCKETS - 1);
-    for (uint32_t e = s->edge_count; e-- > 0;)
-        if (s->edges[e].state == EDGE_QUEUED) queue_push(s->queue, e, s->edges[e].bucket);
+    retry_pairs(s);
+    fill_queue(s);
     while (s->live_faces > s->def->target_faces) {
         uint32_t e = queue_pop(s->queue);
         if (e == FCT_NONE) break;
         if (s->edges[e].state != EDGE_QUEUED) continue;
+        if (s->released && s->queue->current > s->released_bucket) {
+            fill_queue(s);
+            continue;
+        }
         if (s->log && (result = fct_log_reserve(s)) != FCT_OK) return result;
         if (!process_edge(s, e) || ++contractions % PROGRESS_PERIOD) continue;
         double goal = (double)before - s->def->target_faces;

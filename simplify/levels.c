@@ -80,6 +80,7 @@ static fct_result run_level(fct_simplifier *s, fct_mesh *out, bool measure, fct_
     if (result == FCT_OK) result = write_refitted(s, out, measure, stats, keep);
     stats->faces_after = out->face_count;
     stats->max_cost = sqrt(s->max_error2) * s->extent;
+    stats->pairs_found = s->edge_count - s->first_pair, stats->pairs_joined = s->pairs_joined;
     return result;
 }
 

@@ -12,8 +12,9 @@
 fct_result fct_log_create(fct_simplifier *s) {
     fct_log *log = s->log = fct_allocate_zero(s->env, 1, sizeof *log);
     if (!log) return fct_fail_memory(s->env, "a log");
-    const fct_array arrays[] = {FCT_ARRAY(log->records, s->point_count),
-                                FCT_ARRAY_ZERO(log->keys, s->point_count),
+    /* A contraction takes a point, a wall takes a face. */
+    size_t records = (size_t)s->point_count + (s->next_pairs ? s->face_count : 0);
+    const fct_array arrays[] = {FCT_ARRAY(log->records, records), FCT_ARRAY_ZERO(log->keys, s->point_count),
                                 FCT_ARRAY(log->locked, s->point_count)};
     fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "a log");
     for (uint32_t p = 0; p < s->point_count && result == FCT_OK; ++p) log->locked[p] = point_is_locked(s, p);
@@ -93,7 +94,7 @@ void fct_log_end(fct_simplifier *s, double error) {
     fct_log *log = s->log;
     fct_record *record = &log->records[log->count];
     write_point(s, record->kept, record->at);
-    record->error = (float)fct_min(error * s->extent, FLT_MAX); /* a file has no infinite errors */
+    record->error = (float)fct_min(error * s->extent, (double)FLT_MAX); /* a file has no infinite errors */
     for (uint32_t w = s->channel_count ? s->first_wedges[record->kept] : FCT_NONE; w != FCT_NONE;
          w = s->next_wedges[w]) {
         write_wedge(s, w, log->values + s->channel_count * log->wedge_count);
@@ -103,20 +104,37 @@ void fct_log_end(fct_simplifier *s, double error) {
     ++log->count;
 }
 
-fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t points, uint32_t wedges,
+/* The points of the faces get the key, because a later contraction there changes what is left of them. */
+void fct_log_wall(fct_simplifier *s, uint32_t first, uint32_t second) {
+    fct_log *log = s->log;
+    const fct_record *last = &log->records[log->count - 1];
+    log->records[log->count] = (fct_record){.kept = first == FCT_NONE ? FCT_NONE : first / 3,
+                                            .gone = second / 3,
+                                            .key = last->key,
+                                            .error = last->error,
+                                            .first_wedge = (uint32_t)log->wedge_count,
+                                            .wall = true};
+    for (uint32_t k = 0; k < 3; ++k) {
+        uint16_t *key = &log->keys[s->triangles[second - second % 3 + k]];
+        if (*key < last->key) *key = last->key;
+    }
+    ++log->count;
+}
+
+fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t records, uint32_t wedges,
                          fct_log **out) {
     *out = NULL;
     if (!s->log) return FCT_OK;
     if (!s->channel_count) wedges = 0;
     size_t wedge_room = (size_t)blocks * wedges;
     fct_log all = {0}, *logs;
-    const fct_array arrays[] = {FCT_ARRAY(logs, blocks), FCT_ARRAY(all.records, (size_t)blocks * points),
+    const fct_array arrays[] = {FCT_ARRAY(logs, blocks), FCT_ARRAY(all.records, (size_t)blocks * records),
                                 FCT_ARRAY(all.wedges, wedge_room),
                                 FCT_ARRAY(all.values, wedge_room * s->channel_count)};
     fct_result result = fct_allocate_all(s->env, arrays, FCT_LENGTH(arrays), "the logs of a sweep");
     if (result != FCT_OK) return result;
     for (size_t b = 0; b < blocks; ++b)
-        logs[b] = (fct_log){.records = all.records + b * points,
+        logs[b] = (fct_log){.records = all.records + b * records,
                             .wedges = all.wedges + b * wedges,
                             .values = all.values + b * wedges * s->channel_count,
                             .keys = s->log->keys};

@@ -10,13 +10,14 @@
 #include "simplify/state.h"
 
 typedef struct fct_record {
-    uint32_t kept, gone; /* points; both are gone if `body` */
+    uint32_t kept, gone; /* points; both are gone if `body`; if `wall`, faces that vanish (FCT_NONE: none) */
     /* The wedges of the kept point afterwards: entries of fct_log.wedges. None without attributes. */
     uint32_t first_wedge, wedge_count;
     float at[3];  /* the position of the kept point afterwards, as it is written */
     float error;  /* as fct_simplify_def.max_error measures it */
     uint16_t key; /* records sorted by key, equal keys in the order of the log, are in a valid order too */
     bool body;    /* all faces at the kept point vanish as well */
+    bool wall;    /* no contraction: an inner wall vanishes */
 } fct_record;
 
 typedef struct fct_log {
@@ -42,10 +43,14 @@ fct_result fct_log_reserve(fct_simplifier *s);
 void fct_log_begin(fct_simplifier *s, uint32_t a, uint32_t b, uint32_t count_b);
 /* Completes it afterwards, when a has its new position and wedges. */
 void fct_log_end(fct_simplifier *s, double error);
+/* Records that the faces of two corners vanish after the last contraction, at its point; first may be
+ * FCT_NONE. */
+void fct_log_wall(fct_simplifier *s, uint32_t first, uint32_t second);
 
-/* One empty log per block, with room for `points` records and `wedges` wedges each; NULL if s has no log.
+/* One empty log per block, with room for `records` records and `wedges` wedges each; NULL if s has no log.
  * Errors: MEMORY. */
-fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t points, uint32_t wedges, fct_log **out);
+fct_result fct_log_split(fct_simplifier *s, uint32_t blocks, uint32_t records, uint32_t wedges,
+                         fct_log **out);
 /* Appends the logs of the blocks to that of s and destroys them. NULL is allowed. Errors: MEMORY. */
 fct_result fct_log_join(fct_simplifier *s, fct_log *logs, uint32_t blocks);
 

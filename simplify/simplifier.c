@@ -6,6 +6,7 @@
 #include "simplify/cost/fundamental.h"
 #include "simplify/handle/history.h"
 #include "simplify/log.h"
+#include "simplify/pairs/candidates.h"
 #include "simplify/topology/topology.h"
 
 fct_result fct_simplifier_scratch(fct_simplifier *s) {
@@ -25,6 +26,7 @@ fct_result fct_simplifier_fill(fct_simplifier *s) {
     if (result == FCT_OK) result = fct_simplify_attributes(s);
     if (result == FCT_OK) result = fct_simplify_quadrics(s);
     if (result == FCT_OK) result = fct_simplify_constraints(s);
+    if (result == FCT_OK) result = fct_simplify_pairs(s);
     if (result != FCT_OK) return result;
     s->refused = fct_allocate_zero(s->env, s->point_count, sizeof *s->refused);
     s->side_marks = fct_allocate_zero(s->env, s->point_count, sizeof *s->side_marks);
@@ -67,7 +69,12 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->marks,
                       s->sorted.places,
                       s->sorted.vertex_places,
-                      s->sorted.locks};
+                      s->sorted.locks,
+                      s->first_pairs,
+                      s->last_pairs,
+                      s->next_pairs,
+                      s->solids,
+                      s->walled};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) fct_release(s->env, arrays[i]);
     fct_log_destroy(s->env, s->log);
     fct_mesh_release(s->env, &s->sorted.mesh);

@@ -10,6 +10,7 @@
  */
 #include "simplify/simplify.h"
 
+#include "simplify/handle/handle.h"
 #include "simplify/levels.h"
 #include "simplify/simplifier.h"
 
@@ -58,6 +59,12 @@ fct_result fct_simplify_check(const fct_env *env, const fct_mesh *mesh, const fc
         if (!is_weight(weights[i].value))
             return fct_fail(env, FCT_ERROR_DATA, "%s is %g, expected 0 or a number from 1e-12 to 1e12",
                             weights[i].name, weights[i].value);
+    if (!(def->pair_distance >= 0))
+        return fct_fail(env, FCT_ERROR_DATA, "pair_distance is %g, expected at least 0", def->pair_distance);
+    if (def->pair_distance > 0 && def->keep_topology)
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "pair_distance is %g with keep_topology, expected one of them: pairs join bodies",
+                        def->pair_distance);
     if ((unsigned)def->placement > FCT_PLACE_SUBSET)
         return fct_fail(env, FCT_ERROR_DATA, "placement is %d, expected a fct_placement",
                         (int)def->placement);
@@ -83,7 +90,7 @@ static fct_result simplify(const fct_env *env, const fct_mesh *mesh, const fct_s
     if (result != FCT_OK) return result;
     fct_simplify_def first = *def;
     first.target_faces = w->target_faces[0];
-    result = fct_simplifier_create(env, mesh, &first, &s);
+    result = fct_handle_create(env, mesh, &first, &s);
     if (result != FCT_OK) return result;
     found.seconds_init = fct_seconds() - start;
     result = fct_simplify_run(s, w, &found);

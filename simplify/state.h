@@ -32,6 +32,9 @@ enum {
 
 enum { EDGE_BOUNDARY = 1, EDGE_BORDER = 2 };
 
+/* Whether the body of a point is closed, and whether its volume lies behind the faces or before them. */
+enum { SOLID_NONE, SOLID, SOLID_INSIDE_OUT };
+
 /* One float of an attribute. value * factor is its coordinate in the space of the quadrics. */
 typedef struct fct_channel {
     enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD } source;
@@ -99,6 +102,7 @@ struct fct_simplifier {
     const fct_simplify_def *def;
     v3 center;
     double extent; /* longest side of the bounds, 1 if that is 0 */
+    double step;   /* between floats at the largest coordinate, in units of the mesh */
 
     uint32_t point_count, wedge_count, edge_count;
     uint32_t face_count, live_faces; /* faces with three distinct points: at the start, and now */
@@ -117,6 +121,17 @@ struct fct_simplifier {
 
     fct_edge *edges;
     uint8_t *edge_flags; /* per edge: EDGE_BOUNDARY, EDGE_BORDER; valid until the constraints are made */
+
+    /* Pairs of points without a common face (pairs/candidates.h): the edges from first_pair on. Entry
+     * 2 (e - first_pair) + k of a list stands for end k of the pair e. NULL without pair_distance. */
+    uint32_t first_pair;
+    uint32_t *first_pairs, *last_pairs; /* per point: its list of pairs */
+    uint32_t *next_pairs;               /* per entry */
+    uint8_t *solids;                    /* per point of the input: SOLID_NONE and so on */
+    uint8_t *walled;                    /* per point: 1 if a face there vanished as an inner wall */
+    uint32_t pairs_joined;
+    bool released;            /* planes of walls left quadrics, so costs in the queue may be too high */
+    uint32_t released_bucket; /* `current` of the queue at that time */
 
     /* Per wedge. The first `steering` channels are dimensions of the quadrics; the others are interpolated.
      */
@@ -152,6 +167,7 @@ struct fct_simplifier {
     const uint32_t *blocks;      /* per point: its block; NULL outside of sweeps */
     uint32_t block, least_faces; /* the block, and live_faces at which it stops */
     uint32_t wedge_room;         /* the wedges that contractions of the block may still write */
+    uint32_t wall_room;          /* the inner walls that may still vanish in the block */
     double least_height;  /* a face with a smaller height may lose its area when its corners become floats */
     uint8_t *refused;     /* per point: 1 if an edge at the point may be refused */
     uint32_t *link_marks; /* per point; only with keep_topology */

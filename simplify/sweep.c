@@ -11,12 +11,14 @@
 
 #include "base/parallel.h"
 #include "simplify/log.h"
+#include "simplify/pairs/release.h"
 
 enum {
     BLOCK_POINTS = 4096,
     LEAST_EDGES = 8192,             /* of a sweep */
     LEAST_SHARE = 32,               /* sweeps go on while they contract this part of their edges */
     MOST_WEDGES = 8 * BLOCK_POINTS, /* a block stops when it has written so many, so that a log has room */
+    MOST_WALLS = BLOCK_POINTS,      /* likewise, inner walls that vanish */
 };
 
 typedef struct sweep {
@@ -63,10 +65,18 @@ static void cut_blocks(sweep *w, uint32_t first) {
     w->block_count = block + 1;
 }
 
+/* A block asks for the blocks of its pairs, also of those that are not chosen. */
+static void resolve_pairs(fct_simplifier *s) {
+    for (uint32_t e = s->first_pair; e < s->edge_count; ++e)
+        for (int k = 0; k < 2; ++k)
+            s->edges[e].ends[k] = fct_sets_find(s->point_parents, s->edges[e].ends[k]);
+}
+
 /* Lists the queued edges up to the limit by their blocks. Edges between blocks are left out. */
 static void choose_edges(sweep *w) {
     fct_simplifier *s = w->s;
     uint32_t count = 0;
+    resolve_pairs(s);
     memset(w->starts, 0, ((size_t)w->block_count + 1) * sizeof *w->starts);
     for (uint32_t i = 0; i < w->edge_count; ++i) {
         fct_edge *e = &s->edges[w->edges[i]];
@@ -92,6 +102,7 @@ static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint3
         use_scratch(s, w->s->scratches + thread);
         s->blocks = w->blocks, s->block = (uint32_t)b;
         s->wedge_room = MOST_WEDGES;
+        s->wall_room = MOST_WALLS;
         if (w->logs) s->log = &w->logs[b];
         queue_clear(s->queue, s->edges, w->limit);
         for (uint32_t i = w->starts[b + 1]; i-- > w->starts[b];)
@@ -104,26 +115,32 @@ static void run_blocks(void *user, size_t begin, size_t end, size_t chunk, uint3
 }
 
 /* Runs one sweep, with blocks that begin at another point than those of the sweep before. *contracted: the
- * number of edges that took two faces. */
+ * number of pairs, and of edges if each took two faces. */
 static fct_result run_sweep(sweep *w, uint32_t number, uint32_t *contracted) {
     fct_simplifier *s = w->s;
     cut_blocks(w, number % 2 ? BLOCK_POINTS / 2 : BLOCK_POINTS);
     choose_edges(w);
     w->results = fct_allocate(s->env, w->block_count, sizeof *w->results);
     if (!w->results) return fct_fail_memory(s->env, "blocks of points");
-    fct_result result = fct_log_split(s, w->block_count, BLOCK_POINTS, MOST_WEDGES, &w->logs);
+    fct_result result = fct_log_split(s, w->block_count, BLOCK_POINTS + (s->next_pairs ? MOST_WALLS : 0),
+                                      MOST_WEDGES, &w->logs);
     if (result != FCT_OK) goto done;
     fct_parallel_for(s->env, w->block_count, 1, run_blocks, w);
-    uint32_t before = s->live_faces, side_epoch = s->side_epoch, link_epoch = s->link_epoch;
+    uint32_t before = s->live_faces, joined = s->pairs_joined, side_epoch = s->side_epoch,
+             link_epoch = s->link_epoch;
     for (uint32_t b = 0; b < w->block_count; ++b) {
         const fct_simplifier *r = &w->results[b];
         s->live_faces -= before - r->live_faces;
         s->max_error2 = fct_max(s->max_error2, r->max_error2);
+        s->pairs_joined += r->pairs_joined - joined;
+        if (r->released && (!s->released || r->released_bucket > s->released_bucket))
+            s->released_bucket = r->released_bucket;
+        s->released |= r->released;
         if (r->side_epoch > side_epoch) side_epoch = r->side_epoch;
         if (r->link_epoch > link_epoch) link_epoch = r->link_epoch;
     }
     s->side_epoch = side_epoch, s->link_epoch = link_epoch;
-    *contracted = (before - s->live_faces) / 2;
+    *contracted = (before - s->live_faces) / 2 + s->pairs_joined - joined;
     result = fct_log_join(s, w->logs, w->block_count);
 done:
     fct_release(s->env, w->results);
@@ -138,6 +155,7 @@ static fct_result run_sweeps(sweep *w) {
     for (uint32_t number = 0;; ++number) {
         uint32_t count, contracted = 0;
         if (s->live_faces < target + LEAST_EDGES) return FCT_OK;
+        fct_simplify_reprice(s);
         w->limit = find_limit(w, s->live_faces - target, &count);
         if (count < LEAST_EDGES) return FCT_OK;
         fct_result result = run_sweep(w, number, &contracted);

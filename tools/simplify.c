@@ -45,7 +45,8 @@ enum {
     KEY_RESUME,
     KEY_SAVE_STATE,
     KEY_CONTOUR,
-    KEY_PAINT
+    KEY_PAINT,
+    KEY_PAIRS
 };
 
 static const struct argp_option simplify_options_table[] = {
@@ -63,6 +64,11 @@ static const struct argp_option simplify_options_table[] = {
      "The attributes that count in the error, with optional weights, such as color=.02,uv=.1,normal=.01; "
      "none: only the shape counts. Default: all attributes of the mesh; uv and normal have the weights of "
      "this example, color has 2 / sqrt(faces of the result), at most .1",
+     0},
+    {"pairs", KEY_PAIRS, "TAU", 0,
+     "Also contract pairs of points of different bodies that are at most TAU apart, so that near bodies "
+     "join; "
+     "in the mesh's unit (default 0: edges only)",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
@@ -147,7 +153,7 @@ static error_t parse_levels(simplify_options *o, char *list, struct argp_state *
 /* Notes options that a state has of its own. */
 static void note_shaping(simplify_options *o, int key) {
     static const int keys[] = {KEY_ATTRIBUTES, KEY_PLACEMENT,   KEY_WEIGHTS,  KEY_BOUNDARY, KEY_FEATURE,
-                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT};
+                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT,    KEY_PAIRS};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i)
         for (const struct argp_option *option = simplify_options_table; keys[i] == key && option->name;
              ++option)
@@ -162,6 +168,10 @@ static error_t check_options(const simplify_options *o, struct argp_state *state
     if (o->progressive && (o->resume || o->save_state || o->contour || o->paint))
         return tool_usage(state,
                           "--progressive: expected neither --resume, --save-state, --contour nor --paint");
+    if (o->def.pair_distance > 0 && o->def.keep_topology)
+        return tool_usage(state, "expected either --pairs or --keep-topology, found both");
+    if (o->def.pair_distance > 0 && (o->save_state || o->contour || o->paint))
+        return tool_usage(state, "--pairs: expected neither --save-state, --contour nor --paint");
     if (o->resume && o->shaping) return tool_usage(state, "--resume: the state has its own --%s", o->shaping);
     return 0;
 }
@@ -213,6 +223,8 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         return 0;
     case KEY_LEVELS:
         return parse_levels(o, text, state);
+    case KEY_PAIRS:
+        return tool_parse_real(state, "--pairs", text, 0, INFINITY, &o->def.pair_distance);
     case KEY_RESUME:
         o->resume = text;
         return 0;
@@ -254,9 +266,10 @@ static const char *const stop_reasons[] = {
 
 /* The keys of one result, without times. */
 static json_t *pack_result(const fct_mesh *mesh, const fct_simplify_stats *s) {
-    return json_pack("{s:I, s:I, s:I, s:s, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "faces_before",
+    return json_pack("{s:I, s:I, s:I, s:s, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "faces_before",
                      (json_int_t)s->faces_before, "faces_after", (json_int_t)s->faces_after, "vertices",
                      (json_int_t)mesh->vertex_count, "stopped_because", stop_reasons[s->stopped_because],
+                     "pairs_found", (json_int_t)s->pairs_found, "pairs_joined", (json_int_t)s->pairs_joined,
                      "max_cost", s->max_cost, "distance_rms", s->distance_rms, "distance_max",
                      s->distance_max, "color_rms", s->color_rms, "uv_rms", s->texcoord_rms, "normal_rms",
                      s->normal_rms, "lost_area", s->lost_area);
@@ -501,7 +514,7 @@ done:
 }
 
 int tool_simplify(int argc, char **argv) {
-    static const tool_stage stages[] = {{"read", 5},   {"costs", 3}, {"contract", 78},
+    static const tool_stage stages[] = {{"read", 5},   {"pairs", 2}, {"costs", 3}, {"contract", 76},
                                         {"refit", 12}, {"write", 2}, {0}};
     static const tool_command command = {
         .name = "simplify",
@@ -516,6 +529,7 @@ int tool_simplify(int argc, char **argv) {
             "until the faces are as few as --faces or --ratio says, or until the error would exceed "
             "--max-error.\n\n"
             "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or exhausted), "
+            "pairs_found and pairs_joined (candidates of --pairs, and contractions of them), "
             "max_cost (the largest error of a contraction), distance_rms, distance_max, color_rms, uv_rms, "
             "normal_rms (errors of the result), lost_area (the share of the area of IN that has no faces in "
             "OUT; the errors do not cover it), seconds{init, contract, refit, total}, peak_bytes. With "
@@ -525,6 +539,7 @@ int tool_simplify(int argc, char **argv) {
                     "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
                     "  facetree simplify bunny.obj --levels 20000,5000,1000 -o lod.ply\n"
+                    "  facetree simplify city.glb --ratio .05 --pairs .5 -o far.glb\n"
                     "  facetree simplify bunny.obj --faces 200 -o small.ply --progressive bunny.fpm",
         .options = simplify_options_table,
         .parse = parse_simplify,

@@ -26,7 +26,7 @@ typedef struct fct_simplifier fct_simplifier;
 
 /* Copies the mesh and the options, so both may be released. env must outlive *out. def->target_faces and
  * def->max_error are used only for the automatic weight of colours (FCT_WEIGHT_AUTO). Errors: those of
- * fct_simplify, with *out = NULL. */
+ * fct_simplify, and DATA if def->pair_distance is above 0: only edges are contracted. *out is then NULL. */
 FCT_API fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh,
                                          const fct_simplify_def *def, fct_simplifier **out);
 /* NULL is allowed. */

@@ -53,6 +53,16 @@ typedef struct fct_simplify_def {
      * distance, the root of the mean squared distance from the planes of the faces plus that from the planes
      * of the boundary (without boundary_weight). Attributes have no part in it. */
     double max_error;
+    /* Points of different bodies that are at most this far apart may be contracted, too, and join the bodies
+     * (Garland 1999, 3.2.1 and 6.4); in the mesh's unit, and up to the rounding of its coordinates; default
+     * 0: only edges are contracted. A body is a set of faces that common points join, so points of one body
+     * are no pair: a thin sheet does not collapse onto its other side. Each point has a pair with the nearest
+     * point of each of the 8 nearest other bodies in reach, so there are at most 8 pairs per point at any
+     * distance (infinity is allowed). Locked points and points of more than 512 faces have none. Such a pair
+     * costs what both quadrics measure at the best position, and no face of it vanishes. Then equal faces of
+     * two closed bodies that stand on each other, an inner wall, vanish, and of two equal faces that look the
+     * same way one does. Not together with keep_topology. */
+    double pair_distance;
     fct_placement placement; /* default OPTIMAL */
     fct_weighting weighting; /* default AREA */
     double color_weight;     /* default FCT_WEIGHT_AUTO */
@@ -85,6 +95,7 @@ FCT_API fct_simplify_def fct_simplify_def_default(void);
 typedef struct fct_simplify_stats {
     uint32_t faces_before, faces_after;
     fct_stop stopped_because;
+    uint32_t pairs_found, pairs_joined; /* by pair_distance: candidates, and contractions */
     double max_cost; /* the largest error of a contraction that was made, as max_error measures it */
     /* Errors of the result: root mean square, by area, over samples of the input (vertices and centroids of
      * faces: up to 12 per vertex of the result all of them, then one of eight, and at most 32), and the

@@ -38,7 +38,8 @@ bool fct_groups_fit(const fct_simplifier *s, uint32_t a, uint32_t b) {
 bool fct_groups_find(fct_simplifier *s, uint32_t a, uint32_t b, fct_groups *g) {
     g->wedge_count = 0;
     if (!list_wedges(s, a, false, g) || !list_wedges(s, b, true, g)) return false;
-    if (g->wedge_count == 2) {
+    /* The ends of an edge have a common face, those of a pair do not. */
+    if (g->wedge_count == 2 && !s->next_pairs) {
         g->group_of[0] = g->group_of[1] = 0;
         g->group_count = 1;
         return true;

@@ -41,7 +41,7 @@ typedef struct file_head {
     double origin[3];
 } file_head;
 _Static_assert(sizeof(file_head) == 144, "no gaps");
-_Static_assert(sizeof(fct_simplify_def) == 96, "the head holds all options");
+_Static_assert(sizeof(fct_simplify_def) == 104, "the head holds all options but pair_distance, which is 0");
 
 static const unsigned char magic[8] = {0x89, 'F', 'S', 'T', '\r', '\n', 0x1a, '\n'};
 

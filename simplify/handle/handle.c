@@ -36,8 +36,8 @@ static fct_result copy_sorted(fct_simplifier *s, const fct_mesh *mesh) {
     return fct_names_copy(s->env, mesh->material_names, mesh->material_count, &s->sorted.mesh.material_names);
 }
 
-fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
-                                 fct_simplifier **out) {
+fct_result fct_handle_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                             fct_simplifier **out) {
     *out = NULL;
     fct_simplifier *s;
     fct_result result = fct_simplify_check(env, mesh, def);
@@ -50,6 +50,15 @@ fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh, const
     else
         fct_simplifier_destroy(s);
     return result;
+}
+
+fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
+                                 fct_simplifier **out) {
+    *out = NULL;
+    if (def->pair_distance > 0)
+        return fct_fail(env, FCT_ERROR_DATA, "pair_distance is %g: a state holds no pairs, expected 0",
+                        def->pair_distance);
+    return fct_handle_create(env, mesh, def, out);
 }
 
 uint32_t fct_simplifier_faces(const fct_simplifier *s) {

@@ -173,8 +173,11 @@ static fct_result run_builder(fct_builder *b) {
     if (result != FCT_OK) return result;
     sort_records(b);
     fct_builder_start(b);
-    for (uint32_t i = 0; i < records && result == FCT_OK; ++i)
-        result = fct_builder_repeat(b, &b->log->records[b->order[i]]);
+    for (uint32_t i = 0; i < records && result == FCT_OK; ++i) {
+        const fct_record *r = &b->log->records[b->order[i]];
+        result = r->wall ? fct_builder_repeat_wall(b, r, b->log->records[b->order[i - 1]].wall)
+                         : fct_builder_repeat(b, r);
+    }
     if (result == FCT_OK) result = write_progressive(b);
     fct_release(s->env, b->moved);
     fct_release_all(s->env, arrays, FCT_LENGTH(arrays));

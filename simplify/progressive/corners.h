@@ -47,7 +47,8 @@ typedef struct fct_splits {
             corners, triangles, materials, face_colors, nodes, list, next, previous, ring;
     } room;
 
-    uint32_t step; /* the next one */
+    bool has_pairs; /* a split may have no faces */
+    uint32_t step;  /* the next one */
     uint32_t last_point;
 
     /* The current step. */

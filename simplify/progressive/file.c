@@ -25,7 +25,8 @@ enum {
     HAS_TEXCOORDS = 4,
     HAS_FACE_COLORS = 8,
     HAS_MATERIALS = 16,
-    HAS_NAMES = 32
+    HAS_NAMES = 32,
+    HAS_PAIRS = 64
 };
 
 typedef struct file_head {
@@ -71,7 +72,8 @@ static fct_result write_head(const fct_progressive *m, FILE *stream) {
     head.material_count = m->material_count;
     head.flags = (m->color != FCT_NONE ? HAS_COLORS : 0) | (m->normal != FCT_NONE ? HAS_NORMALS : 0) |
                  (m->texcoord != FCT_NONE ? HAS_TEXCOORDS : 0) | (m->face_colors ? HAS_FACE_COLORS : 0) |
-                 (m->materials ? HAS_MATERIALS : 0) | (m->material_names ? HAS_NAMES : 0);
+                 (m->materials ? HAS_MATERIALS : 0) | (m->material_names ? HAS_NAMES : 0) |
+                 (fct_splits_have_pairs(m) ? HAS_PAIRS : 0);
     memcpy(head.origin, m->origin, sizeof head.origin);
     size_t size = 0;
     for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
@@ -155,7 +157,7 @@ static const char *find_head_fault(const file_head *head, const unsigned char *d
     if (head->names_size > size - sizeof *head) return "truncated in the head";
     if (head->checksum != hash_head(head, (const char *)data + sizeof *head)) return "damaged head";
     if (head->face_count >= INT32_MAX || head->split_count >= INT32_MAX ||
-        head->base_faces > head->face_count || head->flags >= 2 * HAS_NAMES ||
+        head->base_faces > head->face_count || head->flags >= 2 * HAS_PAIRS ||
         head->material_count >= INT32_MAX)
         return "counts or flags out of range";
     if ((head->flags & HAS_NAMES) && head->material_count > head->names_size) return "names are missing";
@@ -279,7 +281,8 @@ static fct_result read_head(file_reader *r, fct_progressive *m) {
 static fct_result read_file(file_reader *r, fct_progressive *m) {
     fct_result result = read_head(r, m);
     if (result == FCT_OK)
-        result = fct_splits_read(m, r->head.flags & HAS_MATERIALS, r->head.flags & HAS_FACE_COLORS, &r->k);
+        result = fct_splits_read(m, r->head.flags & HAS_MATERIALS, r->head.flags & HAS_FACE_COLORS,
+                                 r->head.flags & HAS_PAIRS, &r->k);
     if (result == FCT_OK) result = read_blocks(r);
     if (r->k) m->point_count = r->k->point_count;
     fct_splits_close(r->k);

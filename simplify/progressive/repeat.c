@@ -235,6 +235,29 @@ static fct_result replace_nodes(fct_builder *b, const fct_record *r) {
     return FCT_OK;
 }
 
+static void end_step(fct_builder *b, float error) {
+    float before = b->step_count ? b->steps[b->step_count - 1].error : 0;
+    b->steps[b->step_count++] =
+        (fct_ended_step){b->ended_count, b->removed_count, error > before ? error : before};
+}
+
+fct_result fct_builder_repeat_wall(fct_builder *b, const fct_record *r, bool continues) {
+    static const fct_record apart = {.kept = FCT_NONE, .gone = FCT_NONE};
+    uint32_t first_removed = b->removed_count;
+    b->ring_count = 0;
+    for (int i = 0; i < 2; ++i) {
+        uint32_t f = i ? r->gone : r->kept;
+        if (f == FCT_NONE) continue;
+        b->dead[f] = true;
+        b->removed[b->removed_count++] = f;
+        for (uint32_t k = 3 * f; k < 3 * f + 3; ++k) --b->uses[b->handles[k]], --b->faces[b->points[k]];
+    }
+    fct_result result = end_apexes(b, &apart, first_removed);
+    if (continues) --b->step_count;
+    end_step(b, r->error);
+    return result;
+}
+
 fct_result fct_builder_repeat(fct_builder *b, const fct_record *r) {
     uint32_t first_removed = b->removed_count;
     b->ring_count = b->old_count = 0;
@@ -242,11 +265,11 @@ fct_result fct_builder_repeat(fct_builder *b, const fct_record *r) {
     gather_ring(b, r->gone);
     if (r->body) gather_ring(b, r->kept);
     remove_faces(b, r);
+    if (!b->s->channel_count) /* the ends of a pair have no common face */
+        merge_handles(b, b->wedge_handles[r->kept], b->wedge_handles[r->gone], r->kept);
     fct_result result = replace_nodes(b, r);
     if (result == FCT_OK) result = end_apexes(b, r, first_removed);
     join_rings(b, r);
-    float error = b->step_count ? b->steps[b->step_count - 1].error : 0;
-    b->steps[b->step_count++] =
-        (fct_ended_step){b->ended_count, b->removed_count, r->error > error ? r->error : error};
+    end_step(b, r->error);
     return result;
 }

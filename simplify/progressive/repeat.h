@@ -53,5 +53,8 @@ void fct_builder_start(fct_builder *b);
 /* Repeats a contraction, and appends what it ends to the lists. Cost: linear in the ring of the gone point;
  * where a handle of the kept point ends, in the ring of the kept point too. Errors: MEMORY. */
 fct_result fct_builder_repeat(fct_builder *b, const fct_record *r);
+/* Removes the faces of an inner wall. continues: the record before is a wall of the same pair, and both are
+ * one step. Errors: MEMORY. */
+fct_result fct_builder_repeat_wall(fct_builder *b, const fct_record *r, bool continues);
 
 #endif

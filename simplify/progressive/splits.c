@@ -247,6 +247,12 @@ static void code_error(fct_splits *k, uint32_t step) {
     if (!isfinite(m->errors[step])) fct_splits_fail(k);
 }
 
+/* Whether a step without faces is one: both ends have corners. */
+static bool is_pair_split(const fct_splits *k) {
+    return k->has_pairs && k->split != FCT_NONE && k->points[k->split].count > 0 &&
+           k->points[k->born].count > 0;
+}
+
 fct_result fct_splits_step(fct_splits *k) {
     fct_progressive *m = k->m;
     uint32_t step = k->step, count = k->names ? m->step_faces[step + 1] - m->step_faces[step] : 0;
@@ -258,7 +264,7 @@ fct_result fct_splits_step(fct_splits *k) {
     uint32_t first = k->names ? m->step_faces[step] : m->face_count;
     if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
     if (k->result == FCT_OK) count = fct_code_number(&k->coder, &k->models.faces, count);
-    if (step > 0 && count == 0) fct_splits_fail(k);
+    if (step > 0 && count == 0 && !is_pair_split(k)) fct_splits_fail(k);
     for (uint32_t i = 0; i < count && !fct_splits_stopped(k); ++i) code_face(k, first + i);
     if (!fct_splits_stopped(k)) code_error(k, step);
     if (fct_splits_stopped(k)) return k->result;
@@ -279,11 +285,18 @@ static fct_result start_splits(fct_progressive *m, fct_splits **out) {
     return FCT_OK;
 }
 
+bool fct_splits_have_pairs(const fct_progressive *m) {
+    for (uint32_t step = 1; step < m->step_count; ++step)
+        if (m->step_faces[step] == m->step_faces[step + 1]) return true;
+    return false;
+}
+
 fct_result fct_splits_write(fct_progressive *m, fct_splits **out) {
     fct_result result = start_splits(m, out);
     if (result != FCT_OK) return result;
     fct_splits *k = *out;
     size_t corners = 3 * (size_t)m->face_count;
+    k->has_pairs = fct_splits_have_pairs(m);
     const fct_array arrays[] = {FCT_ARRAY(k->points, m->point_count),
                                 FCT_ARRAY(k->names, m->point_count),
                                 FCT_ARRAY(k->next, corners),
@@ -301,10 +314,12 @@ fct_result fct_splits_write(fct_progressive *m, fct_splits **out) {
     return result;
 }
 
-fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face_colors, fct_splits **out) {
+fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face_colors, bool has_pairs,
+                           fct_splits **out) {
     fct_result result = start_splits(m, out);
     if (result != FCT_OK) return result;
     fct_splits *k = *out;
+    k->has_pairs = has_pairs;
     /* Also a mesh without faces has its arrays. */
     GROW(k, m->first_corners, k->room.first_corners, 1);
     if (has_materials) GROW(k, m->materials, k->room.materials, 1);

@@ -9,10 +9,13 @@
 
 #include "simplify/progressive/corners.h"
 
+/* Whether a split of m has no faces: it undoes the contraction of a pair. Cost: linear in the steps. */
+bool fct_splits_have_pairs(const fct_progressive *m);
 /* A writer of m, which is at its coarsest level. Errors: MEMORY. */
 fct_result fct_splits_write(fct_progressive *m, fct_splits **out);
 /* A reader, which adds what it reads to m. m has no steps, but the members of the head. Errors: MEMORY. */
-fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face_colors, fct_splits **out);
+fct_result fct_splits_read(fct_progressive *m, bool has_materials, bool has_face_colors, bool has_pairs,
+                           fct_splits **out);
 void fct_splits_close(fct_splits *splits);
 /* Codes the next step. The coder must have begun. A reader then has m at the level after it. Errors: MEMORY;
  * DATA without a message, if the stream is damaged. */

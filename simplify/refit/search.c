@@ -11,6 +11,9 @@
 
 /* A barycentric weight above this counts as positive. */
 #define RIM 1e-6
+/* A sample of an inner wall lands on other walls of the body, which are about perpendicular to it: cosine of
+ * the least angle. */
+#define WALL_COSINE .5
 
 enum { CACHE = 64 /* octets */, MAX_WALK = 4 /* steps from ring to ring */ };
 
@@ -140,6 +143,25 @@ static void walk_rings(search *w, const uint32_t *points, uint32_t count) {
     }
 }
 
+static v3 find_cross(v3 a, v3 b, v3 c) {
+    return v3_cross(v3_sub(b, a), v3_sub(c, a));
+}
+
+/* Whether the sample belongs to an inner wall that vanished: it has a point where one did, and the face on
+ * which it landed looks another way. */
+static bool is_inside(const fct_simplifier *s, uint32_t corner, const uint32_t *points, uint32_t count,
+                      uint32_t face) {
+    bool walled = false;
+    for (uint32_t k = 0; k < count; ++k) walled |= s->walled[points[k]];
+    if (!walled || face == FCT_NONE) return false;
+    uint32_t f = corner - corner % 3;
+    const uint32_t *t = s->triangles + 3 * (size_t)face;
+    v3 from =
+        find_cross(find_input_position(s, f), find_input_position(s, f + 1), find_input_position(s, f + 2));
+    v3 to = find_cross(point_position(s, t[0]), point_position(s, t[1]), point_position(s, t[2]));
+    return v3_dot(from, to) < WALL_COSINE * v3_norm(from) * v3_norm(to);
+}
+
 void fct_refit_search(const fct_refit *r, size_t begin, size_t end) {
     const fct_simplifier *s = r->s;
     search w = {.s = s};
@@ -158,5 +180,6 @@ void fct_refit_search(const fct_refit *r, size_t begin, size_t end) {
             search_ring(&w, point, s->corner_wedges ? s->wedge_parents[input] : FCT_NONE);
         }
         walk_rings(&w, points, number);
+        if (s->walled && is_inside(s, corners[0], points, number, w.out->face)) w.out->face = FCT_NONE;
     }
 }

@@ -234,6 +234,26 @@ bool fct_simplify_remains_good(fct_simplifier *s, const fct_move *move) {
     return true;
 }
 
+/* The remaining faces [begin, end), which are those of one end of a pair. */
+static bool check_fan(fct_simplifier *s, const fct_move *move, uint32_t point, uint32_t begin, uint32_t end) {
+    const fct_move own = {.a = point, .b = FCT_NONE};
+    ++s->side_epoch;
+    for (uint32_t i = begin; i < end; ++i) {
+        if (!check_moved_sides(s, &own, i)) return false;
+        if (s->remaining[i].turned && !check_fixed_side(s, move, &s->remaining[i])) return false;
+    }
+    return true;
+}
+
+bool fct_simplify_joins_well(fct_simplifier *s, const fct_move *move) {
+    fct_simplify_begin_move(s);
+    if (fct_simplify_folds_over(s, s->ring_a, move->count_a, move->b, point_position(s, move->a), move->at) ||
+        fct_simplify_folds_over(s, s->ring_b, move->count_b, move->a, point_position(s, move->b), move->at))
+        return false;
+    return !s->def->check_foldover || (check_fan(s, move, move->a, 0, move->count_a) &&
+                                       check_fan(s, move, move->b, move->count_a, s->remaining_count));
+}
+
 bool fct_simplify_is_level(const fct_simplifier *s) {
     /* Without check_foldover open sides are not counted. */
     if (s->remaining_count == 0 || !s->level || !s->def->check_foldover || s->open_sides > 0) return false;

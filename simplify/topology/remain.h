@@ -28,6 +28,9 @@ bool fct_simplify_folds_over(fct_simplifier *s, const uint32_t *ring, uint32_t c
  * another, no edge of more than two faces, and no two faces that lie on each other, with less than 26 degrees
  * between them at their common edge. Without check_foldover every move is good. */
 bool fct_simplify_remains_good(fct_simplifier *s, const fct_move *move);
+/* The same for the contraction of a pair, whose ends have no common face. The faces of each end are judged by
+ * themselves: both may have faces at one edge. `remaining` lists those of a before those of b. */
+bool fct_simplify_joins_well(fct_simplifier *s, const fct_move *move);
 /* Whether the faces after the move that fct_simplify_remains_good accepted form one closed fan that is nearly
  * flat. Then they cover what was covered before. */
 bool fct_simplify_is_level(const fct_simplifier *s);

@@ -99,6 +99,7 @@ static void find_frame(fct_simplifier *s) {
     if (!(s->extent > 0)) s->extent = 1;
     double reach = fct_max(fabs(s->center.x), fct_max(fabs(s->center.y), fabs(s->center.z))) + .5 * s->extent;
     double step = fct_max(FLT_EPSILON * reach, FLT_TRUE_MIN);
+    s->step = step;
     s->least_height = LEAST_HEIGHT * step / s->extent;
 }
 

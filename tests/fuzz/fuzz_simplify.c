@@ -167,6 +167,10 @@ static void check(const fct_env *env, const fct_mesh *mesh, const fct_simplify_d
     fuzz_require(stats->max_cost >= 0 && stats->max_cost <= def->max_error * (1 + 1e-9), "the error's limit");
     if (stats->stopped_because == FCT_STOP_FACES)
         fuzz_require(out->face_count <= def->target_faces, "the target is reached");
+    fuzz_require(stats->pairs_joined <= stats->pairs_found &&
+                     stats->pairs_found <= 8 * (uint64_t)mesh->vertex_count &&
+                     (def->pair_distance > 0 || stats->pairs_found == 0),
+                 "the number of pairs");
     if (def->max_error == INFINITY) fuzz_require(stats->stopped_because != FCT_STOP_ERROR, "no limit");
     check_attributes(mesh, out);
     for (uint32_t v = 0; def->placement == FCT_PLACE_SUBSET && v < out->vertex_count; ++v)
@@ -176,6 +180,7 @@ static void check(const fct_env *env, const fct_mesh *mesh, const fct_simplify_d
     fuzz_require(before.flat || !after.flat, "no face loses its area");
     if (before.flat || before.doubled || before.crowded) return;
     fuzz_require(!after.doubled, "no face gets the corners of another");
+    if (stats->pairs_joined > 0) return; /* joined bodies share edges, and may touch there */
     fuzz_require(!after.crowded, "no edge gets a third face");
     fuzz_require(before.folded || before.coarse || !after.folded, "no face folds over");
 }
@@ -255,11 +260,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         def.boundary_weight = weight(&b, def.boundary_weight);
         def.regularization = weight(&b, def.regularization), def.feature_threshold = weight(&b, .1);
     }
+    uint32_t pairs = fuzz_byte(&b);
+    if (pairs & 1) def.pair_distance = pairs == 255 ? (double)fuzz_real(&b) : pairs / 16.;
     bool valid = fuzz_check_mesh(&env, &mesh) && def.max_error >= 0 &&
                  (is_weight(def.color_weight) || def.color_weight == FCT_WEIGHT_AUTO) &&
                  is_weight(def.texcoord_weight) && is_weight(def.normal_weight) &&
                  is_weight(def.boundary_weight) && is_weight(def.regularization) &&
-                 def.placement <= FCT_PLACE_SUBSET && def.feature_threshold >= 0;
+                 def.placement <= FCT_PLACE_SUBSET && def.pair_distance >= 0 &&
+                 !(def.pair_distance > 0 && def.keep_topology) && def.feature_threshold >= 0;
     fct_result result = fct_simplify(&env, &mesh, &def, &out, &stats);
     fuzz_require(result == (valid ? FCT_OK : FCT_ERROR_DATA), "valid input is simplified, and no other");
     fuzz_require(result == FCT_OK || (!out.positions && !out.triangles), "a failure leaves nothing behind");

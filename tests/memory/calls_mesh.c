@@ -240,6 +240,30 @@ static fct_result simplify(const fct_env *env) {
     return finish_mesh(env, &mesh, STARVE(fct_simplify(env, &inputs.sheet, &def, &mesh, NULL)));
 }
 
+/* Two sheets, one above the other, join. */
+static fct_result simplify_pairs(const fct_env *env) {
+    fct_mesh mesh, both;
+    const fct_mesh *sheet = &inputs.sheet;
+    fct_progressive *progressive;
+    fct_simplify_def def = fct_simplify_def_default();
+    def.target_faces = 10, def.pair_distance = .2;
+    assert_int_equal(fct_mesh_create(&inputs.env, 2 * sheet->vertex_count, 2 * sheet->face_count, 0, &both),
+                     FCT_OK);
+    for (uint32_t v = 0; v < both.vertex_count; ++v) {
+        const float *p = sheet->positions + 3 * (size_t)(v % sheet->vertex_count);
+        float *to = both.positions + 3 * (size_t)v;
+        to[0] = p[0], to[1] = p[1], to[2] = p[2] + (v < sheet->vertex_count ? 0 : .1F);
+    }
+    for (uint32_t c = 0; c < 3 * both.face_count; ++c) {
+        uint32_t second = c >= 3 * sheet->face_count;
+        both.triangles[c] = sheet->triangles[c % (3 * sheet->face_count)] + second * sheet->vertex_count;
+    }
+    fct_result result = STARVE(fct_simplify_progressive(env, &both, &def, &mesh, NULL, &progressive));
+    fct_progressive_destroy(progressive);
+    fct_mesh_release(&inputs.env, &both);
+    return finish_mesh(env, &mesh, result);
+}
+
 static fct_result simplify_levels(const fct_env *env) {
     fct_mesh levels[2];
     fct_simplify_def def = fct_simplify_def_default();
@@ -445,6 +469,7 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_simplifier_mesh", "", write_simplifier, false},
                                   {"fct_simplifier_save", "", save_simplifier, false},
                                   {"fct_simplifier_load", "", load_simplifier, false},
+                                  {"fct_simplify_progressive", "with pairs", simplify_pairs, false},
                                   {"fct_progressive_save", "", save_progressive, false},
                                   {"fct_progressive_load", "", load_progressive, false},
                                   {"fct_progressive_mesh", "", write_level, false},

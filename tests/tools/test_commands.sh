@@ -207,7 +207,7 @@ awk 'NR > 2 && NF == 3 { $3 += .25 } { print }' grid.off >raised.off
 expect 0 compare grid.off raised.off --json --samples 10
 holds "$(value e_avg) > .05 && $(value e_avg) < .0626 && $(value e_max) <= .25001 && $(value e_max) > .2499"
 expect 0 simplify sphere.off --faces 100 -o small.ply --json
-keys faces_before faces_after stopped_because max_cost seconds init contract total peak_bytes
+keys faces_before faces_after stopped_because pairs_found pairs_joined max_cost seconds init contract total peak_bytes
 holds "$(value faces_before) == 960 && $(value faces_after) <= 100 && $(value faces_after) >= 98"
 check "it says why it stopped" test "$(value stopped_because)" = faces
 expect 0 simplify sphere.fct --ratio .25 -o quarter.off --placement subset --refit 0 --keep-topology

@@ -22,6 +22,21 @@ expect 0 level sphere.fpm --max-error .01 -o fine.ply --json
 holds "$(value max_cost) <= .01 && $(value max_cost) > .005 && $(value faces) < 1520"
 expect 0 level sphere.fpm --faces 10 -o least.ply
 says "the coarsest level has 60 faces, 10 were asked for"
+# Three boxes in a row: edges alone keep them apart, pairs make one box of them, and the file holds all that.
+awk 'BEGIN { for (i = 0; i < 3; ++i) for (k = 0; k < 8; ++k) print "v", 1.01 * i + k % 2, int(k / 2) % 2, int(k / 4)
+    split("1 3 4 1 4 2 5 6 8 5 8 7 1 2 6 1 6 5 3 7 8 3 8 4 1 5 7 1 7 3 2 4 8 2 8 6", t, " ")
+    for (i = 0; i < 3; ++i) for (k = 1; k < 36; k += 3) print "f", t[k] + 8 * i, t[k + 1] + 8 * i, t[k + 2] + 8 * i }' >row.obj
+expect 0 simplify row.obj --faces 12 --pairs .01 -o row.ply --progressive row.fpm --json
+keys pairs_found pairs_joined
+holds "$(value pairs_found) == 8 && $(value pairs_joined) == 8 && $(value faces_after) == 12 && $(value distance_max) < 1e-6"
+expect 0 simplify row.obj --faces 12 --pairs .009 -o apart.ply --json
+holds "$(value pairs_found) == 0 && $(value pairs_joined) == 0"
+expect 0 level row.fpm --ratio 1 -o all.ply
+expect 0 compare all.ply row.obj --json
+holds "$(value e_max) < 1e-12"
+expect 0 level row.fpm --faces 12 -o least.ply
+expect 0 compare least.ply row.ply --json
+holds "$(value e_max) < 1e-5"
 head -c 3000 sphere.fpm >part.fpm
 expect 0 level part.fpm --faces 100 -o level.ply
 says "truncated"
@@ -48,7 +63,7 @@ leftovers
 finish
 # several levels in one run
 expect 0 simplify sphere.off --levels .5,300,60 -o chain.ply --json
-keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because max_cost distance_rms distance_max color_rms uv_rms normal_rms lost_area file
+keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because pairs_found pairs_joined max_cost distance_rms distance_max color_rms uv_rms normal_rms lost_area file
 holds "$("$program" info chain-1.ply --json | sed -n 's/.*"faces": \([0-9]*\).*/\1/p' | head -n 1) == 760"
 expect 0 simplify sphere.off --ratio .5 -o half.ply
 check "the first level is that of a run of its own" cmp -s half.ply chain-1.ply

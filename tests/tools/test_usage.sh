@@ -123,6 +123,10 @@ says "expected --faces N, --ratio R, --levels LIST or --max-error E"
 expect 64 simplify cube.off -o x.ply --faces 4 --ratio .5
 expect 64 simplify cube.off -o x.ply --ratio 0
 expect 64 simplify cube.off -o x.ply --ratio 2
+expect 64 simplify cube.off -o x.ply --faces 4 --pairs near
+expect 64 simplify cube.off -o x.ply --faces 4 --pairs -1
+expect 64 simplify cube.off -o x.ply --faces 4 --pairs .1 --keep-topology
+says "either --pairs or --keep-topology"
 expect 64 simplify cube.off -o x.ply --faces 4 --attributes smell
 says "expected color, uv or normal, found 'smell'"
 expect 64 simplify cube.off -o x.ply --faces 4 --attributes color=much
@@ -130,7 +134,7 @@ expect 64 simplify cube.off -o x.ply --faces 4 --placement best
 expect 64 simplify cube.off -o x.ply --faces 4 --weights heavy
 says "expected area, angle or uniform, found 'heavy'"
 expect 64 simplify cube.off -o x.doc --faces 4
-for later in --primitive=face --pairs=1; do
+for later in --primitive=face; do
     expect 64 simplify cube.off -o x.ply --faces 4 "$later"
     says "unknown option"
 done
