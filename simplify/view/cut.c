@@ -1,0 +1,164 @@
+/* simplify/view/cut.c: see cut.h. From the base mesh on, each child of a marked step is tested. A wanted step
+ * is marked, and what it needs as well. Bounds grow towards the root, so a step below an unwanted one is not
+ * wanted.
+ */
+#include "simplify/view/cut.h"
+
+#include <math.h>
+#include <string.h>
+
+static bool is_outside(const fct_cut_view *view, v3 center, double radius) {
+    double z = v3_dot(view->forward, center);
+    const double places[2] = {fabs(v3_dot(view->right, center)), fabs(v3_dot(view->up, center))};
+    bool outside = z < -radius;
+    for (int i = 0; i < 2; ++i) {
+        double slope = view->slopes[i];
+        outside |= places[i] - slope * z > radius * sqrt(1 + slope * slope);
+    }
+    return outside;
+}
+
+/* The sign of normal times direction of sight for all normals and all points of the sphere: 1: all faces are
+ * seen from behind, -1: all from the front, 0: neither, a silhouette. */
+static int find_side(const fct_bound *bound, v3 center, double distance) {
+    double sine = (double)bound->radius / distance, cosine = (double)bound->cosine;
+    if (!(sine < 1 && cosine > 0)) return 0;
+    double other = sqrt(1 - sine * sine), cone = sqrt(fct_max(1 - cosine * cosine, 0));
+    /* The sine of the sum of both half angles, which has to be below 90 degrees. */
+    if (other * cosine - sine * cone <= 0) return 0;
+    double spread = sine * cosine + other * cone;
+    double along = v3_dot(v3_load(bound->axis), center) / distance;
+    return along > spread ? 1 : -along > spread ? -1 : 0;
+}
+
+/* The most pixels per length anywhere in the sphere and in the picture: at depth z, seen at angle a from the
+ * middle, a length has up to focal / (z cos a) pixels. */
+static double find_scale(const fct_cut_view *view, const fct_bound *bound, v3 center, double distance) {
+    double radius = (double)bound->radius, z = v3_dot(view->forward, center), near = distance - radius;
+    double depth = fct_max(z - radius, near / view->secant);
+    double sine = radius / distance, cosine = fct_min(z / distance, 1);
+    double farthest =
+        cosine * sqrt(1 - sine * sine) - sine * sqrt(fct_max(1 - cosine * cosine, 0)); /* its cosine */
+    double secant = farthest * view->secant > 1 ? 1 / farthest : view->secant;
+    return view->focal * secant / depth;
+}
+
+fct_cut_error fct_cut_measure(const fct_cut_view *view, const fct_bound *bound) {
+    v3 center = v3_sub(v3_load(bound->center), view->eye);
+    double radius = (double)bound->radius, distance = v3_norm(center), scale = INFINITY;
+    bool near = !(distance > radius), outside = is_outside(view, center, radius);
+    int side = near ? 0 : find_side(bound, center, distance);
+    fct_cut_error e = {.limit = side == 0 ? view->silhouette_tolerance : view->tolerance};
+    if (side > 0) e.limit *= view->back_factor;
+    if (outside) e.limit *= view->outside_factor;
+    if (!(e.limit >= 0)) e.limit = 0; /* 0 times infinity */
+    if (!near)
+        scale = outside ? view->focal / (distance - radius) : find_scale(view, bound, center, distance);
+    e.pixels = bound->error > 0 ? scale * (double)bound->error : 0;
+    e.extent = radius > 0 ? 2 * scale * radius : 0;
+    e.hidden = outside || side > 0;
+    return e;
+}
+
+static bool exceeds_limit(const fct_cut_view *view, const fct_bound *bound, const fct_cut_error *e) {
+    if (!(e->limit < INFINITY)) return false;
+    return !(e->pixels < e->limit) || ((double)bound->color > view->color_tolerance && e->extent > e->limit);
+}
+
+bool fct_cut_wants(const fct_cut_view *view, const fct_bound *bound) {
+    fct_cut_error e = fct_cut_measure(view, bound);
+    return exceeds_limit(view, bound, &e);
+}
+
+static bool has_step(const uint64_t *bits, uint32_t step) {
+    return bits[step / 64] >> step % 64 & 1;
+}
+
+static void add_step(uint64_t *bits, uint32_t step) {
+    bits[step / 64] |= (uint64_t)1 << step % 64;
+}
+
+typedef struct marker {
+    fct_hierarchy *h;
+    const fct_cut_view *view;
+    fct_view_stats *stats;
+    uint32_t stack_count;
+} marker;
+
+static void mark_step(marker *k, uint32_t step) {
+    add_step(k->h->wanted, step);
+    k->h->stack[k->stack_count++] = step;
+    ++k->stats->splits;
+}
+
+static bool test_step(marker *k, uint32_t step) {
+    ++k->stats->tested;
+    return fct_cut_wants(k->view, &k->h->bounds[step]);
+}
+
+static void mark_needs(marker *k, uint32_t step) {
+    const fct_hierarchy *h = k->h;
+    if (step == 0) return;
+    for (uint32_t i = h->first_needs[step]; i < h->first_needs[step + 1]; ++i) {
+        if (has_step(h->wanted, h->needs[i])) continue;
+        if (!test_step(k, h->needs[i])) ++k->stats->forced;
+        mark_step(k, h->needs[i]);
+    }
+}
+
+/* Lists the tested steps that were not wanted. Returns their number. */
+static uint32_t mark_cut(marker *k) {
+    fct_hierarchy *h = k->h;
+    uint32_t count = 0;
+    memset(h->wanted, 0, (h->step_count / 64 + 1) * sizeof *h->wanted);
+    add_step(h->wanted, 0);
+    h->stack[k->stack_count++] = 0;
+    while (k->stack_count) {
+        uint32_t step = h->stack[--k->stack_count];
+        mark_needs(k, step);
+        for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c]) {
+            if (has_step(h->wanted, c)) continue;
+            if (test_step(k, c))
+                mark_step(k, c);
+            else
+                h->tested[count++] = c;
+        }
+    }
+    return count;
+}
+
+/* The largest errors of steps that are not done. */
+static void find_errors(const marker *k, uint32_t count) {
+    const fct_hierarchy *h = k->h;
+    for (uint32_t i = 0; i < count; ++i) {
+        const fct_bound *bound = &h->bounds[h->tested[i]];
+        if (has_step(h->wanted, h->tested[i])) continue;
+        fct_cut_error e = fct_cut_measure(k->view, bound);
+        k->stats->error = fct_max((double)bound->error, k->stats->error);
+        if (!e.hidden) k->stats->pixels = fct_max(e.pixels, k->stats->pixels);
+    }
+}
+
+/* Contracts from the last step to the first, then splits from the first to the last: steps that others need
+ * are done before them and undone after them. */
+static void move_cut(const fct_progressive *m, fct_hierarchy *h, fct_view_stats *stats) {
+    uint32_t words = h->step_count / 64 + 1;
+    for (uint32_t i = words; i-- > 0;)
+        for (uint64_t left = h->done[i] & ~h->wanted[i]; left; ++stats->undone) {
+            uint32_t bit = 63 - (uint32_t)__builtin_clzll(left);
+            left ^= (uint64_t)1 << bit;
+            fct_progressive_contract(m, 64 * i + bit, h->triangles, h->nodes);
+        }
+    for (uint32_t i = 0; i < words; ++i) {
+        for (uint64_t left = h->wanted[i] & ~h->done[i]; left; left &= left - 1, ++stats->done)
+            fct_progressive_split(m, 64 * i + (uint32_t)__builtin_ctzll(left), h->triangles, h->nodes);
+        h->done[i] = h->wanted[i];
+    }
+}
+
+void fct_cut_move(const fct_progressive *m, fct_hierarchy *h, const fct_cut_view *view,
+                  fct_view_stats *stats) {
+    marker k = {.h = h, .view = view, .stats = stats};
+    find_errors(&k, mark_cut(&k));
+    move_cut(m, h, stats);
+}

@@ -1,0 +1,47 @@
+/* simplify/view/hierarchy.h: the vertex hierarchy of a progressive mesh, and a cut through it.
+ *
+ * A cut is a set of steps that are done. Step t needs step s if s was the last step before t that made or
+ * changed a face that t changes, or a node that t replaces or that a new face of t uses. A set of steps with
+ * all that they need can be done in the order of the file, or in any other order that does needed steps
+ * first:
+ * - Each step finds exactly the faces around its point that it found in the file, so it is the same split.
+ * - Each face of the result is a face of some level, with the same three nodes. So it is not folded over, and
+ *   a closed mesh stays closed.
+ * (Xia and Varshney, "Dynamic View-Dependent Simplification for Polygonal Models", Visualization 1996, and
+ * Garland 1999, section 7.3.)
+ */
+#ifndef FCT_SIMPLIFY_HIERARCHY_H
+#define FCT_SIMPLIFY_HIERARCHY_H
+
+#include "simplify/progressive/progressive.h"
+
+/* What a mesh lacks around the point of a step that is not done, and of all steps below it in the tree. */
+typedef struct fct_bound {
+    float center[3], radius; /* a sphere around the surface that the step changes */
+    float axis[3], cosine;   /* a cone with its normals; cosine <= 0: they may have any direction */
+    float error;             /* the largest distance of a vertex of the finest level from the faces */
+    float color;             /* the largest difference of a component of its colour from that of the faces */
+} fct_bound;
+
+typedef struct fct_hierarchy {
+    uint32_t step_count;
+    /* Step t needs needs[first_needs[t]] to needs[first_needs[t + 1]]; step 0, which is always done, is left
+     * out. */
+    uint32_t *first_needs, *needs;
+    /* A tree of the steps with root 0: the parent is the last step that made a node that this step replaces,
+     * or 0. Bounds of children are inside that of their parent. */
+    uint32_t *parents, *first_children, *siblings;
+    fct_bound *bounds;
+    /* The cut. */
+    uint64_t *done, *wanted;     /* a bit per step; `wanted` is scratch */
+    uint32_t *triangles, *nodes; /* as those of the progressive mesh */
+    uint32_t *stack, *tested;    /* scratch, step_count each */
+} fct_hierarchy;
+
+/* The hierarchy of m, with the base mesh as its cut. Does not change the level of m. Cost: linear, plus the
+ * rings of all splits. Errors: MEMORY, CANCELLED. */
+fct_result fct_hierarchy_create(const fct_progressive *m, fct_hierarchy **out);
+/* NULL is allowed. */
+void fct_hierarchy_destroy(const fct_env *env, fct_hierarchy *h);
+
+#endif
