@@ -18,17 +18,17 @@ static bool is_outside(const fct_cut_view *view, v3 center, double radius) {
     return outside;
 }
 
-/* The sign of normal times direction of sight for all normals and all points of the sphere: 1: all faces are
- * seen from behind, -1: all from the front, 0: neither, a silhouette. */
-static int find_side(const fct_bound *bound, v3 center, double distance) {
-    double sine = (double)bound->radius / distance, cosine = (double)bound->cosine;
-    if (!(sine < 1 && cosine > 0)) return 0;
-    double other = sqrt(1 - sine * sine), cone = sqrt(fct_max(1 - cosine * cosine, 0));
-    /* The sine of the sum of both half angles, which has to be below 90 degrees. */
-    if (other * cosine - sine * cone <= 0) return 0;
-    double spread = sine * cosine + other * cone;
-    double along = v3_dot(v3_load(bound->axis), center) / distance;
-    return along > spread ? 1 : -along > spread ? -1 : 0;
+/* The sign of n . (x - eye) for all normals n and all points x of the sphere: 1: all faces are seen from
+ * behind, -1: all from the front, 0: neither, a silhouette. */
+static int find_side(const fct_bound *bound, v3 center) {
+    const double c[3] = {center.x, center.y, center.z};
+    double least = 0, most = 0; /* n . (center - eye) */
+    for (int k = 0; k < 3; ++k) {
+        double a = (double)bound->low[k] * c[k], b = (double)bound->high[k] * c[k];
+        least += fct_min(a, b), most += fct_max(a, b);
+    }
+    double radius = (double)bound->radius;
+    return least > radius ? 1 : most < -radius ? -1 : 0;
 }
 
 /* The most pixels per length anywhere in the sphere and in the picture: at depth z, seen at angle a from the
@@ -47,7 +47,7 @@ fct_cut_error fct_cut_measure(const fct_cut_view *view, const fct_bound *bound) 
     v3 center = v3_sub(v3_load(bound->center), view->eye);
     double radius = (double)bound->radius, distance = v3_norm(center), scale = INFINITY;
     bool near = !(distance > radius), outside = is_outside(view, center, radius);
-    int side = near ? 0 : find_side(bound, center, distance);
+    int side = find_side(bound, center);
     fct_cut_error e = {.limit = side == 0 ? view->silhouette_tolerance : view->tolerance};
     if (side > 0) e.limit *= view->back_factor;
     if (outside) e.limit *= view->outside_factor;

@@ -10,6 +10,10 @@
 /* Bounds are stored as floats; this is more than their rounding. */
 #define SLACK 1e-6
 
+typedef struct box {
+    v3 low, high;
+} box;
+
 /* A face of the ring after the contraction. */
 typedef struct ring_face {
     uint32_t face;
@@ -23,9 +27,9 @@ struct fct_deviation {
     uint32_t *nodes;      /* FCT_NONE: no face uses the point */
     uint32_t *next;       /* the next sample of the same face */
     v3 *normals;          /* unit; 0: unknown */
-    float *cosines;       /* of the angle between the normal and those of the faces around it: the smallest */
     const float **colors; /* NULL: absent, or several */
     uint32_t *first;      /* per face: a sample */
+    box *places;          /* per step: of what is inside the sphere of its bound */
     /* The current step. */
     uint32_t *list, list_count; /* samples */
     size_t list_room;
@@ -75,15 +79,7 @@ static void start_samples(fct_deviation *d) {
             d->normals[m->points[nodes[k]]] = v3_add(d->normals[m->points[nodes[k]]], cross);
         }
     }
-    for (uint32_t p = 0; p < m->point_count; ++p) d->normals[p] = v3_unit(d->normals[p]), d->cosines[p] = 1;
-    for (uint32_t f = 0; f < m->face_count; ++f) {
-        v3 normal = v3_unit(find_cross(d, f, nodes));
-        if (v3_norm2(normal) == 0) continue;
-        for (int k = 0; k < 3; ++k) {
-            uint32_t p = m->points[nodes[k]];
-            d->cosines[p] = (float)fct_min((double)d->cosines[p], v3_dot(normal, d->normals[p]) - SLACK);
-        }
-    }
+    for (uint32_t p = 0; p < m->point_count; ++p) d->normals[p] = v3_unit(d->normals[p]);
 }
 
 fct_result fct_deviation_begin(fct_walk *w, fct_deviation **out) {
@@ -93,8 +89,8 @@ fct_result fct_deviation_begin(fct_walk *w, fct_deviation **out) {
     d->w = w;
     const fct_array arrays[] = {
         FCT_ARRAY(d->nodes, m->point_count),        FCT_ARRAY(d->next, m->point_count),
-        FCT_ARRAY_ZERO(d->normals, m->point_count), FCT_ARRAY(d->cosines, m->point_count),
-        FCT_ARRAY_ZERO(d->colors, m->point_count),  FCT_ARRAY(d->first, m->face_count)};
+        FCT_ARRAY_ZERO(d->normals, m->point_count), FCT_ARRAY_ZERO(d->colors, m->point_count),
+        FCT_ARRAY(d->first, m->face_count),         FCT_ARRAY(d->places, m->step_count)};
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a vertex hierarchy");
     if (result == FCT_OK) start_samples(d);
     return result;
@@ -103,7 +99,7 @@ fct_result fct_deviation_begin(fct_walk *w, fct_deviation **out) {
 void fct_deviation_end(fct_deviation *d) {
     if (!d) return;
     const fct_env *env = d->w->m->env;
-    void *arrays[] = {d->nodes, d->next, d->normals, d->cosines, d->colors,
+    void *arrays[] = {d->nodes, d->next, d->normals, d->colors, d->places,
                       d->first, d->list, d->ring,    d->octets};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(env, arrays[i]);
     fct_release(env, d);
@@ -228,14 +224,16 @@ static void place_samples(fct_deviation *d, fct_bound *bound) {
     bound->color = (float)(color * (1 + SLACK));
 }
 
-static void add_to_box(v3 box[2], v3 x) {
-    box[0] = v3_make(fct_min(box[0].x, x.x), fct_min(box[0].y, x.y), fct_min(box[0].z, x.z));
-    box[1] = v3_make(fct_max(box[1].x, x.x), fct_max(box[1].y, x.y), fct_max(box[1].z, x.z));
+static const box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static void add_to_box(box *b, v3 x) {
+    b->low = v3_make(fct_min(b->low.x, x.x), fct_min(b->low.y, x.y), fct_min(b->low.z, x.z));
+    b->high = v3_make(fct_max(b->high.x, x.x), fct_max(b->high.y, x.y), fct_max(b->high.z, x.z));
 }
 
 /* Calls add_to_box, or finds the farthest point from the center, for samples, ring and the nodes of the step.
  */
-static double visit_points(const fct_deviation *d, v3 box[2], v3 center) {
+static double visit_points(const fct_deviation *d, box *b, v3 center) {
     const fct_progressive *m = d->w->m;
     uint32_t first = m->step_nodes[d->w->step], nodes = m->step_nodes[d->w->step + 1] - first;
     uint32_t count = d->list_count + nodes + 3 * d->w->ring_count;
@@ -245,8 +243,8 @@ static double visit_points(const fct_deviation *d, v3 box[2], v3 center) {
         v3 x = i < d->list_count           ? find_position(m, d->nodes[d->list[i]])
                : i < d->list_count + nodes ? find_position(m, first + k)
                                            : d->ring[r / 3].corners[r % 3];
-        if (box)
-            add_to_box(box, x);
+        if (b)
+            add_to_box(b, x);
         else
             farthest2 = fct_max(farthest2, v3_norm2(v3_sub(x, center)));
     }
@@ -254,17 +252,12 @@ static double visit_points(const fct_deviation *d, v3 box[2], v3 center) {
 }
 
 static void bound_places(const fct_deviation *d, fct_bound *bound) {
-    v3 box[2] = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    visit_points(d, box, v3_make(0, 0, 0));
-    if (!(box[0].x <= box[1].x)) return;
-    v3_store(bound->center, v3_scale(v3_add(box[0], box[1]), .5));
+    box *b = &d->places[d->w->step];
+    *b = empty_box;
+    visit_points(d, b, v3_make(0, 0, 0));
+    if (!(b->low.x <= b->high.x)) *b = (box){{0, 0, 0}, {0, 0, 0}};
+    v3_store(bound->center, v3_scale(v3_add(b->low, b->high), .5));
     bound->radius = (float)(visit_points(d, NULL, v3_load(bound->center)) * (1 + SLACK));
-}
-
-/* cos(a + b) for angles below 90 degrees, else -1. */
-static double add_angles(double cos_a, double cos_b) {
-    if (!(cos_a > 0 && cos_b > 0)) return -1;
-    return cos_a * cos_b - sqrt(fct_max(1 - cos_a * cos_a, 0) * fct_max(1 - cos_b * cos_b, 0));
 }
 
 /* Whether the faces around the point leave a gap: then its neighbours do not each come once before a side and
@@ -282,20 +275,14 @@ static bool has_gap(const fct_deviation *d) {
 }
 
 static void bound_normals(const fct_deviation *d, fct_bound *bound) {
-    v3 sum = {0, 0, 0};
-    for (uint32_t i = 0; i < d->list_count; ++i) sum = v3_add(sum, d->normals[d->list[i]]);
-    for (uint32_t i = 0; i < d->w->ring_count; ++i) sum = v3_add(sum, d->ring[i].normal);
-    sum = v3_unit(sum);
-    v3_store(bound->axis, sum);
-    v3 axis = v3_load(bound->axis);
-    double least = d->w->ring_count == 0 || has_gap(d) ? -1 : 1;
-    for (uint32_t i = 0; i < d->list_count && least > 0; ++i) {
-        uint32_t p = d->list[i];
-        least = fct_min(least, add_angles(v3_dot(axis, d->normals[p]), (double)d->cosines[p]));
-    }
-    for (uint32_t i = 0; i < d->w->ring_count; ++i)
-        if (v3_norm2(d->ring[i].normal) > 0) least = fct_min(least, v3_dot(axis, d->ring[i].normal));
-    bound->cosine = (float)(least - SLACK);
+    box b = empty_box;
+    const v3 slack = {SLACK, SLACK, SLACK};
+    bool any = d->w->ring_count == 0 || has_gap(d);
+    for (uint32_t i = 0; i < d->list_count; ++i) add_to_box(&b, d->normals[d->list[i]]);
+    for (uint32_t i = 0; i < d->w->ring_count; ++i) add_to_box(&b, d->ring[i].normal);
+    if (any) b = (box){{-1, -1, -1}, {1, 1, 1}};
+    v3_store(bound->low, v3_sub(b.low, slack));
+    v3_store(bound->high, v3_add(b.high, slack));
 }
 
 /* Includes the bound of a child. */
@@ -305,23 +292,36 @@ static void include_bound(fct_bound *bound, const fct_bound *child) {
     bound->radius = (float)fct_max((double)bound->radius, reach);
     bound->error = child->error > bound->error ? child->error : bound->error;
     bound->color = child->color > bound->color ? child->color : bound->color;
-    if (!(bound->cosine > 0)) return;
-    double angle = v3_dot(v3_load(bound->axis), v3_load(child->axis));
-    double cosine = add_angles(angle, (double)child->cosine) - SLACK;
-    bound->cosine = (float)fct_min((double)bound->cosine, cosine);
+    for (int k = 0; k < 3; ++k) {
+        bound->low[k] = child->low[k] < bound->low[k] ? child->low[k] : bound->low[k];
+        bound->high[k] = child->high[k] > bound->high[k] ? child->high[k] : bound->high[k];
+    }
+}
+
+/* Spheres around spheres grow from level to level, boxes around boxes do not: the sphere goes at most to the
+ * farthest corner of the box. */
+static void limit_sphere(const box *b, fct_bound *bound) {
+    v3 center = v3_load(bound->center), low = v3_sub(center, b->low), high = v3_sub(b->high, center);
+    v3 corner = {fct_max(low.x, high.x), fct_max(low.y, high.y), fct_max(low.z, high.z)};
+    bound->radius = (float)fct_min((double)bound->radius, v3_norm(corner) * (1 + SLACK));
 }
 
 fct_result fct_deviation_contract(fct_deviation *d, fct_hierarchy *h) {
     fct_walk_backward(d->w);
     fct_result result = load_ring(d);
     if (result != FCT_OK) return result;
-    fct_bound *bound = &h->bounds[d->w->step];
+    uint32_t step = d->w->step;
+    fct_bound *bound = &h->bounds[step];
     bound_places(d, bound);
     bound_normals(d, bound);
     place_samples(d, bound);
     /* Nothing is left of what the step adds. */
     if (d->w->ring_count == 0) bound->error = 2 * bound->radius;
-    for (uint32_t c = h->first_children[d->w->step]; c != FCT_NONE; c = h->siblings[c])
+    for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c]) {
         include_bound(bound, &h->bounds[c]);
+        add_to_box(&d->places[step], d->places[c].low);
+        add_to_box(&d->places[step], d->places[c].high);
+    }
+    limit_sphere(&d->places[step], bound);
     return FCT_OK;
 }

@@ -17,8 +17,8 @@
 
 /* What a mesh lacks around the point of a step that is not done, and of all steps below it in the tree. */
 typedef struct fct_bound {
-    float center[3], radius; /* a sphere around the surface that the step changes */
-    float axis[3], cosine;   /* a cone with its normals; cosine <= 0: they may have any direction */
+    float center[3], radius; /* a sphere around the surface that the steps change */
+    float low[3], high[3];   /* a box of its unit normals; -1 and 1: there is an open boundary as well */
     float error;             /* the largest distance of a vertex of the finest level from the faces */
     float color;             /* the largest difference of a component of its colour from that of the faces */
 } fct_bound;
