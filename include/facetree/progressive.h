@@ -117,7 +117,7 @@ typedef struct fct_view_stats {
  * (Hoppe, "View-Dependent Refinement of Progressive Meshes", SIGGRAPH 1997.) Of a truncated file the finest
  * level is the finest one that was read.
  *
- * The first call builds the hierarchy: about as long as reading the file. The next ones move the cut; their
+ * The first call builds the hierarchy, which takes about twice as long as reading the file. The next ones move the cut; their
  * cost is proportional to the sizes of both cuts. The mesh depends only on the view, not on the views before,
  * and has the same bytes on every run. The level of fct_progressive_go does not change. stats may be NULL.
  * Errors: DATA (the view), MEMORY, CANCELLED. */
