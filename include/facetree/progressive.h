@@ -98,29 +98,32 @@ FCT_API fct_view fct_view_default(void);
 typedef struct fct_view_stats {
     uint32_t faces;
     uint32_t splits;       /* of the cut */
-    uint32_t forced;       /* of these: not wanted in this view, but needed by other splits */
+    uint32_t forced;       /* of these: not wanted in this view, but needed by other splits or faces */
     uint32_t done, undone; /* splits and contractions since the cut of the last view */
     uint32_t tested;       /* splits that were compared with the view */
-    double pixels; /* the largest bound on the distance on the screen from a vertex of the finest level to the
-                      mesh, where it is in the picture and not seen from behind only */
+    double pixels; /* the largest distance on the screen from a vertex of the finest level to the mesh, where
+                      it is in the picture and not seen from behind only; as the hierarchy has measured it */
     double error;  /* the largest of these distances anywhere, in the unit of the mesh */
     double seconds_hierarchy, seconds_cut, seconds_mesh;
 } fct_view_stats;
 
 /* The coarsest mesh that a view needs: a cut through the vertex hierarchy of the splits. It has the faces of
- * the base mesh and of some splits: those that the view wants, and those that these need. A split is done
- * only among the faces that it had in the file. So each face of *out is a face of some level, a closed mesh
- * stays closed, and seams do not crack (Garland 1999, section 7.3; Xia and Varshney 1996).
+ * the base mesh and of some splits: those that the view wants, and those that these need. It is the finest
+ * level with each vertex moved to its ancestor in the cut, so a closed mesh stays closed, and seams do not
+ * crack. Where a face would turn by more than 45 degrees from the finest level, and by more than at any
+ * level, splits around it are added until it is a face of some level. So faces do not fold over (Garland
+ * 1999, section 7.3).
  *
  * A split is wanted if, without it or a split below it, a vertex of the finest level may be `tolerance`
- * pixels or more from the mesh on the screen. Its sphere and its cone of normals decide where it may be seen.
- * (Hoppe, "View-Dependent Refinement of Progressive Meshes", SIGGRAPH 1997.) Of a truncated file the finest
- * level is the finest one that was read.
+ * pixels or more from the mesh on the screen. Its sphere and its normals decide where it may be seen. (Hoppe,
+ * "View-Dependent Refinement of Progressive Meshes", SIGGRAPH 1997.) The distance is measured between levels;
+ * between coarse and fine parts of a cut it can be up to a quarter larger (random views of bunny, cow and
+ * rocker arm). Of a truncated file the finest level is the finest one that was read.
  *
- * The first call builds the hierarchy, which takes about twice as long as reading the file. The next ones move the cut; their
- * cost is proportional to the sizes of both cuts. The mesh depends only on the view, not on the views before,
- * and has the same bytes on every run. The level of fct_progressive_go does not change. stats may be NULL.
- * Errors: DATA (the view), MEMORY, CANCELLED. */
+ * The first call builds the hierarchy, which takes about twice as long as reading the file. The next ones
+ * move the cut; their cost is proportional to the sizes of both cuts. The mesh depends only on the view, not
+ * on the views before, and has the same bytes on every run. The level of fct_progressive_go does not change.
+ * stats may be NULL. Errors: DATA (the view), MEMORY, CANCELLED. */
 FCT_API fct_result fct_progressive_view(fct_progressive *progressive, const fct_view *view, fct_mesh *out,
                                         fct_view_stats *stats);
 

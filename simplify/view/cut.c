@@ -7,6 +7,10 @@
 #include <math.h>
 #include <string.h>
 
+/* Cosine of 45 degrees: faces that turn less from the finest level never count as folded over. */
+#define MOST_TURN  .7071
+#define TURN_SLACK 1e-6
+
 static bool is_outside(const fct_cut_view *view, v3 center, double radius) {
     double z = v3_dot(view->forward, center);
     const double places[2] = {fabs(v3_dot(view->right, center)), fabs(v3_dot(view->up, center))};
@@ -79,15 +83,15 @@ static void add_step(uint64_t *bits, uint32_t step) {
 }
 
 typedef struct marker {
+    const fct_progressive *m;
     fct_hierarchy *h;
     const fct_cut_view *view;
     fct_view_stats *stats;
-    uint32_t stack_count;
+    uint32_t stack_count, tested_count;
 } marker;
 
 static void mark_step(marker *k, uint32_t step) {
     add_step(k->h->wanted, step);
-    k->h->stack[k->stack_count++] = step;
     ++k->stats->splits;
 }
 
@@ -96,41 +100,132 @@ static bool test_step(marker *k, uint32_t step) {
     return fct_cut_wants(k->view, &k->h->bounds[step]);
 }
 
+static void push_step(marker *k, uint32_t step) {
+    k->h->stack[k->stack_count++] = step;
+}
+
 static void mark_needs(marker *k, uint32_t step) {
     const fct_hierarchy *h = k->h;
     if (step == 0) return;
-    for (uint32_t i = h->first_needs[step]; i < h->first_needs[step + 1]; ++i) {
+    for (uint32_t i = h->first_needs[step]; i < h->first_strict[step]; ++i) {
         if (has_step(h->wanted, h->needs[i])) continue;
         if (!test_step(k, h->needs[i])) ++k->stats->forced;
         mark_step(k, h->needs[i]);
+        push_step(k, h->needs[i]);
     }
 }
 
-/* Lists the tested steps that were not wanted. Returns their number. */
-static uint32_t mark_cut(marker *k) {
+/* Marks what the view wants and needs. Lists the tested steps that are not wanted. */
+static void mark_cut(marker *k) {
     fct_hierarchy *h = k->h;
-    uint32_t count = 0;
     memset(h->wanted, 0, (h->step_count / 64 + 1) * sizeof *h->wanted);
+    memset(h->strict, 0, (h->step_count / 64 + 1) * sizeof *h->strict);
     add_step(h->wanted, 0);
-    h->stack[k->stack_count++] = 0;
+    add_step(h->strict, 0);
+    push_step(k, 0);
     while (k->stack_count) {
         uint32_t step = h->stack[--k->stack_count];
         mark_needs(k, step);
         for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c]) {
             if (has_step(h->wanted, c)) continue;
-            if (test_step(k, c))
-                mark_step(k, c);
-            else
-                h->tested[count++] = c;
+            if (!test_step(k, c)) {
+                h->tested[k->tested_count++] = c;
+                continue;
+            }
+            mark_step(k, c);
+            push_step(k, c);
         }
     }
-    return count;
+}
+
+/* Contracts from the last step to the first, then splits from the first to the last: steps that others need
+ * are done before them and undone after them. */
+static void move_cut(const marker *k) {
+    fct_hierarchy *h = k->h;
+    uint32_t words = h->step_count / 64 + 1;
+    for (uint32_t i = words; i-- > 0;)
+        for (uint64_t left = h->done[i] & ~h->wanted[i]; left; ++k->stats->undone) {
+            uint32_t bit = 63 - (uint32_t)__builtin_clzll(left);
+            left ^= (uint64_t)1 << bit;
+            fct_progressive_contract(k->m, 64 * i + bit, h->triangles, h->nodes);
+        }
+    for (uint32_t i = 0; i < words; ++i) {
+        for (uint64_t left = h->wanted[i] & ~h->done[i]; left; left &= left - 1, ++k->stats->done)
+            fct_progressive_split(k->m, 64 * i + (uint32_t)__builtin_ctzll(left), h->triangles, h->nodes);
+        h->done[i] = h->wanted[i];
+    }
+}
+
+/* Whether a face turns further from its direction at the finest level than at all levels, and by more than
+ * MOST_TURN. */
+static bool folds_over(const marker *k, uint32_t f) {
+    const fct_face_turn *turn = &k->h->turns[f];
+    v3 p[3], normal = v3_load(turn->normal);
+    for (uint32_t i = 0; i < 3; ++i)
+        p[i] = v3_load(k->m->positions + 3 * (size_t)k->h->nodes[k->h->triangles[3 * (size_t)f + i]]);
+    v3 cross = v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+    double least = fct_min((double)turn->cosine - TURN_SLACK, MOST_TURN);
+    return !(v3_dot(cross, normal) >= least * v3_norm(cross)) || (least > 0 && v3_norm2(cross) == 0);
+}
+
+/* The last step that has changed a face: the one that made its latest node. */
+static uint32_t find_last_change(const marker *k, uint32_t f) {
+    uint32_t latest = 0, low = 0, high = k->m->step_count - 1;
+    for (uint32_t i = 0; i < 3; ++i) {
+        uint32_t node = k->h->nodes[k->h->triangles[3 * (size_t)f + i]];
+        latest = node > latest ? node : latest;
+    }
+    while (low < high) {
+        uint32_t middle = high - (high - low) / 2;
+        if (k->m->step_nodes[middle] <= latest)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    return low;
+}
+
+/* Marks all that a step strictly needs. Returns whether something was not marked. */
+static bool mark_strictly(marker *k, uint32_t step) {
+    fct_hierarchy *h = k->h;
+    uint32_t before = k->stats->splits;
+    if (has_step(h->strict, step)) return false;
+    add_step(h->strict, step);
+    push_step(k, step);
+    while (k->stack_count) {
+        uint32_t s = h->stack[--k->stack_count];
+        for (uint32_t i = h->first_needs[s]; i < h->first_needs[s + 1]; ++i) {
+            uint32_t needed = h->needs[i];
+            if (has_step(h->strict, needed)) continue;
+            add_step(h->strict, needed);
+            push_step(k, needed);
+            if (has_step(h->wanted, needed)) continue;
+            mark_step(k, needed);
+            ++k->stats->forced;
+            for (uint32_t c = h->first_children[needed]; c != FCT_NONE; c = h->siblings[c])
+                h->tested[k->tested_count++] = c;
+        }
+    }
+    return k->stats->splits > before;
+}
+
+/* Marks what the faces need that fold over. Returns whether something was not marked. */
+static bool mark_folds(marker *k) {
+    const fct_progressive *m = k->m;
+    bool more = false;
+    for (uint32_t i = 0; i < k->h->step_count / 64 + 1; ++i)
+        for (uint64_t left = k->h->done[i]; left; left &= left - 1) {
+            uint32_t step = 64 * i + (uint32_t)__builtin_ctzll(left);
+            for (uint32_t f = m->step_faces[step]; f < m->step_faces[step + 1]; ++f)
+                if (folds_over(k, f)) more |= mark_strictly(k, find_last_change(k, f));
+        }
+    return more;
 }
 
 /* The largest errors of steps that are not done. */
-static void find_errors(const marker *k, uint32_t count) {
+static void find_errors(const marker *k) {
     const fct_hierarchy *h = k->h;
-    for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t i = 0; i < k->tested_count; ++i) {
         const fct_bound *bound = &h->bounds[h->tested[i]];
         if (has_step(h->wanted, h->tested[i])) continue;
         fct_cut_error e = fct_cut_measure(k->view, bound);
@@ -139,26 +234,11 @@ static void find_errors(const marker *k, uint32_t count) {
     }
 }
 
-/* Contracts from the last step to the first, then splits from the first to the last: steps that others need
- * are done before them and undone after them. */
-static void move_cut(const fct_progressive *m, fct_hierarchy *h, fct_view_stats *stats) {
-    uint32_t words = h->step_count / 64 + 1;
-    for (uint32_t i = words; i-- > 0;)
-        for (uint64_t left = h->done[i] & ~h->wanted[i]; left; ++stats->undone) {
-            uint32_t bit = 63 - (uint32_t)__builtin_clzll(left);
-            left ^= (uint64_t)1 << bit;
-            fct_progressive_contract(m, 64 * i + bit, h->triangles, h->nodes);
-        }
-    for (uint32_t i = 0; i < words; ++i) {
-        for (uint64_t left = h->wanted[i] & ~h->done[i]; left; left &= left - 1, ++stats->done)
-            fct_progressive_split(m, 64 * i + (uint32_t)__builtin_ctzll(left), h->triangles, h->nodes);
-        h->done[i] = h->wanted[i];
-    }
-}
-
 void fct_cut_move(const fct_progressive *m, fct_hierarchy *h, const fct_cut_view *view,
                   fct_view_stats *stats) {
-    marker k = {.h = h, .view = view, .stats = stats};
-    find_errors(&k, mark_cut(&k));
-    move_cut(m, h, stats);
+    marker k = {.m = m, .h = h, .view = view, .stats = stats};
+    mark_cut(&k);
+    do move_cut(&k);
+    while (mark_folds(&k));
+    find_errors(&k);
 }

@@ -23,10 +23,11 @@ typedef struct ring_face {
 
 struct fct_deviation {
     fct_walk *w;
+    fct_hierarchy *h;
     /* Per sample, which has the number of its point. */
     uint32_t *nodes;      /* FCT_NONE: no face uses the point */
     uint32_t *next;       /* the next sample of the same face */
-    v3 *normals;          /* unit; 0: unknown */
+    box *normals;         /* those of its faces at the finest level */
     const float **colors; /* NULL: absent, or several */
     uint32_t *first;      /* per face: a sample */
     box *places;          /* per step: of what is inside the sphere of its bound */
@@ -54,6 +55,13 @@ static v3 find_cross(const fct_deviation *d, uint32_t f, uint32_t nodes[3]) {
     return v3_cross(v3_sub(find_position(m, nodes[1]), a), v3_sub(find_position(m, nodes[2]), a));
 }
 
+static const box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static void add_to_box(box *b, v3 x) {
+    b->low = v3_make(fct_min(b->low.x, x.x), fct_min(b->low.y, x.y), fct_min(b->low.z, x.z));
+    b->high = v3_make(fct_max(b->high.x, x.x), fct_max(b->high.y, x.y), fct_max(b->high.z, x.z));
+}
+
 static void add_sample(fct_deviation *d, uint32_t node, uint32_t f) {
     const fct_progressive *m = d->w->m;
     uint32_t p = m->points[node];
@@ -72,25 +80,27 @@ static void start_samples(fct_deviation *d) {
     uint32_t nodes[3];
     memset(d->nodes, 0xff, m->point_count * sizeof *d->nodes);
     memset(d->first, 0xff, m->face_count * sizeof *d->first);
+    for (uint32_t p = 0; p < m->point_count; ++p) d->normals[p] = empty_box;
     for (uint32_t f = 0; f < m->face_count; ++f) {
-        v3 cross = find_cross(d, f, nodes);
+        v3 unit = v3_unit(find_cross(d, f, nodes));
+        d->h->turns[f].cosine = 1;
+        v3_store(d->h->turns[f].normal, unit);
         for (int k = 0; k < 3; ++k) {
             add_sample(d, nodes[k], f);
-            d->normals[m->points[nodes[k]]] = v3_add(d->normals[m->points[nodes[k]]], cross);
+            add_to_box(&d->normals[m->points[nodes[k]]], unit);
         }
     }
-    for (uint32_t p = 0; p < m->point_count; ++p) d->normals[p] = v3_unit(d->normals[p]);
 }
 
-fct_result fct_deviation_begin(fct_walk *w, fct_deviation **out) {
+fct_result fct_deviation_begin(fct_walk *w, fct_hierarchy *h, fct_deviation **out) {
     const fct_progressive *m = w->m;
     fct_deviation *d = *out = fct_allocate_zero(m->env, 1, sizeof *d);
     if (!d) return fct_fail_memory(m->env, "a vertex hierarchy");
-    d->w = w;
+    d->w = w, d->h = h;
     const fct_array arrays[] = {
-        FCT_ARRAY(d->nodes, m->point_count),        FCT_ARRAY(d->next, m->point_count),
-        FCT_ARRAY_ZERO(d->normals, m->point_count), FCT_ARRAY_ZERO(d->colors, m->point_count),
-        FCT_ARRAY(d->first, m->face_count),         FCT_ARRAY(d->places, m->step_count)};
+        FCT_ARRAY(d->nodes, m->point_count),   FCT_ARRAY(d->next, m->point_count),
+        FCT_ARRAY(d->normals, m->point_count), FCT_ARRAY_ZERO(d->colors, m->point_count),
+        FCT_ARRAY(d->first, m->face_count),    FCT_ARRAY(d->places, m->step_count)};
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a vertex hierarchy");
     if (result == FCT_OK) start_samples(d);
     return result;
@@ -120,8 +130,10 @@ static fct_result take_samples(fct_deviation *d, uint32_t f) {
 static void load_face(const fct_deviation *d, uint32_t f, ring_face *out) {
     const fct_progressive *m = d->w->m;
     uint32_t nodes[3];
+    fct_face_turn *turn = &d->h->turns[f];
     out->face = f;
     out->normal = v3_unit(find_cross(d, f, nodes));
+    turn->cosine = (float)fct_min((double)turn->cosine, v3_dot(out->normal, v3_load(turn->normal)));
     for (int k = 0; k < 3; ++k) {
         out->corners[k] = find_position(m, nodes[k]);
         out->colors[k] = find_color(m, nodes[k]);
@@ -224,13 +236,6 @@ static void place_samples(fct_deviation *d, fct_bound *bound) {
     bound->color = (float)(color * (1 + SLACK));
 }
 
-static const box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
-static void add_to_box(box *b, v3 x) {
-    b->low = v3_make(fct_min(b->low.x, x.x), fct_min(b->low.y, x.y), fct_min(b->low.z, x.z));
-    b->high = v3_make(fct_max(b->high.x, x.x), fct_max(b->high.y, x.y), fct_max(b->high.z, x.z));
-}
-
 /* Calls add_to_box, or finds the farthest point from the center, for samples, ring and the nodes of the step.
  */
 static double visit_points(const fct_deviation *d, box *b, v3 center) {
@@ -278,7 +283,10 @@ static void bound_normals(const fct_deviation *d, fct_bound *bound) {
     box b = empty_box;
     const v3 slack = {SLACK, SLACK, SLACK};
     bool any = d->w->ring_count == 0 || has_gap(d);
-    for (uint32_t i = 0; i < d->list_count; ++i) add_to_box(&b, d->normals[d->list[i]]);
+    for (uint32_t i = 0; i < d->list_count; ++i) {
+        add_to_box(&b, d->normals[d->list[i]].low);
+        add_to_box(&b, d->normals[d->list[i]].high);
+    }
     for (uint32_t i = 0; i < d->w->ring_count; ++i) add_to_box(&b, d->ring[i].normal);
     if (any) b = (box){{-1, -1, -1}, {1, 1, 1}};
     v3_store(bound->low, v3_sub(b.low, slack));
@@ -306,7 +314,8 @@ static void limit_sphere(const box *b, fct_bound *bound) {
     bound->radius = (float)fct_min((double)bound->radius, v3_norm(corner) * (1 + SLACK));
 }
 
-fct_result fct_deviation_contract(fct_deviation *d, fct_hierarchy *h) {
+fct_result fct_deviation_contract(fct_deviation *d) {
+    fct_hierarchy *h = d->h;
     fct_walk_backward(d->w);
     fct_result result = load_ring(d);
     if (result != FCT_OK) return result;

@@ -14,10 +14,11 @@
 
 typedef struct fct_deviation fct_deviation;
 
-/* Samples of the finest level, where the walk is. Errors: MEMORY. */
-fct_result fct_deviation_begin(fct_walk *w, fct_deviation **out);
-/* Walks one step back and fills in its bound. Cost: samples of the ring, times its faces. Errors: MEMORY. */
-fct_result fct_deviation_contract(fct_deviation *d, fct_hierarchy *h);
+/* Samples of the finest level, where the walk is. It fills in the bounds and turns of h, which must outlive
+ * it. Errors: MEMORY. */
+fct_result fct_deviation_begin(fct_walk *w, fct_hierarchy *h, fct_deviation **out);
+/* Walks one step back. Cost: samples of the ring, times its faces. Errors: MEMORY. */
+fct_result fct_deviation_contract(fct_deviation *d);
 /* NULL is allowed. */
 void fct_deviation_end(fct_deviation *d);
 

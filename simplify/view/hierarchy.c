@@ -48,16 +48,6 @@ static fct_result trace_nodes(tracer *t) {
     return FCT_OK;
 }
 
-static fct_result trace_ring(tracer *t) {
-    fct_result result = fct_walk_find_ring(t->w);
-    for (uint32_t i = 0; i < t->w->ring_count && result == FCT_OK; ++i) {
-        uint32_t f = t->w->ring[i] / 3;
-        result = add_need(t, t->face_steps[f]);
-        t->face_steps[f] = t->step;
-    }
-    return result;
-}
-
 /* The corners of the new faces, once the step is done. */
 static fct_result trace_new_faces(tracer *t) {
     const fct_progressive *m = t->w->m;
@@ -73,6 +63,29 @@ static fct_result trace_new_faces(tracer *t) {
     return FCT_OK;
 }
 
+/* The faces of the ring, which was found before the step. */
+static fct_result trace_ring(tracer *t) {
+    fct_result result = FCT_OK;
+    for (uint32_t i = 0; i < t->w->ring_count && result == FCT_OK; ++i) {
+        uint32_t f = t->w->ring[i] / 3;
+        result = add_need(t, t->face_steps[f]);
+        t->face_steps[f] = t->step;
+    }
+    return result;
+}
+
+static fct_result trace_step(tracer *t) {
+    fct_result result = trace_nodes(t);
+    if (result == FCT_OK) result = fct_walk_find_ring(t->w);
+    if (result != FCT_OK) return result;
+    fct_walk_forward(t->w);
+    result = trace_new_faces(t);
+    t->h->first_strict[t->step] = (uint32_t)t->needs_count;
+    if (result == FCT_OK) result = trace_ring(t);
+    t->h->first_needs[t->step + 1] = (uint32_t)t->needs_count;
+    return result;
+}
+
 static fct_result report_step(const fct_progressive *m, uint32_t done) {
     if (done % PROGRESS_STEPS) return FCT_OK;
     return fct_progress(m->env, "hierarchy", (double)done / (2. * m->step_count));
@@ -85,12 +98,7 @@ static fct_result trace_steps(tracer *t) {
     t->h->parents[0] = t->h->siblings[0] = FCT_NONE;
     t->h->first_needs[0] = t->h->first_needs[1] = 0;
     for (t->step = 1; t->step < m->step_count && result == FCT_OK; ++t->step) {
-        result = trace_nodes(t);
-        if (result == FCT_OK) result = trace_ring(t);
-        if (result != FCT_OK) return result;
-        fct_walk_forward(t->w);
-        result = trace_new_faces(t);
-        t->h->first_needs[t->step + 1] = (uint32_t)t->needs_count;
+        result = trace_step(t);
         if (result == FCT_OK) result = report_step(m, t->step);
     }
     return result;
@@ -98,9 +106,9 @@ static fct_result trace_steps(tracer *t) {
 
 static fct_result measure_steps(fct_walk *w, fct_hierarchy *h) {
     fct_deviation *d;
-    fct_result result = fct_deviation_begin(w, &d);
+    fct_result result = fct_deviation_begin(w, h, &d);
     while (result == FCT_OK && w->step > 1) {
-        result = fct_deviation_contract(d, h);
+        result = fct_deviation_contract(d);
         if (result == FCT_OK) result = report_step(w->m, 2 * w->m->step_count - w->step);
     }
     fct_deviation_end(d);
@@ -124,11 +132,12 @@ fct_result fct_hierarchy_create(const fct_progressive *m, fct_hierarchy **out) {
     size_t steps = m->step_count, words = steps / 64 + 1;
     fct_hierarchy *h = fct_allocate_zero(m->env, 1, sizeof *h);
     if (!h) return fct_fail_memory(m->env, "a vertex hierarchy");
-    const fct_array arrays[] = {FCT_ARRAY(h->first_needs, steps + 1), FCT_ARRAY(h->parents, steps),
-                                FCT_ARRAY(h->first_children, steps),  FCT_ARRAY(h->siblings, steps),
-                                FCT_ARRAY_ZERO(h->bounds, steps),     FCT_ARRAY_ZERO(h->done, words),
-                                FCT_ARRAY_ZERO(h->wanted, words),     FCT_ARRAY(h->stack, steps),
-                                FCT_ARRAY(h->tested, steps)};
+    const fct_array arrays[] = {FCT_ARRAY(h->first_needs, steps + 1), FCT_ARRAY(h->first_strict, steps + 1),
+                                FCT_ARRAY(h->parents, steps),         FCT_ARRAY(h->first_children, steps),
+                                FCT_ARRAY(h->siblings, steps),        FCT_ARRAY_ZERO(h->bounds, steps),
+                                FCT_ARRAY(h->turns, m->face_count),   FCT_ARRAY_ZERO(h->done, words),
+                                FCT_ARRAY_ZERO(h->wanted, words),     FCT_ARRAY(h->strict, words),
+                                FCT_ARRAY(h->stack, steps),           FCT_ARRAY(h->tested, steps)};
     fct_walk w = {0};
     h->step_count = m->step_count;
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a vertex hierarchy");
@@ -147,8 +156,9 @@ fct_result fct_hierarchy_create(const fct_progressive *m, fct_hierarchy **out) {
 
 void fct_hierarchy_destroy(const fct_env *env, fct_hierarchy *h) {
     if (!h) return;
-    void *arrays[] = {h->first_needs, h->needs,  h->parents,   h->first_children, h->siblings, h->bounds,
-                      h->done,        h->wanted, h->triangles, h->nodes,          h->stack,    h->tested};
+    void *arrays[] = {h->first_needs, h->first_strict, h->needs, h->parents, h->first_children,
+                      h->siblings,    h->bounds,       h->turns, h->done,    h->wanted,
+                      h->strict,      h->triangles,    h->nodes, h->stack,   h->tested};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(env, arrays[i]);
     fct_release(env, h);
 }

@@ -1,14 +1,14 @@
 /* simplify/view/hierarchy.h: the vertex hierarchy of a progressive mesh, and a cut through it.
  *
- * A cut is a set of steps that are done. Step t needs step s if s was the last step before t that made or
- * changed a face that t changes, or a node that t replaces or that a new face of t uses. A set of steps with
- * all that they need can be done in the order of the file, or in any other order that does needed steps
- * first:
- * - Each step finds exactly the faces around its point that it found in the file, so it is the same split.
- * - Each face of the result is a face of some level, with the same three nodes. So it is not folded over, and
- *   a closed mesh stays closed.
- * (Xia and Varshney, "Dynamic View-Dependent Simplification for Polygonal Models", Visualization 1996, and
- * Garland 1999, section 7.3.)
+ * A cut is a set of steps that are done, together with all steps that they need. It can be done in the order
+ * of the file, or in any other order that does needed steps first. A step needs
+ * - the steps that made the nodes that it replaces, and the nodes that its new faces use. Then the mesh is
+ * the finest one with all vertices at their ancestors in the cut, so a closed mesh stays closed and seams do
+ * not crack;
+ * - strictly, also the last steps before it that changed a face that it changes. If all strict needs of a
+ * step are done, and theirs, its faces are faces of some level. A cut does this where a face would fold over.
+ * (Garland 1999, section 7.3; Xia and Varshney, "Dynamic View-Dependent Simplification for Polygonal Models",
+ * Visualization 1996, have strict needs everywhere, which refines far more.)
  */
 #ifndef FCT_SIMPLIFY_HIERARCHY_H
 #define FCT_SIMPLIFY_HIERARCHY_H
@@ -23,19 +23,26 @@ typedef struct fct_bound {
     float color;             /* the largest difference of a component of its colour from that of the faces */
 } fct_bound;
 
+/* How far a face turns in the levels. */
+typedef struct fct_face_turn {
+    float normal[3]; /* at the finest level: unit, or 0 */
+    float cosine;    /* of the angle to that at any level: the smallest */
+} fct_face_turn;
+
 typedef struct fct_hierarchy {
     uint32_t step_count;
-    /* Step t needs needs[first_needs[t]] to needs[first_needs[t + 1]]; step 0, which is always done, is left
-     * out. */
-    uint32_t *first_needs, *needs;
+    /* Step t needs needs[first_needs[t]] to needs[first_strict[t]], and strictly those to
+     * needs[first_needs[t + 1]] as well; step 0, which is always done, is left out. */
+    uint32_t *first_needs, *first_strict, *needs;
     /* A tree of the steps with root 0: the parent is the last step that made a node that this step replaces,
      * or 0. Bounds of children are inside that of their parent. */
     uint32_t *parents, *first_children, *siblings;
     fct_bound *bounds;
+    fct_face_turn *turns; /* per face */
     /* The cut. */
-    uint64_t *done, *wanted;     /* a bit per step; `wanted` is scratch */
-    uint32_t *triangles, *nodes; /* as those of the progressive mesh */
-    uint32_t *stack, *tested;    /* scratch, step_count each */
+    uint64_t *done, *wanted, *strict; /* a bit per step; the last two are scratch */
+    uint32_t *triangles, *nodes;      /* as those of the progressive mesh */
+    uint32_t *stack, *tested;         /* scratch, step_count each */
 } fct_hierarchy;
 
 /* The hierarchy of m, with the base mesh as its cut. Does not change the level of m. Cost: linear, plus the

@@ -1,7 +1,6 @@
 /* What a view measures: pixels beside projections, sides beside normals, bounds beside an oracle, and the
  * distance on the screen between a cut and the finest level. */
-#include "facetree/bvh.h"
-#include "views.h"
+#include "screen.h"
 
 static fct_env env;
 
@@ -10,24 +9,6 @@ static fct_cut_view frame_of(const fct_view *view) {
     fct_cut_view frame;
     assert_int_equal(fct_cut_read_view(&env, view, origin, &frame), FCT_OK);
     return frame;
-}
-
-/* Pixels from the middle of the picture, by the definition of the camera; false behind the eye. */
-static bool project(const fct_view *view, v3 x, double out[2]) {
-    v3 eye = {view->position[0], view->position[1], view->position[2]},
-       to = v3_sub(v3_make(view->target[0], view->target[1], view->target[2]), eye),
-       up = {view->up[0], view->up[1], view->up[2]}, forward = v3_scale(to, 1 / v3_norm(to)),
-       right = v3_cross(forward, up), d = v3_sub(x, eye);
-    right = v3_scale(right, 1 / v3_norm(right));
-    double z = v3_dot(d, forward), half = tan(view->vertical_fov * 3.14159265358979 / 360);
-    out[0] = .5 * view->height / half * v3_dot(d, right) / z;
-    out[1] = .5 * view->height / half * v3_dot(d, v3_cross(right, forward)) / z;
-    return z > 0;
-}
-
-static bool in_picture(const fct_view *view, v3 x) {
-    double p[2];
-    return project(view, x, p) && fabs(p[0]) <= .5 * view->width && fabs(p[1]) <= .5 * view->height;
 }
 
 static v3 random_unit(uint64_t *seed) {
@@ -260,58 +241,6 @@ static void bounds_hold_what_is_below(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* A surface for nearest points. */
-typedef struct surface {
-    fct_tree *tree;
-    fct_bvh *bvh;
-} surface;
-
-static surface make_surface(const fct_mesh *mesh) {
-    surface s;
-    fct_tree_def def = fct_tree_def_default();
-    assert_int_equal(fct_tree_build(&env, mesh, &def, NULL, &s.tree), FCT_OK);
-    assert_int_equal(fct_bvh_create(&env, s.tree, FCT_BACKEND_OBB, &s.bvh), FCT_OK);
-    return s;
-}
-
-/* Whether the faces around each vertex show the eye their front (1), back (2) or both (3). */
-static unsigned char *list_sides(const fct_mesh *mesh, v3 eye) {
-    unsigned char *sides = calloc(mesh->vertex_count, 1);
-    for (uint32_t f = 0; f < mesh->face_count; ++f)
-        for (int k = 0; k < 3; ++k) {
-            uint32_t v = mesh->triangles[3 * (size_t)f + k];
-            sides[v] |= v3_dot(face_cross(mesh, f), v3_sub(vertex(mesh, v), eye)) < 0 ? 1 : 2;
-        }
-    return sides;
-}
-
-/* Vertices of the finest level in the picture are as near to the cut on the screen as the view asks for.
- * Returns the largest pixels over the tolerance of a vertex that is seen from the front. */
-static double check_screen(const fct_mesh *finest, const fct_mesh *cut, const fct_view *view,
-                           const fct_view_stats *stats) {
-    v3 eye = {view->position[0], view->position[1], view->position[2]};
-    unsigned char *sides = list_sides(finest, eye);
-    surface s = make_surface(cut);
-    double most = 0;
-    for (uint32_t v = 0; v < finest->vertex_count; ++v) {
-        fct_closest near;
-        double p[2], q[2];
-        v3 x = vertex(finest, v);
-        assert_true(fct_bvh_closest_point(s.bvh, finest->positions + 3 * (size_t)v, INFINITY, &near, NULL));
-        assert_true((double)near.distance <= stats->error * 1.001 + 1e-7);
-        if (!in_picture(view, x) || sides[v] == 2) continue;
-        assert_true(project(view, x, p) && project(view, v3_load(near.point), q));
-        double pixels = hypot(p[0] - q[0], p[1] - q[1]);
-        assert_true(pixels <= 1.01 * stats->pixels + 1e-3);
-        assert_true(pixels <= 1.01 * (sides[v] == 3 ? view->silhouette_tolerance : view->tolerance) + 1e-3);
-        if (sides[v] == 1) most = fmax(most, pixels / view->tolerance);
-    }
-    fct_bvh_destroy(s.bvh);
-    fct_tree_destroy(s.tree);
-    free(sides);
-    return most;
-}
-
 static void the_screen_shows_at_most_the_tolerance(void **state) {
     (void)state;
     uint64_t seed = 5;
@@ -324,7 +253,10 @@ static void the_screen_shows_at_most_the_tolerance(void **state) {
         fct_view view = random_view(&seed, v3_make(0, 0, 0), 1.5);
         fct_view_stats stats;
         fct_mesh out = view_mesh(m, &view, &stats);
-        most = fmax(most, check_screen(&finest, &out, &view, &stats));
+        screen seen = measure_screen(&env, &finest, &out, &view);
+        assert_true(seen.front <= 1.01 && seen.silhouette <= 1.01 &&
+                    seen.distance <= 1.01 * stats.error + 1e-6);
+        most = fmax(most, seen.front);
         fct_mesh_release(&env, &out);
     }
     assert_true(most > .6);
@@ -349,7 +281,7 @@ static void colours_are_refined(void **state) {
         view.color_tolerance = tolerance;
         fct_view_stats stats;
         fct_mesh out = view_mesh(m, &view, &stats);
-        surface s = make_surface(&out);
+        surface s = make_surface(&env, &out);
         for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
             fct_closest near;
             double color = 0;

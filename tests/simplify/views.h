@@ -60,17 +60,23 @@ static inline uint32_t step_of_node(const fct_progressive *m, uint32_t node) {
     return step;
 }
 
-/* Whether step t uses what step s < t made: a face that it changes, or a node. */
-static inline bool uses_step(const fct_progressive *m, const uint32_t *states, uint32_t t, uint32_t s) {
+/* Whether step t uses what step s < t made: nodes that it replaces, and nodes of its new faces. Strictly also
+ * faces that it changes. */
+static inline bool uses_step(const fct_progressive *m, const uint32_t *states, uint32_t t, uint32_t s,
+                             bool strictly) {
     size_t row = 3 * (size_t)m->face_count;
-    for (uint32_t f = 0; f < m->step_faces[t + 1]; ++f) {
-        if (!changes_face(m, states, t, f)) continue;
-        if (changes_face(m, states, s, f)) return true;
-        for (uint32_t k = 0; k < 3; ++k)
-            if (step_of_node(m, states[t * row + 3 * f + k]) == s) return true;
-    }
     for (uint32_t n = m->step_nodes[t]; n < m->step_nodes[t + 1]; ++n)
         if (m->parents[n] != FCT_NONE && step_of_node(m, m->parents[n]) == s) return true;
+    for (uint32_t f = m->step_faces[t]; f < m->step_faces[t + 1]; ++f)
+        for (uint32_t k = 0; k < 3; ++k)
+            if (step_of_node(m, states[t * row + 3 * f + k]) == s) return true;
+    for (uint32_t f = 0; strictly && f < m->step_faces[t]; ++f)
+        if (changes_face(m, states, t, f) && changes_face(m, states, s, f)) {
+            bool last = true;
+            for (uint32_t between = s + 1; between < t; ++between)
+                last &= !changes_face(m, states, between, f);
+            if (last) return true;
+        }
     return false;
 }
 

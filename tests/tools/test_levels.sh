@@ -54,7 +54,7 @@ cp out view
 "$program" info view.ply --json >out
 holds "$(value boundary_edges) == 0 && $(value nonmanifold_edges) == 0 && $(value degenerate_faces) == 0"
 holds "$(value faces) == $(value faces view)"
-for options in "--tolerance 8 --silhouette 1" "--silhouette 4" "--size 400x300" "--back 1" "--up z --outside 1"; do
+for options in "--tolerance 8 --silhouette 1" "--silhouette 4" "--size 400x300" "--back 1 --tolerance 1" "--up z --outside 1"; do
     expect 0 level sphere.fpm --view $camera --tolerance 4 --silhouette 1 --size 800x600 $options -o other.ply --json
     case $options in
     --back*) holds "$(value faces) > $(value faces view)" ;;
