@@ -56,7 +56,7 @@ struct fct_progressive {
     uint32_t *nodes;    /* at the current level */
     uint32_t *vertices; /* scratch: FCT_NONE between calls */
     /* Per point, only with texture coordinates. */
-    uint32_t *point_vertices; /* scratch: FCT_NONE between calls */
+    uint32_t *point_vertices;        /* scratch: FCT_NONE between calls */
     struct fct_hierarchy *hierarchy; /* NULL before the first view */
 };
 

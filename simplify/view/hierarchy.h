@@ -45,9 +45,6 @@ typedef struct fct_hierarchy {
     uint32_t *stack, *tested;         /* scratch, step_count each */
 } fct_hierarchy;
 
-/* The hierarchy of m, with the base mesh as its cut. Does not change the level of m. Cost: linear, plus the
- * rings of all splits. Errors: MEMORY, CANCELLED. */
-fct_result fct_hierarchy_create(const fct_progressive *m, fct_hierarchy **out);
 /* NULL is allowed. */
 void fct_hierarchy_destroy(const fct_env *env, fct_hierarchy *h);
 

@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 
+#include "simplify/view/create.h"
 #include "simplify/view/cut.h"
 
 static const double degree = 3.14159265358979323846 / 180;
