@@ -1,6 +1,9 @@
-/* simplify/view/cut.c: see cut.h. From the base mesh on, each child of a marked step is tested. A wanted step
- * is marked, and what it needs as well. Bounds grow towards the root, so a step below an unwanted one is not
- * wanted.
+/* simplify/view/cut.c: see cut.h.
+ *
+ * 1. From the root of the tree on, mark the children that the view wants. What is below an unwanted step is
+ *    inside its bound, so it is not wanted.
+ * 2. Mark what marked steps need.
+ * 3. Split and contract. Mark what faces need that fold over, and repeat until none does.
  */
 #include "simplify/view/cut.h"
 
@@ -95,47 +98,52 @@ static void mark_step(marker *k, uint32_t step) {
     ++k->stats->splits;
 }
 
-static bool test_step(marker *k, uint32_t step) {
-    ++k->stats->tested;
-    return fct_cut_wants(k->view, &k->h->bounds[step]);
+/* Marks a step that is not wanted itself. */
+static void force_step(marker *k, uint32_t step) {
+    fct_hierarchy *h = k->h;
+    mark_step(k, step);
+    ++k->stats->forced;
+    for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c])
+        h->tested[k->tested_count++] = c;
 }
 
 static void push_step(marker *k, uint32_t step) {
     k->h->stack[k->stack_count++] = step;
 }
 
-static void mark_needs(marker *k, uint32_t step) {
-    const fct_hierarchy *h = k->h;
-    if (step == 0) return;
-    for (uint32_t i = h->first_needs[step]; i < h->first_strict[step]; ++i) {
-        if (has_step(h->wanted, h->needs[i])) continue;
-        if (!test_step(k, h->needs[i])) ++k->stats->forced;
-        mark_step(k, h->needs[i]);
-        push_step(k, h->needs[i]);
-    }
-}
-
-/* Marks what the view wants and needs. Lists the tested steps that are not wanted. */
-static void mark_cut(marker *k) {
+/* Marks what the view wants, and lists the tested steps that it does not want. */
+static void mark_wanted(marker *k) {
     fct_hierarchy *h = k->h;
-    memset(h->wanted, 0, (h->step_count / 64 + 1) * sizeof *h->wanted);
-    memset(h->strict, 0, (h->step_count / 64 + 1) * sizeof *h->strict);
+    size_t size = (h->step_count / 64 + 1) * sizeof *h->wanted;
+    memset(h->wanted, 0, size);
+    memset(h->strict, 0, size);
     add_step(h->wanted, 0);
     add_step(h->strict, 0);
     push_step(k, 0);
     while (k->stack_count) {
         uint32_t step = h->stack[--k->stack_count];
-        mark_needs(k, step);
         for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c]) {
-            if (has_step(h->wanted, c)) continue;
-            if (!test_step(k, c)) {
+            ++k->stats->tested;
+            if (fct_cut_wants(k->view, &h->bounds[c])) {
+                mark_step(k, c);
+                push_step(k, c);
+            } else
                 h->tested[k->tested_count++] = c;
-                continue;
-            }
-            mark_step(k, c);
-            push_step(k, c);
         }
     }
+}
+
+/* Marks what marked steps need: earlier ones, so one pass from the last step to the first is enough. */
+static void mark_needs(marker *k) {
+    const fct_hierarchy *h = k->h;
+    for (uint32_t i = h->step_count / 64 + 1; i-- > 0;)
+        for (uint64_t left = h->wanted[i], below; left; left = h->wanted[i] & below) {
+            uint32_t bit = 63 - (uint32_t)__builtin_clzll(left), step = 64 * i + bit;
+            below = ((uint64_t)1 << bit) - 1;
+            if (step == 0) break;
+            for (uint32_t n = h->first_needs[step]; n < h->first_strict[step]; ++n)
+                if (!has_step(h->wanted, h->needs[n])) force_step(k, h->needs[n]);
+        }
 }
 
 /* Contracts from the last step to the first, then splits from the first to the last: steps that others need
@@ -199,11 +207,7 @@ static bool mark_strictly(marker *k, uint32_t step) {
             if (has_step(h->strict, needed)) continue;
             add_step(h->strict, needed);
             push_step(k, needed);
-            if (has_step(h->wanted, needed)) continue;
-            mark_step(k, needed);
-            ++k->stats->forced;
-            for (uint32_t c = h->first_children[needed]; c != FCT_NONE; c = h->siblings[c])
-                h->tested[k->tested_count++] = c;
+            if (!has_step(h->wanted, needed)) force_step(k, needed);
         }
     }
     return k->stats->splits > before;
@@ -237,7 +241,8 @@ static void find_errors(const marker *k) {
 void fct_cut_move(const fct_progressive *m, fct_hierarchy *h, const fct_cut_view *view,
                   fct_view_stats *stats) {
     marker k = {.m = m, .h = h, .view = view, .stats = stats};
-    mark_cut(&k);
+    mark_wanted(&k);
+    mark_needs(&k);
     do move_cut(&k);
     while (mark_folds(&k));
     find_errors(&k);

@@ -26,7 +26,7 @@ typedef struct fct_cut_error {
     bool hidden;   /* outside of the picture, or seen from behind only */
 } fct_cut_error;
 fct_cut_error fct_cut_measure(const fct_cut_view *view, const fct_bound *bound);
-/* Whether the step has to be done. */
+/* Whether the step has to be done, if its ancestors in the tree have to. */
 bool fct_cut_wants(const fct_cut_view *view, const fct_bound *bound);
 
 /* Splits and contracts until the cut has the wanted steps, all steps that they need and no others. Fills in

@@ -35,7 +35,7 @@ typedef struct fct_hierarchy {
      * needs[first_needs[t + 1]] as well; step 0, which is always done, is left out. */
     uint32_t *first_needs, *first_strict, *needs;
     /* A tree of the steps with root 0: the parent is the last step that made a node that this step replaces,
-     * or 0. Bounds of children are inside that of their parent. */
+     * or 0. What the bounds of children hold is inside that of their parent. */
     uint32_t *parents, *first_children, *siblings;
     fct_bound *bounds;
     fct_face_turn *turns; /* per face */
