@@ -137,7 +137,8 @@ fct_result fct_hierarchy_create(const fct_progressive *m, fct_hierarchy **out) {
                                 FCT_ARRAY(h->siblings, steps),        FCT_ARRAY_ZERO(h->bounds, steps),
                                 FCT_ARRAY(h->turns, m->face_count),   FCT_ARRAY_ZERO(h->done, words),
                                 FCT_ARRAY_ZERO(h->wanted, words),     FCT_ARRAY(h->strict, words),
-                                FCT_ARRAY(h->stack, steps),           FCT_ARRAY(h->tested, steps)};
+                                FCT_ARRAY(h->forced, words),          FCT_ARRAY(h->stack, steps),
+                                FCT_ARRAY(h->tested, steps)};
     fct_walk w = {0};
     h->step_count = m->step_count;
     fct_result result = fct_allocate_all(m->env, arrays, FCT_LENGTH(arrays), "a vertex hierarchy");

@@ -102,6 +102,7 @@ static void mark_step(marker *k, uint32_t step) {
 static void force_step(marker *k, uint32_t step) {
     fct_hierarchy *h = k->h;
     mark_step(k, step);
+    add_step(h->forced, step);
     ++k->stats->forced;
     for (uint32_t c = h->first_children[step]; c != FCT_NONE; c = h->siblings[c])
         h->tested[k->tested_count++] = c;
@@ -116,6 +117,7 @@ static void mark_wanted(marker *k) {
     fct_hierarchy *h = k->h;
     size_t size = (h->step_count / 64 + 1) * sizeof *h->wanted;
     memset(h->wanted, 0, size);
+    memset(h->forced, 0, size);
     memset(h->strict, 0, size);
     add_step(h->wanted, 0);
     add_step(h->strict, 0);
@@ -226,14 +228,20 @@ static bool mark_folds(marker *k) {
     return more;
 }
 
-/* The largest errors of steps that are not done. */
+/* The largest errors of steps that are not done. Each is inside the bounds of its ancestors, so those that
+ * the view does not want limit it as well. */
 static void find_errors(const marker *k) {
     const fct_hierarchy *h = k->h;
     for (uint32_t i = 0; i < k->tested_count; ++i) {
-        const fct_bound *bound = &h->bounds[h->tested[i]];
-        if (has_step(h->wanted, h->tested[i])) continue;
-        fct_cut_error e = fct_cut_measure(k->view, bound);
-        k->stats->error = fct_max((double)bound->error, k->stats->error);
+        uint32_t step = h->tested[i];
+        if (has_step(h->wanted, step)) continue;
+        k->stats->error = fct_max((double)h->bounds[step].error, k->stats->error);
+        fct_cut_error e = fct_cut_measure(k->view, &h->bounds[step]);
+        for (step = h->parents[step]; has_step(h->forced, step) && !e.hidden; step = h->parents[step]) {
+            fct_cut_error above = fct_cut_measure(k->view, &h->bounds[step]);
+            e.pixels = fct_min(e.pixels, above.pixels);
+            e.hidden = above.hidden;
+        }
         if (!e.hidden) k->stats->pixels = fct_max(e.pixels, k->stats->pixels);
     }
 }

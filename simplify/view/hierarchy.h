@@ -40,9 +40,10 @@ typedef struct fct_hierarchy {
     fct_bound *bounds;
     fct_face_turn *turns; /* per face */
     /* The cut. */
-    uint64_t *done, *wanted, *strict; /* a bit per step; the last two are scratch */
-    uint32_t *triangles, *nodes;      /* as those of the progressive mesh */
-    uint32_t *stack, *tested;         /* scratch, step_count each */
+    uint64_t *done;                     /* a bit per step */
+    uint64_t *wanted, *forced, *strict; /* scratch, likewise */
+    uint32_t *triangles, *nodes;        /* as those of the progressive mesh */
+    uint32_t *stack, *tested;           /* scratch, step_count each */
 } fct_hierarchy;
 
 /* NULL is allowed. */

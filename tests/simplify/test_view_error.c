@@ -77,6 +77,12 @@ static void spheres_are_outside_of_the_picture(void **state) {
             seen = in_picture(
                 &view, v3_mad(center, (double)bound.radius * cbrt(uniform(&seed)), random_unit(&seed)));
         assert_false(seen && e.hidden);
+        v3 from = v3_sub(center, v3_make(view.position[0], view.position[1], view.position[2]));
+        double half = view.vertical_fov * 3.14159265358979 / 360, z = v3_dot(from, frame.forward),
+               wide = atan(tan(half) * view.width / view.height),
+               away = fmax(fabs(v3_dot(from, frame.right)) * cos(wide) - z * sin(wide),
+                           fabs(v3_dot(from, frame.up)) * cos(half) - z * sin(half));
+        assert_int_equal(e.hidden, fmax(away, -z) > (double)bound.radius);
         assert_ratio(e.limit, view.silhouette_tolerance * (e.hidden ? 3 : 1), 1e-12);
         outside += e.hidden, found += !seen;
         if (!e.hidden) continue;
@@ -220,7 +226,8 @@ static void bounds_hold_what_is_below(void **state) {
     oracle o = {.m = m, .states = states};
     for (uint32_t s = 1; s < m->step_count; ++s)
         for (uint32_t up = s; up != 0; up = m->hierarchy->parents[up]) {
-            const fct_bound *b = &m->hierarchy->bounds[up];
+            const fct_bound *b = &m->hierarchy->bounds[up], *below = &m->hierarchy->bounds[s];
+            assert_true(b->error >= below->error && b->color >= below->color);
             closed += b->high[0] < .99f;
             for (uint32_t f = 0; f < m->step_faces[s]; ++f) {
                 v3 t[3];
@@ -241,6 +248,32 @@ static void bounds_hold_what_is_below(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Where a sheet ends, its edge is a silhouette from everywhere. */
+static void open_boundaries_have_all_normals(void **state) {
+    (void)state;
+    fct_mesh mesh = make_grid(&env, 12);
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) mesh.positions[3 * v + 2] = .01f * (float)(v * 7 % 5);
+    fct_progressive *m = progressive_of(&env, &mesh, fct_simplify_def_default(), 20);
+    fct_view view = fct_view_default();
+    fct_mesh out = view_mesh(m, &view, NULL);
+    uint32_t open = 0, closed = 0;
+    for (uint32_t s = 1; s < m->step_count; ++s) {
+        const fct_bound *b = &m->hierarchy->bounds[s];
+        bool any = b->low[2] <= -1 && b->high[2] >= 1, ends = false;
+        for (uint32_t n = m->step_nodes[s]; n < m->step_nodes[s + 1]; ++n)
+            for (int k = 0; k < 2; ++k) {
+                float x = m->positions[3 * (size_t)m->parents[n] + k];
+                ends |= x < 1e-6f || x > 1 - 1e-6f;
+            }
+        if (ends) assert_true(any);
+        open += ends, closed += !any;
+    }
+    assert_true(open > 10 && closed > 10);
+    fct_mesh_release(&env, &out);
+    fct_progressive_destroy(m);
+    fct_mesh_release(&env, &mesh);
+}
+
 static void the_screen_shows_at_most_the_tolerance(void **state) {
     (void)state;
     uint64_t seed = 5;
@@ -256,6 +289,7 @@ static void the_screen_shows_at_most_the_tolerance(void **state) {
         screen seen = measure_screen(&env, &finest, &out, &view);
         assert_true(seen.front <= 1.01 && seen.silhouette <= 1.01 &&
                     seen.distance <= 1.01 * stats.error + 1e-6);
+        assert_true(stats.pixels <= view.tolerance);
         most = fmax(most, seen.front);
         fct_mesh_release(&env, &out);
     }
@@ -316,6 +350,7 @@ int main(void) {
                                        cmocka_unit_test(sides_are_those_of_all_normals),
                                        cmocka_unit_test(errors_are_those_of_repeated_contractions),
                                        cmocka_unit_test(bounds_hold_what_is_below),
+                                       cmocka_unit_test(open_boundaries_have_all_normals),
                                        cmocka_unit_test(the_screen_shows_at_most_the_tolerance),
                                        cmocka_unit_test(colours_are_refined)};
     return cmocka_run_group_tests(tests, NULL, NULL);
