@@ -59,7 +59,10 @@ error_t view_parse(int key, const char *text, struct argp_state *state, view_opt
         o->camera = text;
         return 0;
     case KEY_SIZE:
-        return drawing_parse_size(state, text, &o->view.width, &o->view.height);
+        return drawing_parse_size(text, &o->view.width, &o->view.height)
+                   ? 0
+                   : tool_usage(state, "--size: expected WIDTHxHEIGHT, each 1 to %d, found '%s'",
+                                RASTER_MAX_SIZE, text);
     case KEY_UP:
         return parse_up(state, text, &o->view);
     case KEY_TOLERANCE:

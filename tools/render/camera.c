@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tools/kit/options.h"
-
 const char *const drawing_views[] = {"corner", "front", "back", "left", "right", "top", "bottom", NULL};
 
 /* Directions towards the eye if y is up. The corner view is right of the front view and above it. */
@@ -56,16 +54,14 @@ bool drawing_parse_camera(const char *text, drawing_frame *out) {
     return true;
 }
 
-error_t drawing_parse_size(struct argp_state *state, const char *text, uint32_t *width, uint32_t *height) {
+bool drawing_parse_size(const char *text, uint32_t *width, uint32_t *height) {
     char *end;
     unsigned long w = strtoul(text, &end, 10), h = 0;
     bool good = *end == 'x' && end > text && *text != '-' && end[1] >= '0' && end[1] <= '9';
     if (good) h = strtoul(end + 1, &end, 10);
-    if (!good || *end || w < 1 || h < 1 || w > RASTER_MAX_SIZE || h > RASTER_MAX_SIZE)
-        return tool_usage(state, "--size: expected WIDTHxHEIGHT, each 1 to %d, found '%s'", RASTER_MAX_SIZE,
-                          text);
+    if (!good || *end || w < 1 || h < 1 || w > RASTER_MAX_SIZE || h > RASTER_MAX_SIZE) return false;
     *width = (uint32_t)w, *height = (uint32_t)h;
-    return 0;
+    return true;
 }
 
 void drawing_from_scene(const fct_camera *camera, drawing_frame *out) {

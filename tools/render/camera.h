@@ -2,8 +2,6 @@
 #ifndef FCT_TOOLS_CAMERA_H
 #define FCT_TOOLS_CAMERA_H
 
-#include <argp.h>
-
 #include "tools/render/drawing.h"
 
 extern const char *const drawing_views[]; /* names; ends with NULL */
@@ -18,8 +16,8 @@ typedef struct drawing_frame {
 
 /* Reads "ex,ey,ez,tx,ty,tz[,fov]". False for any other text. */
 bool drawing_parse_camera(const char *text, drawing_frame *out);
-/* Reads "WxH", the value of --size. Returns as the parsers of tools/kit/options.h. */
-error_t drawing_parse_size(struct argp_state *state, const char *text, uint32_t *width, uint32_t *height);
+/* Reads "WxH", each 1 to RASTER_MAX_SIZE. False for any other text. */
+bool drawing_parse_size(const char *text, uint32_t *width, uint32_t *height);
 void drawing_from_scene(const fct_camera *camera, drawing_frame *out);
 /* Fills the eye, the axes and the focal length of `out`, whose width, height, samples and cull are set
  * already, and the lights of the drawing. *outside: whether the eye is outside the bounds of the mesh. */

@@ -167,7 +167,10 @@ static error_t parse_render(int key, char *text, struct argp_state *state) {
         o->wireframe = true;
         return 0;
     case KEY_SIZE:
-        return drawing_parse_size(state, text, &o->width, &o->height);
+        return drawing_parse_size(text, &o->width, &o->height)
+                   ? 0
+                   : tool_usage(state, "--size: expected WIDTHxHEIGHT, each 1 to %d, found '%s'",
+                                RASTER_MAX_SIZE, text);
     case KEY_CAMERA:
     case KEY_SCENE:
     case KEY_VIEW:
