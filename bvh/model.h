@@ -7,7 +7,8 @@
  * scaled space, so they hold for models of every size at every place.
  *
  *     node (8 children) -> node or leaf      nodes: axis boxes or oriented boxes, built over the leaves
- *     leaf -> up to 16 triangles             leaves: face clusters of the tree, in order of place
+ *     leaf -> up to 16 triangles             leaves: face clusters, their faces in the tree's order;
+ *                                            other sets of faces if the model is dense, see leaves.c
  */
 #ifndef FCT_BVH_MODEL_H
 #define FCT_BVH_MODEL_H
@@ -124,7 +125,7 @@ struct fct_bvh {
     /* FCT_BACKEND_OBB */
     char *nodes, *leaves;
     size_t node_bytes, leaf_bytes;
-    uint32_t *places; /* of the triangles of all leaves, if these are not in order; else NULL */
+    uint32_t *places; /* of the triangles of all leaves, leaf by leaf; NULL if they are 0, 1, 2, ... */
     uint32_t root;    /* reference */
     struct fct_moment_node *moments; /* with FCT_BVH_SIGN; NULL if the model is one leaf */
     size_t moment_bytes;

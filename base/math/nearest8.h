@@ -24,7 +24,7 @@ static inline f8x3 f8x3_mix(f8x3 a, f8 v, f8x3 b, f8 w, f8x3 c) {
 }
 typedef struct fct_nearest8 {
     f8x3 point;
-    f8 v, w; /* its weights of b and c: v, w >= 0 and v + w <= 1, whatever the rounding of the point */
+    f8 v, w; /* its weights of b and c: v, w >= 0, and v + w <= 1 up to 2^-21 */
 } fct_nearest8;
 
 /* The nearest point a + v (b - a) + w (c - a) of each triangle, by the cases of Ericson (Real-Time Collision

@@ -2,8 +2,8 @@
  * make.
  *
  * usage:
- * - shapes NAME COUNT OUT: strip, fan, loose, books, cubes, blocks, beams, needles or gear, of COUNT
- * triangles
+ * - shapes NAME COUNT OUT: strip, fan, loose, books, cubes, blocks, lattice, turned-lattice, beams,
+ *   needles or gear, of COUNT triangles
  * - shapes subdivide LEVELS IN OUT: splits each triangle into four, LEVELS times, with noise
  * - shapes shuffle-faces SEED IN OUT
  * - shapes shuffle SEED IN OUT: vertices, too
@@ -114,6 +114,30 @@ static void make_blocks(const fct_env *env, uint32_t count, fct_mesh *m) {
             }
             add_face(m, v[0], v[1], v[2]);
         }
+    }
+}
+
+/* Cubes at the points of a cubic grid, which fill an eighth of it. */
+static void make_lattice(const fct_env *env, uint32_t count, fct_mesh *m) {
+    uint32_t n = (uint32_t)cbrt(count / 12.0) + 1;
+    start(env, 8 * n * n * n, 12 * n * n * n, m);
+    for (uint32_t c = 0; c < n * n * n; ++c) {
+        for (uint32_t k = 0; k < 8; ++k)
+            add_vertex(m, c % n + .5 * (k & 1), c / n % n + .5 * (k >> 1 & 1), c / n / n + .5 * (k >> 2));
+        for (int s = 0; s < 12; ++s)
+            add_face(m, 8 * c + cube_sides[s][0], 8 * c + cube_sides[s][1], 8 * c + cube_sides[s][2]);
+    }
+}
+
+/* The same, turned as a whole: its edges run along diagonals. */
+static void make_turned_lattice(const fct_env *env, uint32_t count, fct_mesh *m) {
+    static const double r[3][3] = {
+        {2. / 3, -1. / 3, 2. / 3}, {2. / 3, 2. / 3, -1. / 3}, {-1. / 3, 2. / 3, 2. / 3}};
+    make_lattice(env, count, m);
+    for (uint32_t v = 0; v < m->vertex_count; ++v) {
+        float *p = m->positions + 3 * (size_t)v;
+        const double x = (double)p[0], y = (double)p[1], z = (double)p[2];
+        for (int k = 0; k < 3; ++k) p[k] = (float)(r[k][0] * x + r[k][1] * y + r[k][2] * z);
     }
 }
 
@@ -304,9 +328,17 @@ int main(int argc, char **argv) {
     static const struct {
         const char *name;
         void (*make)(const fct_env *env, uint32_t count, fct_mesh *m);
-    } made[] = {{"strip", make_strip}, {"fan", make_fan},         {"loose", make_loose},
-                {"books", make_books}, {"cubes", make_cubes},     {"blocks", make_blocks},
-                {"beams", make_beams}, {"needles", make_needles}, {"gear", make_gear}};
+    } made[] = {{"strip", make_strip},
+                {"fan", make_fan},
+                {"loose", make_loose},
+                {"books", make_books},
+                {"cubes", make_cubes},
+                {"blocks", make_blocks},
+                {"beams", make_beams},
+                {"needles", make_needles},
+                {"gear", make_gear},
+                {"lattice", make_lattice},
+                {"turned-lattice", make_turned_lattice}};
     fct_env env = bench_env(2);
     fct_mesh m = {0};
     if (argc < 4 || argc > 5) bench_fail("usage: shapes NAME COUNT [IN] OUT");

@@ -5,6 +5,7 @@
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/distance.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Rigid_triangle_mesh_collision_detection.h>
@@ -111,19 +112,22 @@ void count_in_box(void *m, size_t count, const void *queries, double *faces) {
     }
 }
 
-void make_body(model *m) {
+void make_surface(const fct_mesh *mesh, surface &body) {
     namespace polygons = CGAL::Polygon_mesh_processing;
-    if (!m->body.is_empty()) return;
     std::vector<exact::Point_3> points;
     std::vector<std::array<size_t, 3>> corners;
-    for (uint32_t v = 0; v < m->mesh->vertex_count; ++v)
-        points.push_back(make_point<exact>(m->mesh->positions + 3 * size_t(v)));
-    for (uint32_t f = 0; f < m->mesh->face_count; ++f) {
-        const uint32_t *t = m->mesh->triangles + 3 * size_t(f);
+    for (uint32_t v = 0; v < mesh->vertex_count; ++v)
+        points.push_back(make_point<exact>(mesh->positions + 3 * size_t(v)));
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        const uint32_t *t = mesh->triangles + 3 * size_t(f);
         if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) corners.push_back({t[0], t[1], t[2]});
     }
     if (!polygons::is_polygon_soup_a_polygon_mesh(corners)) polygons::orient_polygon_soup(points, corners);
-    polygons::polygon_soup_to_polygon_mesh(points, corners, m->body);
+    polygons::polygon_soup_to_polygon_mesh(points, corners, body);
+}
+
+void make_body(model *m) {
+    if (m->body.is_empty()) make_surface(m->mesh, m->body);
 }
 
 void find_overlaps(void *model_, size_t count, const void *queries, double *touching) {
@@ -160,6 +164,27 @@ void find_signed_distances(void *model_, size_t count, const void *queries, doub
     }
 }
 
+void find_inside(void *model_, size_t count, const void *queries, double *inside) {
+    auto *m = static_cast<model *>(model_);
+    make_body(m);
+    if (!CGAL::is_closed(m->body)) {
+        inside[0] = std::nan("");
+        return;
+    }
+    if (!m->side) m->side.reset(new CGAL::Side_of_triangle_mesh<surface, exact>(m->body));
+    for (size_t i = 0; i < count; ++i) {
+        auto point = make_point<exact>(static_cast<const float *>(queries) + 3 * i);
+        inside[i] = (*m->side)(point) == CGAL::ON_BOUNDED_SIDE;
+    }
+}
+
+double find_hausdorff(const fct_mesh *a, const fct_mesh *b, double error) {
+    surface one, other;
+    make_surface(a, one), make_surface(b, other);
+    return CGAL::Polygon_mesh_processing::bounded_error_symmetric_Hausdorff_distance<CGAL::Sequential_tag>(
+        one, other, error);
+}
+
 bench_side make_side() {
     bench_side s{};
     s.name = "CGAL";
@@ -173,6 +198,8 @@ bench_side make_side() {
     s.ask[BENCH_SIGNED_DISTANCE] = find_signed_distances;
     s.ask[BENCH_ALL_HITS] = count_hits;
     s.ask[BENCH_BOX] = count_in_box;
+    s.ask[BENCH_INSIDE] = find_inside;
+    s.find_hausdorff = find_hausdorff;
     s.ask[BENCH_OVERLAP] = s.ask[BENCH_PATH] = find_overlaps;
     return s;
 }

@@ -19,6 +19,9 @@ rows 'box points' 12
 rows touching 8
 rows distance 8
 rows 'all hits' 4
+rows 'except a face' 8
+rows inside 2
+rows Hausdorff 2
 rows 'eight nearest' 4
 rows 'faces in ball' 4
 rows 'faces in box' 4

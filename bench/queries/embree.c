@@ -20,6 +20,7 @@ typedef struct model {
     const fct_mesh *mesh;
     RTCDevice device;
     RTCScene scene;
+    RTCScene filtered; /* with filter functions: made when first asked for */
     ssize_t bytes;
 } model;
 
@@ -37,16 +38,10 @@ static bool count_memory(void *m, ssize_t bytes, bool post) {
     return true;
 }
 
-static void *build_model(const fct_mesh *mesh, bool robust, uint32_t threads) {
-    model *m = bench_allocate(1, sizeof *m);
-    char config[64];
-    snprintf(config, sizeof config, "threads=%u,frequency_level=simd512", threads);
-    m->mesh = mesh;
-    m->device = rtcNewDevice(config);
-    rtcSetDeviceMemoryMonitorFunction(m->device, count_memory, m);
-    m->scene = rtcNewScene(m->device);
-    rtcSetSceneFlags(m->scene, robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-    RTCGeometry g = rtcNewGeometry(m->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+static RTCScene make_scene(RTCDevice device, const fct_mesh *mesh, enum RTCSceneFlags flags) {
+    RTCScene scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, flags);
+    RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     float *positions =
         rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh->vertex_count);
     uint32_t *triangles =
@@ -55,12 +50,24 @@ static void *build_model(const fct_mesh *mesh, bool robust, uint32_t threads) {
     memcpy(positions, mesh->positions, 12 * (size_t)mesh->vertex_count);
     memcpy(triangles, mesh->triangles, 12 * (size_t)mesh->face_count);
     rtcCommitGeometry(g);
-    rtcAttachGeometry(m->scene, g);
+    rtcAttachGeometry(scene, g);
     rtcReleaseGeometry(g);
     flush_denormals(true);
-    rtcCommitScene(m->scene);
+    rtcCommitScene(scene);
     flush_denormals(false);
-    if (rtcGetDeviceError(m->device) != RTC_ERROR_NONE) bench_fail("Embree cannot build its structure");
+    if (rtcGetDeviceError(device) != RTC_ERROR_NONE) bench_fail("Embree cannot build its structure");
+    return scene;
+}
+
+static void *build_model(const fct_mesh *mesh, bool robust, uint32_t threads) {
+    model *m = bench_allocate(1, sizeof *m);
+    char config[64];
+    snprintf(config, sizeof config, "threads=%u,frequency_level=simd512", threads);
+    m->mesh = mesh;
+    m->filtered = NULL;
+    m->device = rtcNewDevice(config);
+    rtcSetDeviceMemoryMonitorFunction(m->device, count_memory, m);
+    m->scene = make_scene(m->device, mesh, robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
     return m;
 }
 
@@ -77,6 +84,7 @@ static void *build_robust(const fct_mesh *mesh, const fct_tree *tree, uint32_t t
 static void destroy_model(void *model_) {
     model *m = model_;
     rtcReleaseScene(m->scene);
+    if (m->filtered) rtcReleaseScene(m->filtered);
     rtcReleaseDevice(m->device);
     free(m);
 }
@@ -118,6 +126,34 @@ static void find_any_hits(void *m, size_t count, const void *rays, double *hit) 
         struct RTCRay ray = make_ray((const fct_ray *)rays + i);
         rtcOccluded1(((model *)m)->scene, &context, &ray);
         hit[i] = ray.tfar < 0;
+    }
+    flush_denormals(false);
+}
+
+typedef struct filter_context {
+    struct RTCIntersectContext context; /* first: Embree passes its address on */
+    uint32_t face;
+} filter_context;
+
+static void reject_face(const struct RTCFilterFunctionNArguments *arguments) {
+    const filter_context *c = (const filter_context *)(const void *)arguments->context;
+    const struct RTCHit *hit = (const struct RTCHit *)(const void *)arguments->hit; /* of one ray */
+    if (hit->primID == c->face) arguments->valid[0] = 0;
+}
+
+static void find_except(void *model_, size_t count, const void *queries, double *t) {
+    model *m = model_;
+    if (!m->filtered) m->filtered = make_scene(m->device, m->mesh, RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    filter_context c;
+    rtcInitIntersectContext(&c.context);
+    c.context.filter = reject_face;
+    flush_denormals(true);
+    for (size_t i = 0; i < count; ++i) {
+        const bench_except *e = (const bench_except *)queries + i;
+        struct RTCRayHit query = {.ray = make_ray(&e->ray), .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+        c.face = e->face;
+        rtcIntersect1(m->filtered, &c.context, &query);
+        t[i] = query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? INFINITY : (double)query.ray.tfar;
     }
     flush_denormals(false);
 }
@@ -199,7 +235,8 @@ const bench_side bench_embree = {
     .ask = {[BENCH_CLOSEST_HIT] = find_closest_hits,
             [BENCH_ANY_HIT] = find_any_hits,
             [BENCH_CLOSEST_POINT] = find_closest_points,
-            [BENCH_SIGNED_DISTANCE] = find_closest_points},
+            [BENCH_SIGNED_DISTANCE] = find_closest_points,
+            [BENCH_EXCEPT] = find_except},
     .no_sign = true,
 };
 

@@ -142,6 +142,38 @@ static void ask_first_contact(const fct_bvh *bvh, size_t count, const fct_motion
         times[i] = fct_bvh_first_contact(bvh, bvh, motions + i, tolerance, &first, v) ? first.time : INFINITY;
 }
 
+static void ask_except(const fct_bvh *bvh, size_t count, const bench_except *queries, double *t,
+                       fct_visits *v) {
+    fct_hit hit;
+    for (size_t i = 0; i < count; ++i)
+        t[i] = fct_bvh_closest_hit_except(bvh, &queries[i].ray, queries[i].face, &hit, v) ? (double)hit.t
+                                                                                          : INFINITY;
+}
+
+static void find_except(void *m, size_t count, const void *queries, double *t) {
+    ask_except(((model *)m)->bvh, count, queries, t, NULL);
+}
+
+static void find_inside(void *m, size_t count, const void *points, double *inside) {
+    for (size_t i = 0; i < count; ++i)
+        inside[i] = fabs(fct_bvh_winding_number(((model *)m)->bvh, (const float *)points + 3 * i, NULL)) > .5;
+}
+
+static double find_hausdorff(const fct_mesh *a, const fct_mesh *b, double error) {
+    fct_env env = bench_env(1);
+    const fct_mesh *meshes[2] = {a, b};
+    fct_tree *trees[2];
+    fct_bvh *bvhs[2];
+    fct_hausdorff found;
+    for (int i = 0; i < 2; ++i) {
+        bench_check(fct_tree_build(&env, meshes[i], NULL, NULL, &trees[i]), "a tree");
+        bench_check(fct_bvh_create(&env, trees[i], FCT_BACKEND_OBB, &bvhs[i]), "our structure");
+    }
+    bench_check(fct_mesh_hausdorff(&env, bvhs[0], bvhs[1], 0, error, &found), "a distance");
+    for (int i = 0; i < 2; ++i) fct_bvh_destroy(bvhs[i]), fct_tree_destroy(trees[i]);
+    return found.distance;
+}
+
 static void find_all_hits(void *m, size_t count, const void *rays, double *hits) {
     ask_all_hits(((model *)m)->bvh, count, rays, hits, NULL);
 }
@@ -218,6 +250,9 @@ void bench_count_visits(const void *m, bench_question question, size_t count, co
         break;
     case BENCH_CLOSEST_POINT:
         ask_closest_point(bvh, count, queries, answers, visits);
+        break;
+    case BENCH_EXCEPT:
+        ask_except(bvh, count, queries, answers, visits);
         break;
     case BENCH_NEAREST:
         ask_nearest(bvh, count, queries, answers, visits);
@@ -326,8 +361,10 @@ const bench_side bench_facetree = {
             [BENCH_PAIRS] = find_pairs,
             [BENCH_WITHIN] = find_within,
             [BENCH_DISTANCE] = find_distances,
-            [BENCH_FIRST_CONTACT] = find_first_contacts},
+            [BENCH_FIRST_CONTACT] = find_first_contacts,
+            [BENCH_EXCEPT] = find_except},
     .count_touching = count_touching,
+    .find_hausdorff = find_hausdorff,
 };
 
 const bench_side bench_batch = {
@@ -344,6 +381,7 @@ const bench_side bench_batch = {
             [BENCH_OVERLAP] = batch_overlaps,
             [BENCH_PATH] = batch_overlaps,
             [BENCH_RELATION] = find_relations,
+            [BENCH_INSIDE] = find_inside,
             [BENCH_DISTANCE] = batch_distances},
 };
 

@@ -21,6 +21,8 @@
 #include "bench/queries/workloads.h"
 
 enum { MOST_ROUNDS = 99, MOST_SIDES = 8 };
+/* Larger meshes have no row of the Hausdorff distance. */
+enum { MOST_HAUSDORFF = 100000 };
 
 /* PQP is not in Debian. Its time over that of FCL's OBBRSS for the bunny near contact, from an earlier study:
  * touching 18 to 28 us beside 55, apart 19 to 27 beside 51, distance 1.0 ms beside 1.23. */
@@ -67,7 +69,7 @@ static double find_median(double *values, uint32_t count) {
 
 /* Only our batches have signs. */
 static bool needs_signs(bench_question q) {
-    return q == BENCH_SIGNED_DISTANCE || q == BENCH_RELATION;
+    return q == BENCH_SIGNED_DISTANCE || q == BENCH_RELATION || q == BENCH_INSIDE;
 }
 
 typedef struct work {
@@ -90,6 +92,7 @@ static size_t query_size(bench_question q) {
            : q <= BENCH_BOX           ? sizeof(bench_ball)
            : q == BENCH_WITHIN        ? sizeof(bench_near)
            : q == BENCH_FIRST_CONTACT ? sizeof(fct_motion)
+           : q == BENCH_EXCEPT        ? sizeof(bench_except)
                                       : sizeof(fct_pose);
 }
 
@@ -139,7 +142,8 @@ static size_t choose_step(const options *o, work w, bench_question q, const benc
 static bool are_equal(const subject *s, const bench_side *side, bench_question q, const void *query,
                       double ours, double theirs) {
     switch (q) {
-    case BENCH_CLOSEST_HIT: {
+    case BENCH_CLOSEST_HIT:
+    case BENCH_EXCEPT: { /* its ray comes first */
         if (isinf(ours) || isinf(theirs)) return isinf(ours) && isinf(theirs);
         const float *d = ((const fct_ray *)query)->direction;
         double length = sqrt((double)(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
@@ -165,7 +169,8 @@ static size_t compare_answers(subject *s, const char *row, bench_question q, con
     for (size_t i = 0; i < theirs->count; ++i)
         different += !are_equal(s, side, q, ours->queries + i * step * size, ours->answers[i * step],
                                 theirs->answers[i]);
-    const bool may_miss = (q <= BENCH_ALL_HITS || q == BENCH_BOX || q == BENCH_PAIRS) && side != &bench_batch;
+    const bool may_miss = (q <= BENCH_ALL_HITS || q == BENCH_EXCEPT || q == BENCH_BOX || q == BENCH_PAIRS) &&
+                          side != &bench_batch;
     if (different > (may_miss ? theirs->count / 1000 + 8 : 0)) {
         printf("  DIFFERENT: %s, %s: %zu of %zu answers\n", row, side->name, different, theirs->count);
         s->differ = true;
@@ -259,7 +264,7 @@ static void measure_row(subject *s, const char *row, bench_question q, size_t co
             work w = {bench_sides[i]->ask[q], s->models[i], count, queries, NULL};
             steps[i] = i < 2 ? 1 : choose_step(s->o, w, q, bench_sides[i]);
         }
-    const uint32_t most = q == BENCH_RELATION ? 1 : 2; /* it has no batch of its own */
+    const uint32_t most = q == BENCH_RELATION || q == BENCH_INSIDE ? 1 : 2; /* without batches of their own */
     for (uint32_t threads = 1; threads <= most; ++threads)
         measure_threads(s, row, q, count, queries, threads, steps);
 }
@@ -325,6 +330,32 @@ static void measure_whole_model(const subject *s) {
     write_row(s, "self pairs", 1, "facetree", "seconds", own, 1, "0,,,");
 }
 
+/* The Hausdorff distance from a copy whose vertices have moved, from two meshes to the number: up to .0001 of
+ * the diagonal. */
+static void measure_hausdorff(subject *s) {
+    const double error = 1e-4 * s->diagonal;
+    fct_env env = bench_env(1);
+    fct_mesh moved;
+    double times[MOST_SIDES], found[MOST_SIDES];
+    if (s->mesh.face_count > MOST_HAUSDORFF) return;
+    bench_move_vertices(&env, &s->mesh, .002 * s->diagonal, &moved);
+    for (size_t i = 0; i < bench_side_count; ++i) {
+        const bench_side *side = bench_sides[i];
+        if (!side->find_hausdorff || !s->models[i]) continue;
+        double start = bench_cpu_seconds();
+        found[i] = side->find_hausdorff(&s->mesh, &moved, error);
+        times[i] = bench_cpu_seconds() - start;
+        if (i == 0) printf("  %-14s T1 facetree %.4g s", "Hausdorff", times[0]);
+        if (i) printf("  %s %.4g (%.2f)", side->name, times[i], times[i] / times[0]);
+        write_row(s, "Hausdorff", 1, side->name, "seconds", times[i], times[i] / times[0], "0,,,");
+        if (fabs(found[i] - found[0]) <= 2 * error) continue;
+        printf("\n  DIFFERENT: Hausdorff, %s: %g and %g\n", side->name, found[0], found[i]);
+        s->differ = true;
+    }
+    putchar('\n');
+    fct_mesh_release(&env, &moved);
+}
+
 static double count_ray_bytes(const subject *s) {
     fct_env env = bench_env(2);
     fct_bvh *bvh;
@@ -367,6 +398,15 @@ static void measure_rays(subject *s) {
     measure_row(s, "incoherent", BENCH_CLOSEST_HIT, count, rays);
     measure_row(s, "incoherent any", BENCH_ANY_HIT, count, rays);
     measure_row(s, "all hits", BENCH_ALL_HITS, count / 8, rays);
+    bench_except *except = bench_allocate(count, sizeof *except);
+    bench_incoherent_rays(s->bvh, count, rays);
+    for (size_t i = 0; i < count; ++i) { /* what lies behind the face that is hit */
+        fct_hit hit;
+        except[i] = (bench_except){rays[i], FCT_NONE};
+        if (fct_bvh_closest_hit(s->bvh, rays + i, &hit, NULL)) except[i].face = hit.face;
+    }
+    measure_row(s, "except a face", BENCH_EXCEPT, count, except);
+    free(except);
     free(rays);
 }
 
@@ -377,6 +417,7 @@ static void measure_points(subject *s) {
     measure_row(s, "near points", BENCH_CLOSEST_POINT, count, points);
     bench_box_points(s->bvh, count, points);
     measure_row(s, "box points", BENCH_CLOSEST_POINT, count, points);
+    measure_row(s, "inside", BENCH_INSIDE, count, points);
     bench_near_points(&s->mesh, s->diagonal, count, points);
     measure_row(s, "eight nearest", BENCH_NEAREST, count, points);
     bench_ball *balls = bench_allocate(count, sizeof *balls);
@@ -490,6 +531,7 @@ static bool measure_mesh(const options *o, const char *path) {
     s.bvh = bench_own_bvh(s.models[0]);
     for (uint32_t threads = 1; threads <= 2; ++threads) measure_builds(&s, threads);
     measure_whole_model(&s);
+    if (o->points) measure_hausdorff(&s);
     if (o->rays) measure_rays(&s);
     if (o->points) measure_points(&s);
     if (o->poses) measure_poses(&s);

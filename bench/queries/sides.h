@@ -19,6 +19,7 @@ typedef enum bench_question {
     BENCH_ALL_HITS,        /* fct_ray -> number of hits */
     BENCH_CLOSEST_POINT,   /* float[3] -> distance */
     BENCH_SIGNED_DISTANCE, /* float[3] -> distance, negative inside */
+    BENCH_INSIDE,          /* float[3] -> 1 inside of the surface, else 0 */
     BENCH_NEAREST,         /* float[3] -> distance of the eighth nearest face */
     BENCH_BALL,            /* bench_ball -> number of faces that touch the ball */
     BENCH_BOX,             /* bench_ball -> number of faces that touch the cube around the ball */
@@ -29,12 +30,17 @@ typedef enum bench_question {
     BENCH_DISTANCE,        /* fct_pose of the model beside itself -> distance of the surfaces */
     BENCH_RELATION,        /* fct_pose of the model beside itself -> fct_relation */
     BENCH_FIRST_CONTACT,   /* fct_motion of the model beside itself -> time */
+    BENCH_EXCEPT,          /* bench_except -> t of the closest hit of another face, or infinity */
     BENCH_QUESTIONS
 } bench_question;
 
 typedef struct bench_ball {
     float center[3], radius;
 } bench_ball;
+typedef struct bench_except {
+    fct_ray ray;
+    uint32_t face;
+} bench_except;
 typedef struct bench_near {
     fct_pose pose;
     double distance;
@@ -58,6 +64,8 @@ typedef struct bench_side {
      * per frame. NULL if the side has no broad phase. */
     void (*count_touching)(void *model, uint32_t count, uint32_t frames, const fct_pose *poses,
                            double *pairs);
+    /* The Hausdorff distance of two meshes, up to `error`. NULL if the side has none. */
+    double (*find_hausdorff)(const fct_mesh *a, const fct_mesh *b, double error);
 } bench_side;
 
 /* Ours first; those that were found when the program was built. */

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bench/cluster/bench.h"
 
@@ -81,6 +82,14 @@ void bench_grid_points(const fct_bvh *bvh, uint32_t side, float *points) {
             points[3 * i + (size_t)k] =
                 (float)(middle(&b, k) + 1.1 * extent(&b, k) * (((double)cell[k] + .5) / side - .5));
     }
+}
+
+void bench_move_vertices(const fct_env *env, const fct_mesh *mesh, double most, fct_mesh *out) {
+    bench_dice dice = {4};
+    bench_check(fct_mesh_create(env, mesh->vertex_count, mesh->face_count, 0, out), "a mesh");
+    memcpy(out->triangles, mesh->triangles, 3 * (size_t)mesh->face_count * sizeof *out->triangles);
+    for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; ++i)
+        out->positions[i] = (float)((double)mesh->positions[i] + most * (2 * bench_unit(&dice) - 1));
 }
 
 /* --- Poses --- */

@@ -17,6 +17,9 @@ void bench_box_points(const fct_bvh *bvh, size_t count, float *points);
 /* side^3 points of a grid over the bounds, with a margin of 5 %. */
 void bench_grid_points(const fct_bvh *bvh, uint32_t side, float *points);
 
+/* A copy whose vertices have moved by up to `most` in each coordinate. */
+void bench_move_vertices(const fct_env *env, const fct_mesh *mesh, double most, fct_mesh *out);
+
 /* Poses of the model beside itself, with random rotations and directions: pose i of `touching` is 1 % of the
  * diagonal nearer than first contact, and of `apart` 1 % farther. */
 void bench_contact_poses(const fct_bvh *bvh, double diagonal, size_t count, fct_pose *touching,

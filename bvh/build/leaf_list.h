@@ -7,14 +7,15 @@
 /* In the order in which bvh->leaves holds them. */
 typedef struct fct_leaf_list {
     uint32_t count;
-    uint32_t *
-        nodes; /* count, ids in the cluster tree: the cluster, or, if bvh->places is set, a large one in it */
-    uint32_t *firsts;  /* count + 1: triangles in the leaves before each */
+    /* Per leaf, an id in the cluster tree: the cluster that it is; if bvh->places is set, the cluster of
+     * largest area of those that it is put together of. */
+    uint32_t *nodes;
+    uint32_t *firsts;  /* count + 1: the number of triangles in all leaves before leaf i */
     uint32_t *offsets; /* count, units of 64 bytes in bvh->leaves */
     float *bounds;     /* count x 6, lower then upper, scaled */
-    /* If the top is split along other axes than those of the coordinates, see frame.h; else NULL: */
-    float
-        *frame_bounds; /* count x 6, lower then upper along the axes of `frame`, relative to fct_bvh.center */
+    /* NULL, unless the top is split along other axes than those of the coordinates, see frame.h: the bounds
+     * along the axes of `frame`, relative to fct_bvh.center; count x 6, lower then upper. */
+    float *frame_bounds;
     v3 frame[3];
 } fct_leaf_list;
 

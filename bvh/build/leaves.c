@@ -1,13 +1,14 @@
 /* bvh/build/leaves.c: chooses the face clusters that become leaves, and packs them.
  *
- * Input: the cluster tree. Output: leaves in order of place; each face is in one leaf. A leaf is the largest
- * cluster of at most 16 faces and 16 vertices. It stores each vertex once and its corners as bytes: at most
- * 256 bytes, about 22 bytes per triangle on a scan. O(F): the leaves are chosen and packed in parallel, but
- * one thread lists the clusters, adds up their surfaces and numbers the leaves.
+ * Input: the cluster tree. Output: leaves that hold the faces one after the other in the tree's order, each
+ * face once. A leaf is the largest cluster of at most 16 faces and 16 vertices. It stores each vertex once
+ * and its corners as bytes: at most 256 bytes, about 22 bytes per triangle on a scan. O(F): the leaves are
+ * chosen and packed in parallel, but one thread lists the clusters, adds up their surfaces and numbers the
+ * leaves.
  *
  * A line through a scan meets the boxes of one or two leaves. Where a model fills its volume, as stacked
  * blocks do, boxes overlap and a line meets dozens. Then sets of small clusters, split by surface area cost,
- * make better leaves. These are not in order of place: bvh->places lists their faces.
+ * make better leaves. Their faces are not in the tree's order: bvh->places lists them.
  */
 #include "bvh/build/leaves.h"
 
@@ -44,8 +45,8 @@ static size_t measure_leaf(const fct_tree_view *view, const uint32_t *places, ui
     return vertex_count > FCT_LEAF_VERTICES ? 0 : fct_leaf_bytes(count, (vertex_count + 7) / 8);
 }
 
-/* Lists the largest clusters of at most `most` faces, in order of place, and returns their number. `stack`
- * has room for depth + root_count + 1 nodes. */
+/* Lists the largest clusters of at most `most` faces in the order of their faces, and returns their number.
+ * `stack` has room for depth + root_count + 1 nodes. */
 static uint32_t list_candidates(const fct_tree *tree, uint32_t most, uint32_t *stack, uint32_t *candidates) {
     const fct_tree_view *view = &tree->view;
     uint32_t height = 0, count = 0;

@@ -8,6 +8,9 @@
 /* An oriented box of a leaf that saves a smaller share of the area is not fitted. */
 #define LEAST_SAVED 1e-5
 
+/* The shortest over the longest half extent of a bulky leaf. */
+#define BULKY .5f
+
 /* With more roots, the search for an enclosing cluster costs more than its box saves. */
 enum { MOST_ROOTS = 32 };
 
@@ -66,11 +69,11 @@ void fct_slabs_clear(fct_slabs *s) {
     for (int k = 0; k < 3; ++k) s->lower[k] = INFINITY, s->upper[k] = -INFINITY;
 }
 
-static void use_cluster_axes(const fct_bvh *bvh, uint32_t node, fct_slabs *s) {
+static void use_cluster_axes(const fct_bvh *bvh, uint32_t node, v3 axes[3]) {
     fct_cluster room;
     fct_box box;
     fct_cluster_box(fct_node_cluster(bvh->tree, node, &room), &box);
-    for (int k = 0; k < 3; ++k) s->axes[k] = v3_load(box.axes[k]);
+    for (int k = 0; k < 3; ++k) axes[k] = v3_load(box.axes[k]);
 }
 
 static fct_slabs make_axis_slabs(const fct_bvh *bvh, const fct_top_node *node) {
@@ -121,25 +124,58 @@ fct_result fct_spans_build(const fct_bvh *bvh, const fct_leaf_list *leaves, cons
     return FCT_OK;
 }
 
-/* Whether the axes of cluster i are there, and are not those of another one. */
-static bool adds_axes(const uint32_t clusters[2], int i) {
-    return clusters[i] != FCT_NONE && (i == 0 || clusters[0] != clusters[1]);
+/* Whether the tree's box of a cluster is about as thick as long. */
+static bool is_bulky(const fct_bvh *bvh, uint32_t node) {
+    fct_cluster room;
+    const float *half = fct_node_cluster(bvh->tree, node, &room)->box_half;
+    const float least = fminf(half[0], fminf(half[1], half[2])),
+                most = fmaxf(half[0], fmaxf(half[1], half[2]));
+    return least > BULKY * most;
+}
+
+bool fct_slabs_face_axes(const fct_leaf *leaf, v3 axes[3]) {
+    double area = 0;
+    for (uint32_t i = 0; i < leaf->count; ++i) {
+        v3 p[3];
+        fct_leaf_triangle(leaf, i, p);
+        const v3 sides[3] = {v3_sub(p[1], p[0]), v3_sub(p[2], p[1]), v3_sub(p[0], p[2])};
+        const v3 normal = v3_cross(sides[0], sides[1]);
+        if (!(v3_norm(normal) > area)) continue;
+        area = v3_norm(normal);
+        int shortest = v3_norm2(sides[1]) < v3_norm2(sides[0]);
+        if (v3_norm2(sides[2]) < v3_norm2(sides[shortest])) shortest = 2;
+        axes[0] = v3_unit(sides[shortest]);
+        axes[1] = v3_unit(v3_cross(normal, axes[0]));
+        axes[2] = v3_cross(axes[0], axes[1]);
+    }
+    return area > 0;
+}
+
+/* The axes that compete with those of the coordinates. Returns their number. */
+static uint32_t list_axes(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
+                          const fct_top_node *node, const fct_span *span, v3 axes[4][3]) {
+    uint32_t count = 1;
+    use_cluster_axes(bvh, span->largest, axes[0]);
+    if (span->enclosing != FCT_NONE && span->enclosing != span->largest)
+        use_cluster_axes(bvh, span->enclosing, axes[count++]);
+    if (leaves->frame_bounds) memcpy(axes[count++], leaves->frame, sizeof axes[0]);
+    if (node->left == FCT_NONE && is_bulky(bvh, span->largest))
+        count +=
+            fct_slabs_face_axes(fct_bvh_leaf(bvh, leaves->offsets[top->order[node->begin]]), axes[count]);
+    return count;
 }
 
 fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const fct_top *top,
                         const fct_top_node *node, const fct_span *span) {
     fct_slabs best = make_axis_slabs(bvh, node), s;
     double best_area = fct_slabs_area(&best);
-    const bool is_leaf = node->left == FCT_NONE;
-    if (is_leaf && !bvh->places && cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED))
+    if (node->left == FCT_NONE && !bvh->places && !is_bulky(bvh, span->largest) &&
+        cluster_area(bvh, span->largest) > best_area * (1 - LEAST_SAVED))
         return best;
-    const uint32_t clusters[2] = {span->largest, span->enclosing};
-    for (int i = 0; i < 3; ++i) {
-        if (i == 2 ? !leaves->frame_bounds : !adds_axes(clusters, i)) continue;
-        if (i == 2)
-            memcpy(s.axes, leaves->frame, sizeof s.axes);
-        else
-            use_cluster_axes(bvh, clusters[i], &s);
+    v3 axes[4][3];
+    const uint32_t count = list_axes(bvh, leaves, top, node, span, axes);
+    for (uint32_t i = 0; i < count; ++i) {
+        memcpy(s.axes, axes[i], sizeof s.axes);
         fct_slabs_clear(&s);
         fct_slabs_hold(bvh, leaves->offsets, top->order + node->begin, node->end - node->begin, &s);
         const double area = fct_slabs_area(&s);

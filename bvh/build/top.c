@@ -230,17 +230,18 @@ static fct_result split_all(const fct_env *env, const float *bounds, fct_top *to
     return FCT_OK;
 }
 
-/* Sets the bounds along the coordinate axes, where the splits had other axes. */
+/* Sets the bounds along the coordinate axes, where the splits had other axes. Unused nodes are empty. */
 static void bound_nodes(const float *bounds, fct_top *top) {
     for (uint32_t n = top->node_count; n-- > 0;) {
         fct_top_node *node = &top->nodes[n];
         clear_bounds(node->bounds);
-        if (node->left == FCT_NONE) {
-            join_bounds(node->bounds, bounds + 6 * (size_t)top->order[node->begin]);
-        } else {
+        if (node->left != FCT_NONE) {
             join_bounds(node->bounds, top->nodes[node->left].bounds);
             join_bounds(node->bounds, top->nodes[node->right].bounds);
+            continue;
         }
+        for (uint32_t i = node->begin; i < node->end; ++i)
+            join_bounds(node->bounds, bounds + 6 * (size_t)top->order[i]);
     }
 }
 

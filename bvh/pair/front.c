@@ -42,8 +42,19 @@ static float find_reach(const front_search *s, double gap) {
 
 /* --- Leaves --- */
 
-/* Whether the search looks for this pair of faces. */
-static bool test_faces(front_search *s, uint32_t place_a, uint32_t place_b) {
+/* Two leaves in the coordinates of a's box. The lists hold pairs of triangles whose boxes are near. */
+typedef struct leaf_pair {
+    const fct_leaf *a, *b;
+    fct_leaf_maps maps;
+    leaf_corners corners_a, corners_b;
+    uint32_t listed, list_a[24], list_b[24];
+    float gap; /* a lower bound of the distance of the other triangles, scaled */
+} leaf_pair;
+
+/* Whether the search looks for this pair of triangles of the leaves. */
+static bool test_faces(front_search *s, const leaf_pair *l, uint32_t number_a, uint32_t number_b) {
+    const uint32_t place_a = fct_leaf_place(s->map->a, l->a, number_a),
+                   place_b = fct_leaf_place(s->map->b, l->b, number_b);
     v3 p[3], q[3], at_a, at_b;
     fct_pair_triangle_a(s->map, place_a, p);
     fct_pair_triangle_b(s->map, place_b, q);
@@ -55,15 +66,6 @@ static bool test_faces(front_search *s, uint32_t place_a, uint32_t place_b) {
     s->hint->pair = (fct_face_pair){ids_a[place_a], ids_b[place_b], place_a, place_b};
     return true;
 }
-
-/* Two leaves in the coordinates of a's box. The lists hold pairs of triangles whose boxes are near. */
-typedef struct leaf_pair {
-    const fct_leaf *a, *b;
-    fct_leaf_maps maps;
-    leaf_corners corners_a, corners_b;
-    uint32_t listed, list_a[24], list_b[24];
-    float gap; /* a lower bound of the distance of the other triangles, scaled */
-} leaf_pair;
 
 /* Bounds the distances of the first eight pairs of the lists, removes them, and tests the near ones. Returns
  * whether one is found. */
@@ -79,8 +81,7 @@ static bool test_listed(front_search *s, leaf_pair *l) {
     f8_store(lower, lower_lanes);
     for (uint32_t i = 0; i < used; ++i) {
         float gap = lower[i] - error;
-        if (!(gap > s->within_a) && test_faces(s, l->a->first + lanes_a[i], l->b->first + lanes_b[i]))
-            return true;
+        if (!(gap > s->within_a) && test_faces(s, l, lanes_a[i], lanes_b[i])) return true;
         if (!(gap > l->gap)) l->gap = gap > 0 ? gap : 0;
     }
     return false;

@@ -278,15 +278,24 @@ double fct_lamps_direct(const fct_lamps *lamps, const fct_scene *scene, const do
     return open > 0 ? (irradiance[0] + irradiance[1] + irradiance[2]) / open : 0;
 }
 
+/* Estimates that choose_lamp keeps; it makes those of more lamps twice. */
+enum { KEPT_ESTIMATES = 128 };
+
 /* Chooses a lamp in proportion to the estimates; NULL without light. *chance: its probability. */
 static const fct_lamp *choose_lamp(const query *q, double u, double *chance) {
-    double sum = 0, below = 0;
-    for (uint32_t i = 0; i < q->lamps->count; ++i) sum += estimate_lamp(q, q->lamps->lamps + i);
-    for (uint32_t i = 0; i < q->lamps->count; ++i) {
+    const uint32_t count = q->lamps->count;
+    double kept[KEPT_ESTIMATES], sum = 0, below = 0;
+    for (uint32_t i = 0; i < count; ++i) {
         const double share = estimate_lamp(q, q->lamps->lamps + i);
+        if (i < KEPT_ESTIMATES) kept[i] = share;
+        sum += share;
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        const double share = i < KEPT_ESTIMATES ? kept[i] : estimate_lamp(q, q->lamps->lamps + i);
         below += share;
+        if (!(u * sum < below)) continue;
         *chance = share / sum;
-        if (u * sum < below) return q->lamps->lamps + i;
+        return q->lamps->lamps + i;
     }
     return NULL;
 }

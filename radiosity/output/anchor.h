@@ -39,9 +39,9 @@ fct_result fct_anchors_extend(const fct_env *env, const fct_source *source, cons
  * light from below the horizon. Without a guide all rays are cosine-distributed and w = 1. With an aimed
  * guide, a third of them (rounded down) go to points of its sources, with the density p_g per area; p_c = d .
  * n c' / (pi r^2) is that of the others, and w = p_c / (n_c p_c + n_g p_g), the balance heuristic of Veach
- * and Guibas. A ray that does not reach its point has w = 0. The sum of all w has the mean 1; division by it
- * keeps rows at 1, so a furnace is exact. Near hits take the light at their point (near.h). Returns the
- * number of all rays. */
+ * and Guibas. A ray that does not reach its point has w = 0. The sum of all w has the mean 1. Division by
+ * it makes the weights of all hits sum to 1: where all hits have one radiosity, E is exact. Near hits take an
+ * estimate of the light at their point (near.h), which is noisy. Returns the number of all rays. */
 uint64_t fct_anchor_gather(const fct_source *source, const fct_guide *guide, uint32_t rays, uint64_t seed,
                            fct_anchor *anchor);
 

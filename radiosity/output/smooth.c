@@ -6,6 +6,7 @@
 
 #include "base/env.h"
 #include "base/math/vec.h"
+#include "base/parallel.h"
 #include "radiosity/surface/split.h"
 
 /* Difference of two neighbours over the sum of their light that may be noise of the rays. Larger values blur
@@ -16,7 +17,8 @@
 /* Share of the variance of a vertex that those around it have at least: in the dark, the light is no measure.
  */
 #define OWN_SHARE .1
-/* Chi-square per degree of freedom above which a fit changes the light less, with the square of the ratio. */
+/* Chi-square per degree of freedom above which a fit changes the light less, with the square of the ratio.
+ * Noise alone gives 1. Light that bends a little gives more, and the fit is still better than the noise. */
 #define MOST_MISFIT 6.
 /* A fit takes vertices within one edge, and another one those within two. The first 64 are enough. */
 enum { RINGS = 2, MOST_GROUP = 64 };
@@ -24,6 +26,7 @@ enum { RINGS = 2, MOST_GROUP = 64 };
 enum { PASSES = 2 };
 /* Vertices at one position, without twins, that the search for a twin looks at. */
 enum { MOST_OTHERS = 8 };
+enum { VERTEX_GRAIN = 256 }; /* vertices per chunk */
 
 static bool can_mix(const fct_surface *f, const uint8_t *covered, uint32_t v) {
     return f->flat[v] && !covered[v];
@@ -159,12 +162,12 @@ static fct_result list_neighbours(const fct_env *env, const fct_surface *f, cons
     return FCT_OK;
 }
 
-/* Appends the neighbours of vertex v that are not in the group yet, while there is room. */
+/* Appends the neighbours of vertex v that are not in the group yet, until it is full. */
 static void add_neighbours(const neighbours *n, uint32_t v, uint32_t *group, uint32_t *count) {
-    for (size_t i = n->begin[v]; i < n->begin[v + 1]; ++i) {
+    for (size_t i = n->begin[v]; i < n->begin[v + 1] && *count < MOST_GROUP; ++i) {
         uint32_t k = 0;
         while (k < *count && group[k] != n->list[i]) ++k;
-        if (k == *count && k < MOST_GROUP) group[(*count)++] = n->list[i];
+        if (k == *count) group[(*count)++] = n->list[i];
     }
 }
 
@@ -185,11 +188,13 @@ static void span_plane(v3 n, v3 axes[2]) {
     axes[1] = v3_cross(n, axes[0]);
 }
 
-/* What a fit reads. */
+/* What a fit reads, and the light that it changes. */
 typedef struct smoothing {
     const fct_surface *f;
+    const uint8_t *covered;
     const neighbours *near;
     const float *variances, *light;
+    float *smooth;
 } smoothing;
 
 /* Adds vertex b to the sums of vertex a. */
@@ -227,8 +232,8 @@ static double solve_fit(const fit *s, double change[3]) {
 }
 
 /* Moves the light of a vertex towards the plane through it and its neighbours, and then towards the plane
- * through those within two edges: all the way if the noise explains the misfit, else the less the larger it
- * is. */
+ * through those within two edges: all the way if the misfit is at most MOST_MISFIT, else the less the larger
+ * it is. */
 static void smooth_vertex(const smoothing *s, uint32_t v, float *out) {
     uint32_t group[MOST_GROUP] = {v}, count = 1, first = 0;
     v3 axes[2];
@@ -238,7 +243,8 @@ static void smooth_vertex(const smoothing *s, uint32_t v, float *out) {
     add_to_fit(s, axes, v, v, &sums);
     for (int ring = 0; ring < RINGS; ++ring) {
         const uint32_t last = count;
-        for (uint32_t i = first; i < last; ++i) add_neighbours(s->near, group[i], group, &count);
+        for (uint32_t i = first; i < last && count < MOST_GROUP; ++i)
+            add_neighbours(s->near, group[i], group, &count);
         for (uint32_t i = last; i < count; ++i) add_to_fit(s, axes, v, group[i], &sums);
         first = last;
         const double misfit = solve_fit(&sums, change),
@@ -246,6 +252,14 @@ static void smooth_vertex(const smoothing *s, uint32_t v, float *out) {
         for (int k = 0; k < 3; ++k) all[k] += share * (change[k] - all[k]);
     }
     for (int k = 0; k < 3; ++k) out[k] = (float)fct_max((double)s->light[3 * (size_t)v + k] + all[k], 0);
+}
+
+static void smooth_chunk(void *user, size_t begin, size_t end, size_t chunk, uint32_t thread) {
+    (void)chunk, (void)thread;
+    const smoothing *s = user;
+    for (size_t v = begin; v < end; ++v)
+        if (s->variances[v] > 0 && can_mix(s->f, s->covered, (uint32_t)v))
+            smooth_vertex(s, (uint32_t)v, s->smooth + 3 * v);
 }
 
 fct_result fct_direct_smooth(const fct_env *env, const fct_surface *f, const uint8_t *covered,
@@ -264,9 +278,8 @@ fct_result fct_direct_smooth(const fct_env *env, const fct_surface *f, const uin
     for (size_t v = 0; v < count; ++v) variances[v] /= (float)counts[v] * (float)counts[v];
     if ((result = list_neighbours(env, f, covered, twins, &near)) != FCT_OK) goto done;
     memcpy(noisy, light, 3 * count * sizeof *light);
-    const smoothing s = {.f = f, .near = &near, .variances = variances, .light = noisy};
-    for (uint32_t v = 0; v < count; ++v)
-        if (variances[v] > 0 && can_mix(f, covered, v)) smooth_vertex(&s, v, light + 3 * (size_t)v);
+    smoothing s = {f, covered, &near, variances, noisy, light};
+    fct_parallel_for(env, count, VERTEX_GRAIN, smooth_chunk, &s);
     spread_twins(twins, f->mesh.vertex_count, light);
 done:
     fct_release(env, near.begin), fct_release(env, near.list);

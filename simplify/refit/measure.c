@@ -15,9 +15,11 @@ typedef struct measure {
     part *parts; /* per chunk */
 } measure;
 
-static void add_channels(const fct_refit *r, const fct_landing *at, const uint32_t *corners, uint32_t count,
-                         const double b[3], double weight, part *out) {
+static void add_channels(const fct_refit *r, size_t sample, const double b[3], part *out) {
     const fct_simplifier *s = r->s;
+    const fct_landing *at = &r->landings[sample];
+    double weight = r->samples[sample].weight;
+    uint32_t corners[3] = {0}, count = find_sample_corners(r, sample, corners);
     out->channel_weight += weight;
     for (uint32_t i = 0; i < s->channel_count; ++i) {
         double rest = 0;
@@ -38,16 +40,15 @@ static void measure_samples(void *user, size_t begin, size_t end, size_t chunk, 
     part *out = &m->parts[chunk];
     for (size_t i = begin; i < end; ++i) {
         const fct_landing *at = &r->landings[i];
-        uint32_t corners[3] = {0}, count = find_sample_corners(r, i, corners);
-        if (count == 0 || at->face == FCT_NONE) continue;
-        v3 ends[3], rest = find_sample_position(s, corners, count, ends);
+        if (at->face == FCT_NONE) continue;
+        v3 rest = r->samples[i].at;
         const double b[3] = {1 - (double)at->u - at->v, at->u, at->v};
         for (size_t k = 0; k < 3; ++k)
             rest = v3_mad(rest, -b[k], point_position(s, s->triangles[3 * (size_t)at->face + k]));
-        double weight = find_sample_weight(r, i, count, ends), distance2 = v3_norm2(rest);
+        double weight = r->samples[i].weight, distance2 = v3_norm2(rest);
         out->distance2 += weight * distance2, out->weight += weight;
         out->farthest2 = fct_max(out->farthest2, distance2);
-        if (at->attributes) add_channels(r, at, corners, count, b, weight, out);
+        if (at->attributes) add_channels(r, i, b, out);
     }
 }
 

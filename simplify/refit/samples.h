@@ -9,6 +9,12 @@
 #define CENTROID_WEIGHT .75
 #define CORNER_DIVISOR  12
 
+/* A corner or the centroid of a face of the input. */
+typedef struct fct_sample {
+    v3 at;
+    double weight; /* the area for which it stands; 0: it does not count */
+} fct_sample;
+
 /* The point of the remaining faces that is nearest to a sample. */
 typedef struct fct_landing {
     uint32_t face;   /* FCT_NONE: there is none */
@@ -16,27 +22,35 @@ typedef struct fct_landing {
     bool attributes; /* the face is on the sample's side of a seam, so its attributes count */
 } fct_landing;
 
-/* The limit of a point's step depends on these. */
-typedef struct fct_reach {
-    double residual2; /* the mean squared distance of its samples from the surface, times `weight` */
-    double weight;
-    double nearest2;  /* the smallest squared distance from the point to the centroid of a face of the input
-                         that is among its samples or has a corner that was contracted to it */
-    uint32_t nearest; /* this face; it stands for the input near the point */
-} fct_reach;
+/* The least-squares system of a point, and what limits its step. Each sample that lands on a face of the
+ * point adds to it, weighted by its area and by the landing's barycentric b of the point. */
+typedef struct fct_system {
+    double matrix[6]; /* b^2 n n^T: xx xy xz yy yz zz, where n points from the landing to the sample */
+    double side[3];   /* b times the vector from the landing to the sample */
+    double residual2; /* b times its squared length */
+    double weight;    /* b */
+    double unused;    /* twelve numbers are added in pairs */
+} fct_system;
+
+/* A face of the input that stands for the input near a point: its centroid is the nearest one among the
+ * samples that land around the point and the faces with a corner that was contracted to it. */
+typedef struct fct_near_face {
+    double distance2;
+    uint32_t face; /* FCT_NONE: there is none */
+} fct_near_face;
 
 typedef struct fct_refit {
     fct_simplifier *s;
     uint32_t pass;
     uint32_t stride;        /* each stride-th wedge and face of the input has a sample */
     uint32_t wedge_samples; /* the first samples; those of faces follow */
-    uint32_t *corners;      /* per wedge of the input: one of its corners, or FCT_NONE */
-    double *corner_weights; /* per wedge of the input */
-    fct_landing *landings;  /* per sample */
-    double (*systems)[9];   /* per point: xx xy xz yy yz zz of the matrix, then the right side */
-    double *sums;           /* per wedge and channel: weighted residuals */
-    double *weights;        /* per wedge */
-    fct_reach *reaches;     /* per point */
+    uint32_t *corners;      /* per sample of a wedge: one of its corners, or FCT_NONE */
+    fct_sample *samples;
+    fct_landing *landings; /* per sample */
+    fct_system *systems;   /* per point */
+    double *sums;          /* per wedge and channel: weighted residuals */
+    double *weights;       /* per wedge */
+    fct_near_face *near;   /* per point; found in the first pass, because points move little */
 } fct_refit;
 
 /* A corner of the input in the unit cube. */
@@ -60,31 +74,16 @@ static inline uint32_t find_input_wedge(const fct_simplifier *s, uint32_t corner
     return s->corner_wedges ? s->corner_wedges[corner] : s->point_of[s->mesh->triangles[corner]];
 }
 
-/* A sample is the mean of these corners: one for a wedge, three for a face. Returns their number; 0 if the
- * sample does not count. */
+/* A sample is the mean of these corners: one for a wedge, three for a face. Returns their number. The sample
+ * counts. */
 static inline uint32_t find_sample_corners(const fct_refit *r, size_t sample, uint32_t corners[3]) {
-    const fct_simplifier *s = r->s;
     if (sample < r->wedge_samples) {
-        corners[0] = r->corners[sample * r->stride];
-        return corners[0] != FCT_NONE;
+        corners[0] = r->corners[sample];
+        return 1;
     }
     uint32_t f = (uint32_t)(sample - r->wedge_samples) * r->stride;
     for (uint32_t k = 0; k < 3; ++k) corners[k] = 3 * f + k;
-    return is_degenerate(s, f) ? 0 : 3;
-}
-
-/* The position of a sample; p receives those of its corners. */
-static inline v3 find_sample_position(const fct_simplifier *s, const uint32_t *corners, uint32_t count,
-                                      v3 p[3]) {
-    p[0] = find_input_position(s, corners[0]);
-    if (count == 1) return p[0];
-    p[1] = find_input_position(s, corners[1]), p[2] = find_input_position(s, corners[2]);
-    return v3_scale(v3_add(v3_add(p[0], p[1]), p[2]), 1. / 3);
-}
-
-/* The area for which a sample stands; `ends` are the positions of its corners. */
-static inline double find_sample_weight(const fct_refit *r, size_t sample, uint32_t count, const v3 ends[3]) {
-    return count == 1 ? r->corner_weights[sample * r->stride] : CENTROID_WEIGHT * find_area(ends);
+    return 3;
 }
 
 /* The scaled value of a channel at a corner of the input. */

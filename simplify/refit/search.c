@@ -145,12 +145,11 @@ void fct_refit_search(const fct_refit *r, size_t begin, size_t end) {
     search w = {.s = s};
     for (uint32_t i = 0; i < CACHE; ++i) w.cache[i].point = FCT_NONE;
     for (size_t i = begin; i < end; ++i) {
-        uint32_t corners[3] = {0}, points[3], count = find_sample_corners(r, i, corners), number = 0;
         w.out = &r->landings[i];
         *w.out = (fct_landing){.face = FCT_NONE};
-        if (count == 0) continue;
-        v3 ends[3];
-        w.p = find_sample_position(s, corners, count, ends), w.distance2 = INFINITY;
+        if (r->samples[i].weight == 0) continue;
+        uint32_t corners[3] = {0}, points[3], count = find_sample_corners(r, i, corners), number = 0;
+        w.p = r->samples[i].at, w.distance2 = INFINITY;
         for (uint32_t k = 0; k < count; ++k) {
             uint32_t point = s->point_parents[s->point_of[s->mesh->triangles[corners[k]]]];
             if ((number > 0 && point == points[0]) || (number > 1 && point == points[1])) continue;

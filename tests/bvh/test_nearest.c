@@ -65,7 +65,9 @@ static void each_of_the_seven_regions_has_its_point(void **state) {
     }
 }
 
-static void agrees_with_plain_distances(const fct_env *env, fct_mesh mesh, double spread) {
+/* most_nodes: over those that must be visited; most_triangles: per search. */
+static void agrees_with_plain_distances(const fct_env *env, fct_mesh mesh, double spread, double most_nodes,
+                                        double most_triangles) {
     model m = model_make(env, mesh, FCT_BACKEND_OBB);
     fct_visits must = {0}, visited = {0};
     uint64_t seed = 31;
@@ -99,18 +101,19 @@ static void agrees_with_plain_distances(const fct_env *env, fct_mesh mesh, doubl
         assert_true(ours.nodes >= least.nodes && ours.boxes == 8 * ours.nodes && ours.triangles > 0);
         must.nodes += least.nodes, visited.nodes += ours.nodes, visited.triangles += ours.triangles;
     }
-    /* Measured: 1.01 to 1.03 times the nodes, 1.83 times on bars, and 1.1 to 5.9 triangles per search. */
-    assert_true((double)visited.nodes < 1.95 * (double)must.nodes && visited.triangles < 400 * 7);
+    assert_true((double)visited.nodes < most_nodes * (double)must.nodes);
+    assert_true((double)visited.triangles < 400 * most_triangles);
     model_release(env, &m);
 }
 
 static void searches_agree_with_brute_force(void **state) {
     (void)state;
     fct_env env = fct_env_default();
-    agrees_with_plain_distances(&env, make_pebble(&env, 20, 3), 1.5);
-    agrees_with_plain_distances(&env, make_bars(&env, 12, 3), 1.5);
-    agrees_with_plain_distances(&env, make_soup(&env, 1500, 3), 1.5);
-    agrees_with_plain_distances(&env, make_pebble(&env, 20, 3), 40);
+    /* Measured: 1.02, 1.82, 1.03, 1.02 times the nodes, and 3.7, 2.8, 1.1, 5.9 triangles. */
+    agrees_with_plain_distances(&env, make_pebble(&env, 20, 3), 1.5, 1.05, 4);
+    agrees_with_plain_distances(&env, make_bars(&env, 12, 3), 1.5, 1.95, 3.2);
+    agrees_with_plain_distances(&env, make_soup(&env, 1500, 3), 1.5, 1.06, 1.2);
+    agrees_with_plain_distances(&env, make_pebble(&env, 20, 3), 40, 1.05, 6.3);
 }
 
 /* Loose triangles with two sides along axes, so that many have exactly the same normal. */

@@ -207,12 +207,14 @@ static void traversal_visits_little_more_than_it_must(void **state) {
             visited.nodes += ours.nodes, visited.triangles += ours.triangles;
             any_nodes += any.nodes;
         }
-        /* Measured: 1.02 times the nodes, 1.5 times on bars, where few nodes must be visited, and 1.05 times
-         * the triangles. */
+        /* Measured, pebble, bars, soup: 1.01, 1.42, 1.02 times the nodes and 1.07, -, 1.04 times the
+         * triangles; few boxes of bars must be visited. The search for any hit visits .71, .95, .77 of them.
+         */
+        static const double most_nodes[3] = {1.05, 1.5, 1.05}, most_any[3] = {.74, .98, .8};
         assert_true(hits > 600);
-        assert_true((double)visited.nodes < (k == 1 ? 1.6 : 1.2) * (double)must.nodes);
+        assert_true((double)visited.nodes < most_nodes[k] * (double)must.nodes);
         if (k != 1) assert_true((double)visited.triangles < 1.1 * (double)must.triangles);
-        assert_true((double)any_nodes < (k == 1 ? 1 : .85) * (double)visited.nodes);
+        assert_true((double)any_nodes < most_any[k] * (double)visited.nodes);
         model_release(&env, &m);
     }
 }

@@ -262,45 +262,48 @@ static int compare_guesses(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+/* Adds what the map of an object predicts in the middle of every other face, and the squared error there: the
+ * product of the differences from probes of two bakes, whose noise is independent. */
+static void guess_errors(fct_bake *bake, fct_bake *other, uint32_t object, guess **guesses, size_t *count) {
+    static const float up[3][3] = {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}};
+    fct_mesh mesh;
+    assert_int_equal(fct_bake_object(bake, object, &mesh), FCT_OK);
+    const size_t faces = mesh.face_count / 2;
+    float *points = calloc(3 * faces, sizeof *points), *normals = malloc(3 * faces * sizeof *normals);
+    for (size_t f = 0; f < faces; ++f) {
+        memcpy(normals + 3 * f, up[object], sizeof up[object]);
+        for (size_t k = 0; k < 9; ++k)
+            points[3 * f + k % 3] += mesh.positions[3 * (size_t)mesh.triangles[6 * f + k / 3] + k % 3] / 3;
+    }
+    fct_probe *truth = malloc(faces * sizeof *truth), *again = malloc(faces * sizeof *again);
+    assert_int_equal(fct_bake_probe(bake, faces, points, normals, truth), FCT_OK);
+    assert_int_equal(fct_bake_probe(other, faces, points, normals, again), FCT_OK);
+    *guesses = realloc(*guesses, (*count + faces) * sizeof **guesses);
+    for (size_t f = 0; f < faces; ++f) {
+        guess g = {0, 0};
+        for (size_t k = 0; k < 3; ++k) g.predicted += (double)mesh.error[mesh.triangles[6 * f + k]] / 3;
+        for (size_t c = 0; c < 3; ++c) {
+            double light = 0;
+            for (size_t k = 0; k < 3; ++k)
+                light += (double)mesh.colors[3 * (size_t)mesh.triangles[6 * f + k] + c] / 3;
+            g.square += (light - (double)truth[f].radiosity[c]) * (light - (double)again[f].radiosity[c]) / 3;
+        }
+        if (truth[f].instance == object && g.predicted > 0) (*guesses)[(*count)++] = g;
+    }
+    free(points), free(normals), free(truth), free(again);
+    fct_mesh_release(&plain, &mesh);
+}
+
 /* The light of probes, of many rays each, tells the true error in the middle of faces: where the map is
  * large, the error is. */
 static void maps_predict_errors(void **state) {
     (void)state;
     plain = fct_env_default();
     fct_scene *scene = make_room(&plain);
-    fct_bake *bake = start_bake(&plain, scene, 1);
+    fct_bake *bake = start_bake(&plain, scene, 1), *other = start_bake(&plain, scene, 2);
     guess *guesses = NULL;
     size_t count = 0;
-    for (uint32_t object = 0; object < 3; ++object) {
-        fct_mesh mesh;
-        assert_int_equal(fct_bake_object(bake, object, &mesh), FCT_OK);
-        const size_t faces = mesh.face_count;
-        float *points = calloc(3 * faces, sizeof *points), *normals = malloc(3 * faces * sizeof *normals);
-        static const float up[3][3] = {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}};
-        for (size_t f = 0; f < faces; ++f) {
-            memcpy(normals + 3 * f, up[object], sizeof up[object]);
-            for (size_t k = 0; k < 9; ++k)
-                points[3 * f + k % 3] +=
-                    mesh.positions[3 * (size_t)mesh.triangles[3 * f + k / 3] + k % 3] / 3;
-        }
-        fct_probe *truth = malloc(faces * sizeof *truth);
-        assert_int_equal(fct_bake_probe(bake, faces, points, normals, truth), FCT_OK);
-        guesses = realloc(guesses, (count + faces) * sizeof *guesses);
-        for (size_t f = 0; f < faces; ++f) {
-            guess g = {0, 0};
-            double apart[3];
-            for (size_t c = 0; c < 3; ++c) apart[c] = -(double)truth[f].radiosity[c];
-            for (size_t k = 0; k < 3; ++k) {
-                const size_t v = mesh.triangles[3 * f + k];
-                g.predicted += (double)mesh.error[v] / 3;
-                for (size_t c = 0; c < 3; ++c) apart[c] += (double)mesh.colors[3 * v + c] / 3;
-            }
-            for (int c = 0; c < 3; ++c) g.square += apart[c] * apart[c] / 3;
-            if (truth[f].instance == object && g.predicted > 0) guesses[count++] = g;
-        }
-        free(points), free(normals), free(truth);
-        fct_mesh_release(&plain, &mesh);
-    }
+    for (uint32_t object = 0; object < 3; ++object) guess_errors(bake, other, object, &guesses, &count);
     qsort(guesses, count, sizeof *guesses, compare_guesses);
     enum { GROUPS = 5 };
     double found[GROUPS], predicted[GROUPS];
@@ -309,17 +312,17 @@ static void maps_predict_errors(void **state) {
         found[g] = predicted[g] = 0;
         for (size_t i = first; i < end; ++i)
             found[g] += guesses[i].square, predicted[g] += pow(guesses[i].predicted, 2);
-        found[g] = sqrt(found[g] / (double)(end - first));
+        found[g] = sqrt(fmax(found[g], 0) / (double)(end - first));
         predicted[g] = sqrt(predicted[g] / (double)(end - first));
         printf("    %zu faces: predicted %.5f, found %.5f\n", end - first, predicted[g], found[g]);
-        assert_true(found[g] > .7 * predicted[g] && found[g] < (g ? 2.5 : 3.5) * predicted[g]);
+        assert_true(found[g] > .7 * predicted[g] && found[g] < 2.5 * predicted[g]);
         /* Of the smoothed light of penumbrae, the map sees the noise that is left, but not all of the error.
-         * The first group also holds the noise of the probes. */
-        if (g) assert_true(found[g] > .9 * found[g - 1]);
+         * Measured: 1.8, 1.5, 1.2, 1.0, 1.6 times the prediction; each 1.1 times the group before or more. */
+        if (g) assert_true(found[g] > 1.05 * found[g - 1]);
     }
     assert_true(found[GROUPS - 1] > 5 * found[0]);
     free(guesses);
-    fct_bake_destroy(bake);
+    fct_bake_destroy(bake), fct_bake_destroy(other);
     fct_scene_destroy(scene);
 }
 

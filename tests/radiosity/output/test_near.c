@@ -62,8 +62,8 @@ static double mean_light(const gap *g, double height, bool up, bool lamps, uint3
     return sum / count;
 }
 
-/* Under a lamp that fills .04 of a far plane, the near floor has rho times the lamp's light, whatever is
- * stored for it. One ray goes to the lamp and one on. */
+/* Under a small lamp, the near floor has rho times the lamp's light, whatever is stored for it: 7, as in all
+ * scenes here; the upper sheet stores 0. One ray goes to the lamp and one on. */
 static void near_hits_take_the_light_of_lamps(void **state) {
     (void)state;
     gap g = make_gap(1, .5, 3, 7);
@@ -102,8 +102,9 @@ static void near_lamps_do_not_shine(void **state) {
     end_gap(&g);
 }
 
-/* Between two sheets that nearly touch, light is reflected three times before it counts: rho_1 rho_2 rho_1
- * times the stored light of the lid. */
+/* Between two sheets that nearly touch, light is reflected three times before it counts. The floor stores 7
+ * and the lid 0. Up, the third near hit is the lid, and the path ends on the floor: rho_lid rho_floor rho_lid
+ * times 7. Down, it ends on the lid, without light. */
 static void narrow_gaps_are_dark(void **state) {
     (void)state;
     gap g = make_gap(1e-3, 1, 0, 7);
@@ -116,9 +117,39 @@ static void narrow_gaps_are_dark(void **state) {
     end_gap(&g);
 }
 
+/* In a closed box whose walls glow with e and reflect rho, all light is e / (1 - rho). The box is no lamp, so
+ * a near hit brings its emission: without it, the light would be rho times as much. */
+static void near_walls_glow(void **state) {
+    (void)state;
+    static const uint32_t sides[6][4] = {{0, 2, 1, 3}, {4, 5, 6, 7}, {0, 1, 4, 5},
+                                         {2, 6, 3, 7}, {0, 4, 2, 6}, {1, 3, 5, 7}}; /* outwards */
+    static const uint32_t halves[6] = {0, 2, 1, 1, 2, 3};                           /* inwards */
+    fct_mesh mesh;
+    gap g;
+    plain = fct_env_default();
+    assert_int_equal(fct_mesh_create(&plain, 8, 12, 0, &mesh), FCT_OK);
+    for (uint32_t v = 0; v < 8; ++v)
+        v3_store(mesh.positions + 3 * v, v3_make(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1));
+    for (uint32_t i = 0; i < 36; ++i) mesh.triangles[i] = sides[i / 6][halves[i % 6]];
+    assert_int_equal(fct_scene_create(&plain, FCT_BACKEND_OBB, &g.scene), FCT_OK);
+    place_mesh(g.scene, &mesh, place_material(g.scene, .5, 3, false), NULL);
+    assert_int_equal(fct_scene_commit(g.scene), FCT_OK);
+    assert_int_equal(fct_lamps_create(&plain, g.scene, &g.lamps), FCT_OK);
+    assert_int_equal(fct_lamps_count(g.lamps), 0);
+    assert_int_equal(fct_elements_create(&plain, g.scene, 1, &g.set), FCT_OK);
+    g.stored = calloc(3 * g.set.count, sizeof *g.stored);
+    for (size_t i = 0; i < 3 * g.set.count; ++i) g.stored[i] = 6;
+    double rays;
+    assert_near(mean_light(&g, -.99, false, true, 1000, &rays), 6, 1e-5);
+    assert_in_range(100 * rays, 100, 130);
+    end_gap(&g);
+    fct_mesh_release(&plain, &mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(near_hits_take_the_light_of_lamps), cmocka_unit_test(far_hits_take_the_stored_light),
-        cmocka_unit_test(near_lamps_do_not_shine), cmocka_unit_test(narrow_gaps_are_dark)};
+        cmocka_unit_test(near_lamps_do_not_shine), cmocka_unit_test(narrow_gaps_are_dark),
+        cmocka_unit_test(near_walls_glow)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -297,6 +297,7 @@ static void noise_of_shadow_rays_is_smoothed(void **state) {
     }
     assert_int_equal(fct_direct_smooth(&plain, &sheet, covered, sights, light), FCT_OK);
     int taken = 0, left = 0, sure = 0;
+    double step[2] = {0, 0}, count[2] = {0, 0}; /* mean error of all channels left and right of the step */
     for (size_t v = 0; v < n; ++v) {
         double expected[3];
         const bool noisy = sights[v].variance > 0;
@@ -312,10 +313,18 @@ static void noise_of_shadow_rays_is_smoothed(void **state) {
                 noise += pow(before[3 * v + k] - level, 2), rest += pow(light[3 * v + k] - level, 2);
             }
         }
+        const float *p = sheet.mesh.positions + 3 * v, *l = light + 3 * v;
+        if (p[0] > .4F && p[0] < .6F) {
+            const bool high = p[0] > .5F;
+            step[high] += (double)l[0] + l[1] + l[2] - (1 + .3 * (double)p[0] + high), ++count[high];
+        }
         taken += fits == 2, left += noisy && fits == 0, sure += !noisy;
     }
     printf("    %d fits, %d misfits, %d without noise; the noise is %.2f of that before\n", taken, left, sure,
            sqrt(rest / noise));
+    printf("    beside the step: %.3f and %.3f\n", step[0] / count[0], step[1] / count[1]);
+    /* The step is 1, and stays hard. */
+    assert_true(fabs(step[0] / count[0]) < .1 && fabs(step[1] / count[1]) < .1);
     assert_true(taken > 90 && left > 10 && sure > 10 && rest < .15 * noise);
     assert_int_equal(fct_direct_smooth(&plain, &loose, covered, all, loose.mesh.colors), FCT_OK);
     for (size_t v = 0; v < m; ++v)
@@ -331,6 +340,45 @@ static void noise_of_shadow_rays_is_smoothed(void **state) {
     free(sights), free(all), free(before), free(covered);
     fct_surface_release(&plain, &sheet), fct_surface_release(&plain, &loose);
     fct_scene_destroy(scene);
+}
+
+/* A fan around one vertex: a search through all of its neighbours for each of them would take minutes. Each
+ * thread count gives the same bytes. */
+static void hubs_are_smoothed_in_linear_time(void **state) {
+    (void)state;
+    enum { RIM = 60000 };
+    fct_surface fan;
+    float *first = NULL;
+    fct_sight *sights = calloc(RIM + 1, sizeof *sights);
+    uint8_t *covered = calloc(RIM + 1, 1);
+    for (uint32_t threads = 1; threads <= 3; threads += 2) {
+        plain = fct_env_default();
+        plain.thread_count = threads;
+        assert_int_equal(fct_surface_allocate(&plain, RIM + 1, RIM, &fan), FCT_OK);
+        float *light = calloc(3 * (RIM + 1), sizeof *light);
+        for (uint32_t v = 0; v <= RIM; ++v) {
+            const double angle = 6.283185307179586 * v / RIM, radius = v ? 1 : 0;
+            v3_store(fan.mesh.positions + 3 * (size_t)v,
+                     v3_make(radius * cos(angle), radius * sin(angle), 0));
+            fan.normals[3 * (size_t)v + 2] = 1, fan.flat[v] = 1, sights[v].variance = 1e-4F;
+            for (size_t c = 0; c < 3; ++c)
+                light[3 * (size_t)v + c] = 1 + .02F * (float)fct_uniform(fct_hash(v));
+        }
+        for (uint32_t f = 0; f < RIM; ++f) {
+            uint32_t *t = fan.mesh.triangles + 3 * (size_t)f;
+            t[0] = 0, t[1] = 1 + f, t[2] = 1 + (f + 1) % RIM;
+        }
+        assert_int_equal(fct_direct_smooth(&plain, &fan, covered, sights, light), FCT_OK);
+        if (first) assert_memory_equal(light, first, 3 * (RIM + 1) * sizeof *light);
+        free(first), first = light;
+        fct_surface_release(&plain, &fan);
+    }
+    double noise = 0, rest = 0;
+    for (size_t i = 3; i < 3 * (RIM + 1); ++i)
+        noise += pow(.02 * fct_uniform(fct_hash(i / 3)) - .01, 2), rest += pow((double)first[i] - 1.01, 2);
+    printf("    the noise is %.2f of that before\n", sqrt(rest / noise));
+    assert_true(rest < .7 * noise);
+    free(first), free(sights), free(covered);
 }
 
 /* Difference against 10 % of the sum plus 4 % of the scene's mean, summed over channels. */
@@ -609,6 +657,7 @@ int main(void) {
         cmocka_unit_test(triangles_without_common_vertices_are_smoothed_alike),
         cmocka_unit_test(light_does_not_pass_walls_above_seams),
         cmocka_unit_test(noise_of_shadow_rays_is_smoothed),
+        cmocka_unit_test(hubs_are_smoothed_in_linear_time),
         cmocka_unit_test(borders_are_relative_and_absolute),
         cmocka_unit_test(smaller_errors_get_more_rays),
         cmocka_unit_test(radiosity_is_emission_plus_reflection),
