@@ -71,6 +71,61 @@ FCT_API fct_result fct_progressive_mesh(fct_progressive *progressive, fct_mesh *
 FCT_API fct_result fct_progressive_morph(fct_progressive *progressive, uint32_t faces, double t,
                                          fct_mesh *out);
 
+/* A perspective view, and how far a mesh may be from the finest level. Coordinates are those of the mesh,
+ * with its origin added. */
+typedef struct fct_view {
+    uint32_t size;
+    uint32_t width, height;        /* of the picture, in pixels; default 1280 x 800 */
+    double position[3], target[3]; /* of the eye, and what it looks at; default (0, 0, 1) and the origin */
+    double up[3];                  /* roughly; default y */
+    double vertical_fov;           /* degrees, 1 to 170; default 35 */
+    /* Pixels between the finest level and the mesh on the screen. 0: the finest level; infinity: the base
+     * mesh. Default 1. */
+    double tolerance;
+    /* The same for silhouettes and for surfaces with an open boundary; at most `tolerance`. Default .5. */
+    double silhouette_tolerance;
+    /* How much larger both may be for surfaces that are seen from behind only, and outside of the picture; at
+     * least 1; infinity: nothing is refined there. Default 8. Outside of the picture an error counts as if
+     * the eye looked at it. */
+    double back_factor, outside_factor;
+    /* Also refine where a component of a vertex colour is off by more, unless the place is smaller than the
+     * tolerance; infinity: ignore colours. Default .03. */
+    double color_tolerance;
+} fct_view;
+FCT_API fct_view fct_view_default(void);
+
+typedef struct fct_view_stats {
+    uint32_t faces;
+    uint32_t splits;       /* of the cut */
+    uint32_t forced;       /* of these: not wanted in this view, but needed by other splits or faces */
+    uint32_t done, undone; /* splits and contractions since the cut of the last view */
+    uint32_t tested;       /* splits that were compared with the view */
+    double pixels; /* the largest distance on the screen from a vertex of the finest level to the mesh, where
+                      it is in the picture and not seen from behind only; as the hierarchy has measured it */
+    double error;  /* the largest of these distances anywhere, in the unit of the mesh */
+    double seconds_hierarchy, seconds_cut, seconds_mesh;
+} fct_view_stats;
+
+/* The coarsest mesh that a view needs: a cut through the vertex hierarchy of the splits. It has the faces of
+ * the base mesh and of some splits: those that the view wants, and those that these need. It is the finest
+ * level with each vertex moved to its ancestor in the cut, so a closed mesh stays closed, and seams do not
+ * crack. Where a face would turn by more than 45 degrees from the finest level, and by more than at any
+ * level, splits around it are added until it is a face of some level. So faces do not fold over (Garland
+ * 1999, section 7.3).
+ *
+ * A split is wanted if, without it or a split below it, a vertex of the finest level may be `tolerance`
+ * pixels or more from the mesh on the screen. Its sphere and its normals decide where it may be seen. (Hoppe,
+ * "View-Dependent Refinement of Progressive Meshes", SIGGRAPH 1997.) The distance is measured between levels;
+ * between coarse and fine parts of a cut it can be up to a quarter larger (random views of bunny, cow and
+ * rocker arm). Of a truncated file the finest level is the finest one that was read.
+ *
+ * The first call builds the hierarchy, which takes about twice as long as reading the file. The next ones
+ * move the cut; their cost is proportional to the sizes of both cuts. The mesh depends only on the view, not
+ * on the views before, and has the same bytes on every run. The level of fct_progressive_go does not change.
+ * stats may be NULL. Errors: DATA (the view), MEMORY, CANCELLED. */
+FCT_API fct_result fct_progressive_view(fct_progressive *progressive, const fct_view *view, fct_mesh *out,
+                                        fct_view_stats *stats);
+
 #ifdef __cplusplus
 }
 #endif

@@ -5,27 +5,32 @@
 #include "base/math/vec.h"
 #include "mesh/mesh.h"
 #include "simplify/progressive/progressive.h"
+#include "simplify/view/hierarchy.h"
 
-void fct_progressive_forward(fct_progressive *m) {
-    uint32_t step = m->level++;
+void fct_progressive_split(const fct_progressive *m, uint32_t step, uint32_t *triangles, uint32_t *nodes) {
     for (uint32_t n = m->step_nodes[step]; n < m->step_nodes[step + 1]; ++n) {
         uint32_t h = m->handles[n];
-        m->nodes[h] = n;
-        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
-            m->triangles[m->corners[i]] = h;
+        nodes[h] = n;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i) triangles[m->corners[i]] = h;
     }
 }
 
-void fct_progressive_backward(fct_progressive *m) {
-    uint32_t step = --m->level;
+void fct_progressive_contract(const fct_progressive *m, uint32_t step, uint32_t *triangles, uint32_t *nodes) {
     for (uint32_t n = m->step_nodes[step]; n < m->step_nodes[step + 1]; ++n) {
         uint32_t parent = m->parents[n];
         if (parent == FCT_NONE) continue;
         uint32_t h = m->handles[parent];
-        m->nodes[h] = parent;
-        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i)
-            m->triangles[m->corners[i]] = h;
+        nodes[h] = parent;
+        for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1]; ++i) triangles[m->corners[i]] = h;
     }
+}
+
+void fct_progressive_forward(fct_progressive *m) {
+    fct_progressive_split(m, m->level++, m->triangles, m->nodes);
+}
+
+void fct_progressive_backward(fct_progressive *m) {
+    fct_progressive_contract(m, --m->level, m->triangles, m->nodes);
 }
 
 fct_result fct_progressive_begin(fct_progressive *m) {
@@ -42,6 +47,7 @@ fct_result fct_progressive_begin(fct_progressive *m) {
 
 void fct_progressive_destroy(fct_progressive *m) {
     if (!m) return;
+    fct_hierarchy_destroy(m->env, m->hierarchy);
     fct_names_release(m->env, m->material_names, m->material_count);
     void *arrays[] = {m->step_nodes,    m->step_faces,  m->errors,    m->parents,
                       m->handles,       m->points,      m->corners,   m->positions,
@@ -98,6 +104,7 @@ uint32_t fct_progressive_go_error(fct_progressive *m, double error) {
 /* A mesh of a level, as it is written. */
 typedef struct level_mesh {
     fct_progressive *m;
+    fct_progressive_faces from;
     fct_mesh *out;
     uint32_t vertex_count;
     uint32_t *nodes;     /* per vertex */
@@ -117,9 +124,14 @@ static bool share_vertex(const fct_progressive *m, uint32_t a, uint32_t b) {
            (m->normal == FCT_NONE || same_floats(x + m->normal, y + m->normal));
 }
 
+/* The corner that is written as corner c. */
+static size_t find_corner(const level_mesh *l, size_t c) {
+    return l->from.faces ? 3 * (size_t)l->from.faces[c / 3] + c % 3 : c;
+}
+
 static uint32_t find_vertex(level_mesh *l, uint32_t handle) {
     const fct_progressive *m = l->m;
-    uint32_t node = m->nodes[handle], first = FCT_NONE;
+    uint32_t node = l->from.nodes[handle], first = FCT_NONE;
     if (m->texcoord != FCT_NONE) {
         first = m->point_vertices[m->points[node]];
         for (uint32_t v = first; v != FCT_NONE; v = l->next[v])
@@ -134,8 +146,8 @@ static uint32_t find_vertex(level_mesh *l, uint32_t handle) {
 /* Numbers the vertices in the order of their first use. vertices[handle] receives the vertex. */
 static void number_vertices(level_mesh *l) {
     const fct_progressive *m = l->m;
-    for (size_t c = 0; c < 3 * (size_t)m->step_faces[m->level]; ++c) {
-        uint32_t h = m->triangles[c];
+    for (size_t c = 0; c < 3 * (size_t)l->from.count; ++c) {
+        uint32_t h = l->from.triangles[find_corner(l, c)];
         if (m->vertices[h] == FCT_NONE) m->vertices[h] = find_vertex(l, h);
     }
 }
@@ -175,16 +187,25 @@ static void write_vertex(level_mesh *l, uint32_t v) {
 
 static void write_corner(level_mesh *l, size_t c) {
     const fct_progressive *m = l->m;
-    l->out->triangles[c] = m->vertices[m->triangles[c]];
+    uint32_t handle = l->from.triangles[find_corner(l, c)];
+    l->out->triangles[c] = m->vertices[handle];
     if (!l->out->texcoords) return;
-    size_t b = m->nodes[m->triangles[c]], a = find_ancestor(l, (uint32_t)b), n = m->value_count;
+    size_t b = l->from.nodes[handle], a = find_ancestor(l, (uint32_t)b), n = m->value_count;
     blend_floats(l, m->values + n * a + m->texcoord, m->values + n * b + m->texcoord, 2,
                  l->out->texcoords + 2 * c);
 }
 
+static void write_face(level_mesh *l, uint32_t f) {
+    const fct_progressive *m = l->m;
+    size_t from = l->from.faces ? l->from.faces[f] : f;
+    if (m->materials) l->out->materials[f] = m->materials[from];
+    if (m->face_colors)
+        memcpy(l->out->face_colors + 3 * (size_t)f, m->face_colors + 3 * from, 3 * sizeof *m->face_colors);
+}
+
 static fct_result fill_mesh(level_mesh *l) {
     const fct_progressive *m = l->m;
-    uint32_t faces = m->step_faces[m->level];
+    uint32_t faces = l->from.count;
     unsigned kinds = (m->color != FCT_NONE ? FCT_MESH_COLORS : 0) |
                      (m->normal != FCT_NONE ? FCT_MESH_NORMALS : 0) |
                      (m->texcoord != FCT_NONE ? FCT_MESH_TEXCOORDS : 0) |
@@ -197,15 +218,14 @@ static fct_result fill_mesh(level_mesh *l) {
     memcpy(l->out->origin, m->origin, sizeof l->out->origin);
     for (uint32_t v = 0; v < l->vertex_count; ++v) write_vertex(l, v);
     for (size_t c = 0; c < 3 * (size_t)faces; ++c) write_corner(l, c);
-    if (m->materials) memcpy(l->out->materials, m->materials, faces * sizeof *m->materials);
-    if (m->face_colors)
-        memcpy(l->out->face_colors, m->face_colors, 3 * (size_t)faces * sizeof *m->face_colors);
+    for (uint32_t f = 0; f < faces; ++f) write_face(l, f);
     return FCT_OK;
 }
 
-static fct_result make_mesh(fct_progressive *m, uint32_t least, double t, fct_mesh *out) {
-    level_mesh l = {.m = m, .out = out, .t = t};
-    size_t corners = 3 * (size_t)m->step_faces[m->level];
+static fct_result make_mesh(fct_progressive *m, const fct_progressive_faces *from, uint32_t least, double t,
+                            fct_mesh *out) {
+    level_mesh l = {.m = m, .from = *from, .out = out, .t = t};
+    size_t corners = 3 * (size_t)from->count;
     const fct_array arrays[] = {FCT_ARRAY(l.nodes, corners),
                                 FCT_ARRAY(l.next, m->texcoord == FCT_NONE ? 0 : corners),
                                 FCT_ARRAY_IF(t < 1, l.ancestors, m->step_nodes[m->level])};
@@ -216,20 +236,32 @@ static fct_result make_mesh(fct_progressive *m, uint32_t least, double t, fct_me
     if (l.ancestors) find_ancestors(&l, least);
     result = fill_mesh(&l);
     for (size_t c = 0; c < corners; ++c) {
-        m->vertices[m->triangles[c]] = FCT_NONE;
-        if (m->texcoord != FCT_NONE) m->point_vertices[m->points[m->nodes[m->triangles[c]]]] = FCT_NONE;
+        uint32_t h = from->triangles[find_corner(&l, c)];
+        m->vertices[h] = FCT_NONE;
+        if (m->texcoord != FCT_NONE) m->point_vertices[m->points[from->nodes[h]]] = FCT_NONE;
     }
     if (result != FCT_OK) fct_mesh_release(m->env, out);
     fct_release_all(m->env, arrays, FCT_LENGTH(arrays));
     return result;
 }
 
+fct_result fct_progressive_write_faces(fct_progressive *m, const fct_progressive_faces *from, fct_mesh *out) {
+    return make_mesh(m, from, 0, 1, out);
+}
+
+/* The faces of the current level. */
+static fct_progressive_faces find_faces(const fct_progressive *m) {
+    return (fct_progressive_faces){m->triangles, m->nodes, NULL, m->step_faces[m->level]};
+}
+
 fct_result fct_progressive_mesh(fct_progressive *m, fct_mesh *out) {
-    return make_mesh(m, 0, 1, out);
+    fct_progressive_faces from = find_faces(m);
+    return make_mesh(m, &from, 0, 1, out);
 }
 
 fct_result fct_progressive_morph(fct_progressive *m, uint32_t faces, double t, fct_mesh *out) {
     *out = (fct_mesh){0};
     if (!(t >= 0 && t <= 1)) return fct_fail(m->env, FCT_ERROR_DATA, "t is %g, expected 0 to 1", t);
-    return make_mesh(m, m->step_nodes[find_level(m, faces)], t, out);
+    fct_progressive_faces from = find_faces(m);
+    return make_mesh(m, &from, m->step_nodes[find_level(m, faces)], t, out);
 }

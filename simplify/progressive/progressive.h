@@ -56,14 +56,29 @@ struct fct_progressive {
     uint32_t *nodes;    /* at the current level */
     uint32_t *vertices; /* scratch: FCT_NONE between calls */
     /* Per point, only with texture coordinates. */
-    uint32_t *point_vertices; /* scratch: FCT_NONE between calls */
+    uint32_t *point_vertices;        /* scratch: FCT_NONE between calls */
+    struct fct_hierarchy *hierarchy; /* NULL before the first view */
 };
+
+/* The split of a step, and its contraction, in arrays like `triangles` and `nodes` above. The level does not
+ * change. */
+void fct_progressive_split(const fct_progressive *m, uint32_t step, uint32_t *triangles, uint32_t *nodes);
+void fct_progressive_contract(const fct_progressive *m, uint32_t step, uint32_t *triangles, uint32_t *nodes);
 
 /* One more step of splits (or of the base mesh), or one less. */
 void fct_progressive_forward(fct_progressive *m);
 void fct_progressive_backward(fct_progressive *m);
 /* Allocates the scratch arrays, and goes to the coarsest level. Errors: MEMORY. */
 fct_result fct_progressive_begin(fct_progressive *m);
+/* Faces of a mesh that splits have made. */
+typedef struct fct_progressive_faces {
+    const uint32_t *triangles, *nodes; /* as those of fct_progressive */
+    const uint32_t *faces;             /* NULL: the first ones */
+    uint32_t count;
+} fct_progressive_faces;
+/* A mesh of these faces, in their order. Errors: MEMORY. */
+fct_result fct_progressive_write_faces(fct_progressive *m, const fct_progressive_faces *from, fct_mesh *out);
+
 /* Writes a file to a stream; the caller checks the stream. Errors: MEMORY, CANCELLED. */
 fct_result fct_progressive_write(fct_progressive *m, FILE *stream);
 /* Reads a file from memory; `name` begins the messages. Errors: as fct_progressive_load. */

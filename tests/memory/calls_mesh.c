@@ -420,6 +420,20 @@ static fct_result load_simplifier(const fct_env *env) {
     return result;
 }
 
+static fct_result write_view(const fct_env *env) {
+    fct_mesh mesh;
+    fct_progressive *progressive = make_progressive(env);
+    fct_view view = fct_view_default();
+    view.position[2] = 3, view.tolerance = view.silhouette_tolerance = .1;
+    fct_result result = STARVE(fct_progressive_view(progressive, &view, &mesh, NULL));
+    finish_mesh(env, &mesh, result);
+    /* A view without memory leaves nothing that the next one could stumble over. */
+    assert_int_equal(fct_progressive_view(progressive, &view, &mesh, NULL), FCT_OK);
+    fct_mesh_release(env, &mesh);
+    fct_progressive_destroy(progressive);
+    return result;
+}
+
 const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_writer_open", "", open_writer, false},
                                   {"fct_writer_close", "", close_writer, false},
@@ -474,4 +488,5 @@ const memory_call mesh_calls[] = {{"fct_simd_check", "", check_simd, false},
                                   {"fct_progressive_load", "", load_progressive, false},
                                   {"fct_progressive_mesh", "", write_level, false},
                                   {"fct_progressive_morph", "", write_morph, false},
+                                  {"fct_progressive_view", "", write_view, false},
                                   {NULL, NULL, NULL, false}};

@@ -3,6 +3,7 @@
 #ifndef FCT_TESTS_MEND_LEVELS_H
 #define FCT_TESTS_MEND_LEVELS_H
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
@@ -36,6 +37,36 @@ static inline void mend_levels(uint8_t *data, size_t size) {
     }
 }
 
+/* Looks at the mesh from places that depend on the file; the cuts are meshes between the ends. */
+static inline void mend_try_views(const fct_env *env, fct_progressive *progressive, uint32_t seed,
+                                  void (*require)(bool condition, const char *what)) {
+    fct_progressive_info info;
+    fct_mesh mesh;
+    fct_progressive_inspect(progressive, &info);
+    for (uint32_t i = 0; i < 4; ++i, seed = seed * 1664525u + 1013904223u) {
+        fct_view view = fct_view_default();
+        fct_view_stats stats;
+        for (uint32_t k = 0; k < 3; ++k) view.position[k] = (double)(seed >> (8 * k) & 15) / 4 - 1;
+        view.target[0] = 7, view.up[i % 3] = seed >> 28;
+        view.vertical_fov = 1 + (seed >> 24 & 127), view.width = 1 + (seed >> 20);
+        view.tolerance = i == 3 ? 0 : (double)(1 << (seed >> 26 & 7)) / 8;
+        view.silhouette_tolerance = i == 1 ? view.tolerance : 0;
+        view.back_factor = seed & 1 ? 3 : (double)INFINITY, view.outside_factor = 1 + (seed >> 30);
+        if (fct_progressive_view(progressive, &view, &mesh, &stats) != FCT_OK) continue; /* no memory */
+        require(mesh.face_count >= info.least_faces && mesh.face_count <= info.most_faces,
+                "a view is between the ends");
+        require(i != 3 || mesh.face_count == info.most_faces, "no tolerance gives the finest level");
+        require(fct_mesh_validate(env, &mesh) == FCT_OK, "a view is a valid mesh");
+        require(stats.splits <= info.split_count && stats.forced <= stats.splits && stats.pixels >= 0,
+                "a view has splits of the file");
+        for (uint32_t f = 0; f < mesh.face_count; ++f) {
+            const uint32_t *t = mesh.triangles + 3 * (size_t)f;
+            require(t[0] != t[1] && t[1] != t[2] && t[2] != t[0], "a face of a view has three vertices");
+        }
+        fct_mesh_release(env, &mesh);
+    }
+}
+
 /* Reads the file, and goes to levels. `require` reports a broken promise. Returns whether it was read. */
 static inline bool mend_try_levels(const fct_env *env, const uint8_t *data, size_t size,
                                    void (*require)(bool condition, const char *what)) {
@@ -62,6 +93,7 @@ static inline bool mend_try_levels(const fct_env *env, const uint8_t *data, size
         fct_progressive_inspect(progressive, &info);
         require(info.error >= 0, "an error is not negative");
     }
+    mend_try_views(env, progressive, (uint32_t)XXH3_64bits(data, size), require);
     fct_progressive_destroy(progressive);
     return true;
 }

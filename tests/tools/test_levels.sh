@@ -52,15 +52,54 @@ expect 65 level sphere.off --faces 100 -o x.ply
 says "no progressive mesh"
 expect 66 level absent.fpm --faces 100 -o x.ply
 expect 64 level sphere.fpm -o x.ply
-says "expected --faces N, --ratio R or --max-error E"
+says "expected --faces N, --ratio R, --max-error E or --view CAMERA"
 expect 64 level sphere.fpm --faces 10 --ratio .5 -o x.ply
 expect 64 level sphere.fpm --ratio 0 -o x.ply
 expect 64 level sphere.fpm --faces 10 -o x.fpm
 expect 64 simplify sphere.off --faces 10 -o x.ply --progressive x.ply
 says "expected a name that ends in .fpm"
 expect 73 simplify sphere.off --faces 10 -o x.ply --progressive absent/x.fpm
-leftovers
-finish
+# view-dependent levels
+camera=0,0,4,0,0,0,40
+expect 0 level sphere.fpm --view $camera --tolerance 4 --silhouette 1 --size 800x600 -o view.ply --json
+keys faces vertices least_faces most_faces total_faces splits pixels distance splits_done splits_forced seconds_hierarchy seconds_cut seconds read level write total peak_bytes
+holds "$(value faces) > 60 && $(value faces) < 1520 && $(value pixels) > .4 && $(value pixels) <= 4"
+holds "$(value splits_done) > $(value splits_forced) && $(value splits_done) < $(value splits)"
+cp out view
+"$program" info view.ply --json >out
+holds "$(value boundary_edges) == 0 && $(value nonmanifold_edges) == 0 && $(value degenerate_faces) == 0"
+holds "$(value faces) == $(value faces view)"
+for options in "--tolerance 8 --silhouette 1" "--silhouette 4" "--size 400x300" "--back 1 --tolerance 1" "--up z --outside 1"; do
+    expect 0 level sphere.fpm --view $camera --tolerance 4 --silhouette 1 --size 800x600 $options -o other.ply --json
+    case $options in
+    --back*) holds "$(value faces) > $(value faces view)" ;;
+    --up*) holds "$(value faces) == $(value faces view)" ;;
+    *) holds "$(value faces) < $(value faces view)" ;;
+    esac
+done
+expect 0 level sphere.fpm --view 0,0,3,0,0,9,10 --tolerance 1 -o far.ply --json
+cp out far
+expect 0 level sphere.fpm --view 0,0,3,0,0,9,10 --tolerance 1 --outside inf -o far.ply --json
+holds "$(value faces) == 60 && $(value faces far) > 60 && $(value pixels) == 0 && $(value distance) > .01"
+expect 0 level sphere.fpm --view $camera --tolerance 0 -o all.ply
+expect 0 compare all.ply sphere.ply --json
+holds "$(value e_max) < 1e-12"
+expect 0 level sphere.fpm --view $camera --tolerance inf -o least.ply --json
+holds "$(value faces) == 60 && $(value pixels) > 4"
+head -c 3000 sphere.fpm >part.fpm
+expect 0 level part.fpm --view $camera --tolerance 0 -o level.ply
+says "the file was truncated"
+expect 64 level sphere.fpm --view 0,0,0,0,0,0 -o x.ply
+says "with an eye away from its target"
+expect 64 level sphere.fpm --view $camera --faces 100 -o x.ply
+says "found several"
+expect 64 level sphere.fpm --view $camera --tolerance 1 --silhouette 2 -o x.ply
+says "expected at most the tolerance of 1, found 2"
+expect 64 level sphere.fpm --view $camera --back .5 -o x.ply
+expect 64 level sphere.fpm --view $camera --size 800 -o x.ply
+says "expected WIDTHxHEIGHT"
+expect 64 level sphere.fpm --faces 100 --tolerance 2 -o x.ply
+says "--tolerance: expected --view with it"
 # several levels in one run
 expect 0 simplify sphere.off --levels .5,300,60 -o chain.ply --json
 keys levels seconds total peak_bytes faces_before faces_after vertices stopped_because pairs_found pairs_joined max_cost distance_rms distance_max color_rms uv_rms normal_rms lost_area file
@@ -76,3 +115,5 @@ says "found standard output"
 expect 73 simplify sphere.off --levels 300,60 -o nowhere/chain.ply
 expect 65 simplify sphere.off --levels 60,300 -o chain.ply
 says "level 2 has 300 faces, expected fewer than the 60 of level 1"
+leftovers
+finish

@@ -54,6 +54,16 @@ bool drawing_parse_camera(const char *text, drawing_frame *out) {
     return true;
 }
 
+bool drawing_parse_size(const char *text, uint32_t *width, uint32_t *height) {
+    char *end;
+    unsigned long w = strtoul(text, &end, 10), h = 0;
+    bool good = *end == 'x' && end > text && *text != '-' && end[1] >= '0' && end[1] <= '9';
+    if (good) h = strtoul(end + 1, &end, 10);
+    if (!good || *end || w < 1 || h < 1 || w > RASTER_MAX_SIZE || h > RASTER_MAX_SIZE) return false;
+    *width = (uint32_t)w, *height = (uint32_t)h;
+    return true;
+}
+
 void drawing_from_scene(const fct_camera *camera, drawing_frame *out) {
     for (int k = 0; k < 3; ++k) {
         out->position[k] = camera->position[k];

@@ -16,6 +16,8 @@ typedef struct drawing_frame {
 
 /* Reads "ex,ey,ez,tx,ty,tz[,fov]". False for any other text. */
 bool drawing_parse_camera(const char *text, drawing_frame *out);
+/* Reads "WxH", each 1 to RASTER_MAX_SIZE. False for any other text. */
+bool drawing_parse_size(const char *text, uint32_t *width, uint32_t *height);
 void drawing_from_scene(const fct_camera *camera, drawing_frame *out);
 /* Fills the eye, the axes and the focal length of `out`, whose width, height, samples and cull are set
  * already, and the lights of the drawing. *outside: whether the eye is outside the bounds of the mesh. */

@@ -96,18 +96,6 @@ static const struct argp_option render_options_table[] = {
      3},
     {0}};
 
-static error_t parse_size(struct argp_state *state, const char *text, render_options *o) {
-    char *end;
-    unsigned long width = strtoul(text, &end, 10), height = 0;
-    bool good = *end == 'x' && end > text && *text != '-' && end[1] >= '0' && end[1] <= '9';
-    if (good) height = strtoul(end + 1, &end, 10);
-    if (!good || *end || width < 1 || height < 1 || width > RASTER_MAX_SIZE || height > RASTER_MAX_SIZE)
-        return tool_usage(state, "--size: expected WIDTHxHEIGHT, each 1 to %d, found '%s'", RASTER_MAX_SIZE,
-                          text);
-    o->width = (uint32_t)width, o->height = (uint32_t)height;
-    return 0;
-}
-
 static error_t parse_subject(struct argp_state *state, const char *name, const char *text,
                              drawing_subject subject, render_options *o) {
     if (o->subject != DRAWING_SURFACE)
@@ -179,7 +167,10 @@ static error_t parse_render(int key, char *text, struct argp_state *state) {
         o->wireframe = true;
         return 0;
     case KEY_SIZE:
-        return parse_size(state, text, o);
+        return drawing_parse_size(text, &o->width, &o->height)
+                   ? 0
+                   : tool_usage(state, "--size: expected WIDTHxHEIGHT, each 1 to %d, found '%s'",
+                                RASTER_MAX_SIZE, text);
     case KEY_CAMERA:
     case KEY_SCENE:
     case KEY_VIEW:
