@@ -129,7 +129,8 @@ struct fct_bvh {
     uint32_t root;    /* reference */
     struct fct_moment_node *moments; /* with FCT_BVH_SIGN; NULL if the model is one leaf */
     size_t moment_bytes;
-    bool has_sign; /* winding numbers can be asked for */
+    bool has_sign;  /* winding numbers can be asked for */
+    bool is_closed; /* with has_sign: see near/sign/crossings.h */
     /* FCT_BVH_PAIRS */
     fct_pair_node *pairs; /* pair_count; node 0 has one child, the root */
     uint32_t pair_count;

@@ -156,7 +156,7 @@ static void find_except(void *m, size_t count, const void *queries, double *t) {
 
 static void find_inside(void *m, size_t count, const void *points, double *inside) {
     for (size_t i = 0; i < count; ++i)
-        inside[i] = fabs(fct_bvh_winding_number(((model *)m)->bvh, (const float *)points + 3 * i, NULL)) > .5;
+        inside[i] = fct_bvh_inside(((model *)m)->bvh, (const float *)points + 3 * i, NULL);
 }
 
 static double find_hausdorff(const fct_mesh *a, const fct_mesh *b, double error) {

@@ -147,10 +147,17 @@ FCT_API void fct_bvh_closest_points(const fct_bvh *bvh, size_t count, const floa
  * is NaN if the bvh was built without FCT_BVH_SIGN or with the Embree backend, or if the point is not finite.
  * visits may be NULL. */
 FCT_API double fct_bvh_winding_number(const fct_bvh *bvh, const float point[3], fct_visits *visits);
-/* fct_bvh_closest_point, with a negative distance where the winding number is above .5 or below -.5: inside
- * of a closed surface, however its faces wind, also where parts overlap or small holes are open. The sum of
- * all faces decides where the winding number is within .01 of that. Returns false for a bvh that was built
- * without FCT_BVH_SIGN. */
+/* Whether the winding number is above .5 or below -.5: inside of a closed surface, also of one that is inside
+ * out, and where parts overlap or small holes are open. About a closed surface one ray decides; otherwise the
+ * sum of all faces does where the winding number is within .01 of the limit. Points at rounding distance from
+ * the surface may count as either. False for a bvh that was built without FCT_BVH_SIGN, and for a point that
+ * is not finite. visits may be NULL. */
+FCT_API bool fct_bvh_inside(const fct_bvh *bvh, const float point[3], fct_visits *visits);
+/* The same for `count` points (count x 3), on the threads of the environment. Bit i % 64 of inside[i / 64]
+ * tells whether point i lies inside. `inside` has (count + 63) / 64 words. */
+FCT_API void fct_bvh_inside_points(const fct_bvh *bvh, size_t count, const float *points, uint64_t *inside);
+/* fct_bvh_closest_point, with a negative distance where the point lies inside. Returns false for a bvh that
+ * was built without FCT_BVH_SIGN. */
 FCT_API bool fct_bvh_signed_distance(const fct_bvh *bvh, const float point[3], float max_distance,
                                      fct_closest *out, fct_visits *visits);
 /* The same for `count` points (count x 3), on the threads of the environment. */

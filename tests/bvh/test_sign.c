@@ -2,6 +2,7 @@
 #include "packed.h"
 
 #include "base/math/round.h"
+#include "bvh/near/sign/crossings.h"
 #include "bvh/near/sign/moments.h"
 #include "bvh/near/sign/winding.h"
 
@@ -433,8 +434,93 @@ static void signs_close_to_faces(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* Turns over one face in so many. */
+static fct_mesh turn_faces(fct_mesh mesh, uint32_t step) {
+    for (uint32_t f = 0; f < mesh.face_count; f += step) {
+        uint32_t kept = mesh.triangles[3 * f];
+        mesh.triangles[3 * f] = mesh.triangles[3 * f + 1], mesh.triangles[3 * f + 1] = kept;
+    }
+    return mesh;
+}
+
+/* Each corner gets a vertex of its own; those at 0 get one of both signs. */
+static fct_mesh split_vertices(const fct_env *env, fct_mesh mesh) {
+    fct_mesh out;
+    assert_int_equal(fct_mesh_create(env, 3 * mesh.face_count, mesh.face_count, 0, &out), FCT_OK);
+    for (uint32_t c = 0; c < 3 * mesh.face_count; ++c) {
+        out.triangles[c] = c;
+        for (uint32_t k = 0; k < 3; ++k) {
+            float x = mesh.positions[3 * mesh.triangles[c] + k];
+            out.positions[3 * c + k] = x == 0 && c % 2 ? -x : x;
+        }
+    }
+    fct_mesh_release(env, &mesh);
+    return out;
+}
+
+static fct_mesh join_two(const fct_env *env, fct_mesh a, fct_mesh b) {
+    fct_mesh parts[2] = {a, b}, mesh;
+    assert_int_equal(fct_mesh_join(env, parts, 2, &mesh), FCT_OK);
+    for (int i = 0; i < 2; ++i) fct_mesh_release(env, &parts[i]);
+    return mesh;
+}
+
+/* A whole winding number from one ray, and an answer where no ray can tell. Points in rows hit many vertices.
+ */
+static void ray_tells(const fct_env *env, fct_mesh mesh, bool closed, bool winds) {
+    model m = make_signed(env, mesh);
+    assert_int_equal(m.bvh->is_closed, closed);
+    uint64_t seed = 8;
+    uint32_t inside = 0, told = 0, count = 700;
+    float *points = malloc(12 * (size_t)count);
+    uint64_t bits[11];
+    for (uint32_t i = 0; i < count; ++i) {
+        float *p = points + 3 * i;
+        for (int k = 0; k < 3; ++k)
+            p[k] = i % 2 ? (float)(2.4 * random_unit(&seed) - 1.2) : .25f * (float)((i / 2 >> 3 * k) % 8) - 1;
+        double expected = brute_winding(&mesh, v3_load(p));
+        int64_t number = 7;
+        bool tells = fct_crossings_count(m.bvh, v3_load(p), &number, NULL);
+        assert_true(closed || !tells);
+        if (tells) assert_true(fabs(expected - (double)number) < 1e-5);
+        told += tells;
+        fct_closest near;
+        assert_true(fct_bvh_closest_point(m.bvh, p, INFINITY, &near, NULL));
+        if (near.distance > 1e-6f && fabs(fabs(expected) - .5) > 1e-5)
+            assert_int_equal(fct_bvh_inside(m.bvh, p, NULL), fabs(expected) > .5);
+        inside += fct_bvh_inside(m.bvh, p, NULL);
+    }
+    fct_bvh_inside_points(m.bvh, count, points, bits);
+    for (uint32_t i = 0; i < count; ++i)
+        assert_int_equal(bits[i / 64] >> i % 64 & 1, fct_bvh_inside(m.bvh, points + 3 * i, NULL));
+    assert_true(inside < count && (inside > count / 20 || !winds));
+    assert_true(told > (closed ? count * 3 / 4 : 0) || !closed);
+    free(points);
+    model_release(env, &m);
+}
+
+static void rays_count_crossings_of_closed_surfaces(void **state) {
+    (void)state;
+    fct_env env = fct_env_default();
+    fct_mesh moved = make_sphere(&env, 16), above = make_grid(&env, 6);
+    for (uint32_t v = 0; v < above.vertex_count; ++v) above.positions[3 * v + 2] += .1f; /* beside the rows */
+    for (uint32_t v = 0; v < moved.vertex_count; ++v) moved.positions[3 * v] += .5f;
+    ray_tells(&env, make_sphere(&env, 16), true, true);
+    ray_tells(&env, turn_faces(make_sphere(&env, 16), 1), true, true);
+    ray_tells(&env, split_vertices(&env, make_sphere(&env, 16)), true, true);
+    ray_tells(&env, join_two(&env, make_sphere(&env, 16), moved), true, true);
+    /* Twice, and once each way: windings of 2 and 0. */
+    ray_tells(&env, join_two(&env, make_pebble(&env, 9, 2), make_pebble(&env, 9, 2)), true, true);
+    ray_tells(&env, join_two(&env, make_pebble(&env, 9, 2), turn_faces(make_pebble(&env, 9, 2), 1)), true,
+              false);
+    ray_tells(&env, turn_faces(make_pebble(&env, 9, 2), 50), false, true);
+    ray_tells(&env, make_holes(make_pebble(&env, 9, 2)), false, true);
+    ray_tells(&env, above, false, false);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rays_count_crossings_of_closed_surfaces),
         cmocka_unit_test(signs_close_to_faces),
         cmocka_unit_test(winding_numbers_agree_with_all_faces),
         cmocka_unit_test(moments_are_integrals_over_the_surface),

@@ -10,6 +10,7 @@
 
 #include "base/math/round.h"
 #include "base/parallel.h"
+#include "bvh/near/sign/crossings.h"
 
 enum { NODE_CHUNK = 64 }; /* nodes per task */
 
@@ -200,7 +201,8 @@ static uint32_t number_nodes(const fct_bvh *bvh, fct_moment_node *nodes) {
 fct_result fct_moments_build(fct_bvh *bvh) {
     const fct_env *env = bvh->env;
     bvh->has_sign = true;
-    if (bvh->root & FCT_REF_LEAF) return FCT_OK;
+    fct_result result = fct_crossings_prepare(bvh);
+    if (result != FCT_OK || bvh->root & FCT_REF_LEAF) return result;
     uint32_t count = number_nodes(bvh, NULL);
     moment_job job = {.bvh = bvh};
     job.nodes = fct_allocate(env, count, sizeof *job.nodes);
