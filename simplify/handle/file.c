@@ -11,8 +11,8 @@
 #include "mesh/mesh.h"
 #include "simplify/handle/handle.h"
 #include "simplify/handle/live.h"
+#include "simplify/options.h"
 #include "simplify/simplifier.h"
-#include "simplify/simplify.h"
 
 #define ORDER_MARK 0x01020304u
 

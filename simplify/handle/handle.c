@@ -1,14 +1,12 @@
-/* simplify/handle/handle.c: creates, runs and destroys the handle (facetree/simplifier.h), and writes its
- * mesh.
- */
+/* simplify/handle/handle.c: creates the handle (facetree/simplifier.h), and writes its mesh. */
 #include "simplify/handle/handle.h"
 
 #include "mesh/mesh.h"
 #include "simplify/contract.h"
 #include "simplify/handle/history.h"
 #include "simplify/levels.h"
+#include "simplify/options.h"
 #include "simplify/simplifier.h"
-#include "simplify/simplify.h"
 
 fct_result fct_handle_open(const fct_env *env, const fct_simplify_def *def, fct_simplifier **out) {
     fct_simplifier *s = fct_allocate_zero(env, 1, sizeof *s);
@@ -55,6 +53,8 @@ fct_result fct_handle_create(const fct_env *env, const fct_mesh *mesh, const fct
 fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                  fct_simplifier **out) {
     *out = NULL;
+    fct_result result = fct_simplify_check_size(env, def);
+    if (result != FCT_OK) return result;
     if (def->pair_distance > 0)
         return fct_fail(env, FCT_ERROR_DATA, "pair_distance is %g: a state holds no pairs, expected 0",
                         def->pair_distance);
@@ -82,21 +82,6 @@ fct_result fct_handle_contract(fct_simplifier *s, uint32_t target_faces, double 
     if (max_error > s->last_error) allow_edges(s);
     s->own.target_faces = target_faces, s->own.max_error = s->last_error = max_error;
     return fct_simplify_contract(s, stop);
-}
-
-fct_result fct_simplifier_run(fct_simplifier *s, uint32_t target_faces, double max_error,
-                              fct_simplify_stats *stats) {
-    double start = fct_seconds();
-    fct_simplify_stats found = {.faces_before = s->live_faces};
-    if (!(max_error >= 0))
-        return fct_fail(s->env, FCT_ERROR_DATA, "max_error is %g, expected at least 0", max_error);
-    fct_result result = fct_handle_run(s, target_faces, max_error, &found.stopped_because);
-    if (result != FCT_OK) return result;
-    found.faces_after = s->live_faces;
-    found.max_cost = sqrt(s->max_error2) * s->extent;
-    found.seconds_contract = fct_seconds() - start;
-    if (stats) *stats = found;
-    return FCT_OK;
 }
 
 fct_result fct_simplifier_mesh(fct_simplifier *s, bool refit, fct_mesh *out, fct_simplify_stats *stats) {

@@ -9,8 +9,6 @@ fct_result fct_handle_open(const fct_env *env, const fct_simplify_def *def, fct_
 /* fct_simplifier_create, also with pair_distance: such a handle cannot be saved, and has no way back. */
 fct_result fct_handle_create(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                              fct_simplifier **out);
-/* fct_simplifier_run, with a way back if there is a history. */
-fct_result fct_handle_run(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop);
 /* Contracts without a way back. */
 fct_result fct_handle_contract(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop);
 

@@ -30,11 +30,26 @@ static fct_result run_noted(fct_simplifier *s, uint32_t target_faces, double max
     return result;
 }
 
-fct_result fct_handle_run(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop) {
+static fct_result run_handle(fct_simplifier *s, uint32_t target_faces, double max_error, fct_stop *stop) {
     *stop = FCT_STOP_FACES;
     if (s->live_faces <= target_faces) return FCT_OK;
     return s->history ? run_noted(s, target_faces, max_error, stop)
                       : fct_handle_contract(s, target_faces, max_error, stop);
+}
+
+fct_result fct_simplifier_run(fct_simplifier *s, uint32_t target_faces, double max_error,
+                              fct_simplify_stats *stats) {
+    double start = fct_seconds();
+    fct_simplify_stats found = {.faces_before = s->live_faces};
+    if (!(max_error >= 0))
+        return fct_fail(s->env, FCT_ERROR_DATA, "max_error is %g, expected at least 0", max_error);
+    fct_result result = run_handle(s, target_faces, max_error, &found.stopped_because);
+    if (result != FCT_OK) return result;
+    found.faces_after = s->live_faces;
+    found.max_cost = sqrt(s->max_error2) * s->extent;
+    found.seconds_contract = fct_seconds() - start;
+    if (stats) *stats = found;
+    return FCT_OK;
 }
 
 /* Restores the snapshot of entry `first`, and repeats the runs up to entry `last`. */
