@@ -24,8 +24,8 @@ static const struct argp_option level_options_table[] = {
     {"ratio", KEY_RATIO, "R", 0,
      "The finest level of at most R times the faces of the finest one, above 0 and at most 1", 1},
     {"max-error", KEY_MAX_ERROR, "E", 0,
-     "The coarsest level without a contraction whose error is above E, in the mesh's unit, as "
-     "'facetree simplify' measures it",
+     "The coarsest level without a contraction whose error is above E, in the mesh's unit, as 'facetree "
+     "simplify' measures it",
      1},
     VIEW_OPTIONS,
     {0}};
@@ -93,7 +93,7 @@ static int report_level(tool *t, const level_options *o, const fct_progressive_i
                         const fct_mesh *mesh, const fct_view_stats *stats, const double times[3]) {
     double total = tool_seconds() - t->start;
     if (o->view.camera)
-        tool_say(t, "%u of %u faces, at most %.3g pixels off, %.2f s", mesh->face_count, info->total_faces,
+        tool_say(t, "%u of %u faces, about %.3g pixels off, %.2f s", mesh->face_count, info->total_faces,
                  stats->pixels, total);
     else
         tool_say(t, "%u of %u faces, largest error %.3g, %.2f s", mesh->face_count, info->total_faces,
@@ -146,18 +146,16 @@ int tool_level(int argc, char **argv) {
         .text =
             "IN is a progressive mesh, which 'facetree simplify --progressive' writes; OUT is a mesh. A "
             "level has the positions and attributes of the contractions, which are not fitted to the input. "
-            "If "
-            "the input has up to about 8,000 faces more than the level, it has the faces of 'facetree "
-            "simplify "
-            "--refit 0'; else other ones with about the same error. The finest level has the faces of the "
-            "input. Of a truncated file the coarse levels can be read. --view mixes levels: fine where the "
-            "camera sees it, coarse far away, behind and outside of the picture.\n\n"
+            "If the input has up to about 8,000 faces more than the level, it has the faces of 'facetree "
+            "simplify --refit 0'; else other ones with about the same error. The finest level has the faces "
+            "of the input. Of a truncated file the coarse levels can be read. --view mixes levels: fine "
+            "where the camera sees it, coarse far away, behind and outside of the picture.\n\n"
             "JSON keys: faces, vertices, least_faces and most_faces (of the levels that were read), "
             "total_faces (of the finest level), splits, max_cost (the largest error of a contraction), "
             "seconds{read, level, write, total}, peak_bytes. With --view, instead of max_cost: pixels (the "
-            "largest bound on the distance on the screen) and distance (the largest one anywhere) between "
-            "the mesh and the finest level, splits_done, splits_forced (needed by others), "
-            "seconds_hierarchy, seconds_cut.",
+            "largest measured distance on the screen; between coarse and fine parts it can be a quarter "
+            "larger) and distance (the largest one anywhere) between the mesh and the finest level, "
+            "splits_done, splits_forced (needed by others), seconds_hierarchy, seconds_cut.",
         .examples = "  facetree level bunny.fpm --faces 5000 -o small.ply\n"
                     "  facetree level bunny.fpm --ratio .5 -o half.glb\n"
                     "  facetree level bunny.fpm --view 0,.1,.4,0,.1,0 --tolerance 2 -o seen.ply",

@@ -67,8 +67,8 @@ static const struct argp_option simplify_options_table[] = {
      0},
     {"pairs", KEY_PAIRS, "TAU", 0,
      "Also contract pairs of points of different bodies that are at most TAU apart, so that near bodies "
-     "join; "
-     "in the mesh's unit (default 0: edges only)",
+     "join; in the mesh's unit (default 0: edges only). Not with --keep-topology, --save-state, --resume, "
+     "--contour or --paint",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
@@ -102,7 +102,9 @@ static const struct argp_option simplify_options_table[] = {
      "--contour, --paint and --save-state may follow",
      0},
     {"contour", KEY_CONTOUR, "FILE", 0,
-     "Edges that hold like a boundary: two vertex numbers of IN per line, from 0", 0},
+     "Edges that hold like a boundary: two vertex numbers per line, from 0, of IN or of the input of the "
+     "state",
+     0},
     {"paint", KEY_PAINT, "FILE", 0,
      "Weights from 1e-6 to 1e6 for the cost at each vertex, one per line: of IN or, with --resume, of the "
      "mesh that was written with the state. A region of weight W keeps about the cube root of W times as "
@@ -153,7 +155,7 @@ static error_t parse_levels(simplify_options *o, char *list, struct argp_state *
 /* Notes options that a state has of its own. */
 static void note_shaping(simplify_options *o, int key) {
     static const int keys[] = {KEY_ATTRIBUTES, KEY_PLACEMENT,   KEY_WEIGHTS,  KEY_BOUNDARY, KEY_FEATURE,
-                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT,    KEY_PAIRS};
+                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i)
         for (const struct argp_option *option = simplify_options_table; keys[i] == key && option->name;
              ++option)
@@ -170,8 +172,8 @@ static error_t check_options(const simplify_options *o, struct argp_state *state
                           "--progressive: expected neither --resume, --save-state, --contour nor --paint");
     if (o->def.pair_distance > 0 && o->def.keep_topology)
         return tool_usage(state, "expected either --pairs or --keep-topology, found both");
-    if (o->def.pair_distance > 0 && (o->save_state || o->contour || o->paint))
-        return tool_usage(state, "--pairs: expected neither --save-state, --contour nor --paint");
+    if (o->def.pair_distance > 0 && (o->resume || o->save_state || o->contour || o->paint))
+        return tool_usage(state, "--pairs: expected neither --resume, --save-state, --contour nor --paint");
     if (o->resume && o->shaping) return tool_usage(state, "--resume: the state has its own --%s", o->shaping);
     return 0;
 }
@@ -277,7 +279,7 @@ static json_t *pack_result(const fct_mesh *mesh, const fct_simplify_stats *s) {
 
 static void say_result(tool *t, const char *path, const fct_simplify_stats *s) {
     char lost[48] = "";
-    if (s->lost_area > 0) snprintf(lost, sizeof lost, ", %.2g %% of the area vanished", 100 * s->lost_area);
+    if (s->lost_area > 0) snprintf(lost, sizeof lost, ", %.3g %% of the area vanished", 100 * s->lost_area);
     tool_say(t, "%s%s%u faces to %u (stopped by %s), distance %.3g (largest %.3g)%s, %.2f s",
              path ? path : "", path ? ": " : "", s->faces_before, s->faces_after,
              stop_reasons[s->stopped_because], s->distance_rms, s->distance_max, lost,
@@ -522,21 +524,20 @@ int tool_simplify(int argc, char **argv) {
         .summary = "reduce a mesh, keeping its shape and colours",
         .text =
             "IN is a mesh or a hierarchy file (.fct), OUT is a mesh; their endings choose the formats. If "
-            "both "
-            "are glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each mesh "
-            "counts once, however many nodes place it. Edges are contracted in the order of their quadric "
-            "error "
-            "until the faces are as few as --faces or --ratio says, or until the error would exceed "
-            "--max-error.\n\n"
+            "both are glTF, OUT keeps the nodes, names, materials, textures, cameras and lights of IN. Each "
+            "mesh counts once, however many nodes place it. Edges are contracted in the order of their "
+            "quadric error until the faces are as few as --faces or --ratio says, or until the error would "
+            "exceed --max-error.\n\n"
             "JSON keys: faces_before, faces_after, vertices, stopped_because (faces, error or exhausted), "
-            "pairs_found and pairs_joined (candidates of --pairs, and contractions of them), "
-            "max_cost (the largest error of a contraction), distance_rms, distance_max, color_rms, uv_rms, "
-            "normal_rms (errors of the result), lost_area (the share of the area of IN that has no faces in "
-            "OUT; the errors do not cover it), seconds{init, contract, refit, total}, peak_bytes. With "
-            "--levels: levels[] with these keys up to lost_area and file, seconds{total}, peak_bytes.",
-        .examples = "  facetree simplify bunny.obj --faces 10000 -o small.ply --save-state bunny.fst\n"
+            "pairs_found and pairs_joined (candidates of --pairs, and contractions of them), max_cost (the "
+            "largest error of a contraction), distance_rms, distance_max, color_rms, uv_rms, normal_rms "
+            "(errors of the result), lost_area (the share of the area of IN without faces in OUT, except "
+            "inner walls that --pairs removed; the errors do not cover it), seconds{init, contract, refit, "
+            "total}, peak_bytes. With --levels: levels[] with these keys up to lost_area and file, "
+            "seconds{total}, peak_bytes.",
+        .examples = "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
+                    "  facetree simplify bunny.obj --faces 10000 -o small.ply --save-state bunny.fst\n"
                     "  facetree simplify --resume bunny.fst --faces 1000 -o smaller.ply\n"
-                    "  facetree simplify bunny.obj --ratio .1 -o small.ply\n"
                     "  facetree simplify lit.glb --faces 10000 -o small.glb\n"
                     "  facetree simplify bunny.obj --levels 20000,5000,1000 -o lod.ply\n"
                     "  facetree simplify city.glb --ratio .05 --pairs .5 -o far.glb\n"

@@ -2,7 +2,7 @@
  *
  *     fct_simplifier_create(&env, &mesh, &def, &s);
  *     fct_simplifier_run(s, 10000, INFINITY, NULL);
- *     fct_simplifier_save(s, "bunny.fst");       stop here, and go on tomorrow; or
+ *     fct_simplifier_save(s, "bunny.fst");       stop here, and resume later; or
  *     fct_simplifier_paint(s, ...);              ask for more faces somewhere
  *     fct_simplifier_undo(s, 50000);             and go back
  *     fct_simplifier_run(s, 5000, INFINITY, NULL);
@@ -58,13 +58,14 @@ FCT_API fct_result fct_simplifier_run(fct_simplifier *s, uint32_t target_faces, 
 FCT_API fct_result fct_simplifier_mesh(fct_simplifier *s, bool refit, fct_mesh *out,
                                        fct_simplify_stats *stats);
 
-/* Goes back: undoes contractions until the mesh is the one that the last run through this number of faces
- * would have left with `faces` as its target. So it has at most `faces` faces, and all of the beginning if
- * that has fewer. Does nothing if the mesh has as many faces. The state is restored bit by bit: a run that is
+/* Goes back to more faces: the mesh becomes the one that the last run through this number of faces would have
+ * left with the target `faces`. So it has at most `faces` faces; if the input has fewer, it is the input.
+ * Does nothing if the mesh has at least `faces` faces. The state is restored bit by bit: a run that is
  * repeated gives the same bytes, and the state after undo(N) is that after run(N). Weights and constraints
- * stay: the result is as if the caller had painted and then constrained there. Cost: at most that of a
- * simplification from twice as many faces, or from the last change of weights or constraints. After an error
- * nothing has changed. Errors: DATA (after fct_simplifier_forget), MEMORY, CANCELLED. */
+ * stay: the result is as if the caller had painted and then constrained there. Cost: the runs since the last
+ * snapshot, repeated. A snapshot is taken before a run if the mesh has at most half the faces of the snapshot
+ * before, or if weights or constraints have changed. So one long run is repeated from its beginning. After an
+ * error nothing has changed. Errors: DATA (after fct_simplifier_forget), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplifier_undo(fct_simplifier *s, uint32_t faces);
 /* Releases the memory for undo, about twice that of the state, and records no more runs. A run that fails
  * afterwards keeps its contractions. */

@@ -98,16 +98,17 @@ typedef struct fct_simplify_stats {
     uint32_t pairs_found, pairs_joined; /* by pair_distance: candidates, and contractions */
     double max_cost; /* the largest error of a contraction that was made, as max_error measures it */
     /* Errors of the result: root mean square, by area, over samples of the input (vertices and centroids of
-     * faces: up to 12 per vertex of the result all of them, then one of eight, and at most 32), and the
-     * largest. A sample's distance is that to the faces of the result around it, so the nearest one may be
-     * nearer. In units of the mesh.
+     * faces: up to 12 per vertex of the result all of them, then one of eight, at most 32, and at least 8,192
+     * in all), and the largest. A sample's distance is that to the faces of the result around it, so the
+     * nearest one may be nearer. In units of the mesh.
      */
     double distance_rms, distance_max;
     double color_rms;    /* of one component */
     double texcoord_rms; /* length of the difference of (u, v); 0 if the mesh has no such attribute */
     double normal_rms;   /* length of the difference of normals, before they get unit length */
     /* The share of the input's area (0 to 1) that these errors do not cover, because the result has no faces
-     * there: bodies that vanished, and corners that lost their last face. */
+     * there: bodies that vanished, and corners that lost their last face. Inner walls that pairs removed do
+     * not count. */
     double lost_area;
     double seconds_init, seconds_contract, seconds_refit;
 } fct_simplify_stats;

@@ -3,7 +3,7 @@
  *     snapshot 100k --run--> 80k --run--> 60k        A run keeps a snapshot if the mesh has at most half the
  *     snapshot 45k  --run--> 20k                     faces of the snapshot before, or if paint or constraints
  *                                                    have changed. So all snapshots together are about twice
- *     as large as the first one, and a way back repeats at most runs over half of the faces.
+ *     as large as the first one. A way back repeats the runs since a snapshot.
  */
 #ifndef FCT_SIMPLIFY_HISTORY_H
 #define FCT_SIMPLIFY_HISTORY_H

@@ -64,7 +64,8 @@ static fct_result repeat_runs(fct_simplifier *s, size_t first, size_t last) {
     return result;
 }
 
-/* Goes back to the beginning of entry `last` or, if that has more, to `faces`, with the wishes of today. */
+/* Goes back to the beginning of entry `last` or, if that has more, to `faces`, with the current paint and
+ * constraints. */
 static fct_result go_back(fct_simplifier *s, size_t last, uint32_t faces, const fct_wishes *wishes) {
     fct_history *h = s->history;
     fct_stop stop;
