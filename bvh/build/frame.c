@@ -50,6 +50,7 @@ static const fct_cluster *leaf_cluster(const fct_bvh *bvh, const fct_leaf_list *
 static void sample_leaves(const fct_bvh *bvh, const fct_leaf_list *leaves, samples *s) {
     float area = -1;
     s->count = leaves->count < MOST_SAMPLES ? leaves->count : MOST_SAMPLES;
+    s->largest = 0; /* also if the areas of a damaged file are no numbers */
     for (uint32_t i = 0; i < s->count; ++i) {
         fct_cluster room;
         const uint32_t number = (uint32_t)((uint64_t)i * leaves->count / s->count);
@@ -135,7 +136,7 @@ static bool choose_frame(const fct_bvh *bvh, const fct_leaf_list *leaves, frame 
     double most = MOST_AREA * sum_areas(bvh, leaves, &s, coordinate_axes, INFINITY);
     for (uint32_t i = 0; i < count; ++i) {
         const double sum = sum_areas(bvh, leaves, &s, frames[i], most);
-        if (sum > most) continue;
+        if (!(sum >= 0 && sum < most)) continue; /* numbers of a damaged file may be infinite or none */
         most = BETTER * sum, found = true;
         for (int k = 0; k < 3; ++k) best[k] = frames[i][k];
     }

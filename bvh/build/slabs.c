@@ -179,7 +179,7 @@ fct_slabs fct_slabs_fit(const fct_bvh *bvh, const fct_leaf_list *leaves, const f
         fct_slabs_clear(&s);
         fct_slabs_hold(bvh, leaves->offsets, top->order + node->begin, node->end - node->begin, &s);
         const double area = fct_slabs_area(&s);
-        if (area < best_area) best = s, best_area = area;
+        if (area >= 0 && area < best_area) best = s, best_area = area; /* not if axes are no numbers */
     }
     return best;
 }
