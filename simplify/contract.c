@@ -180,10 +180,10 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
     return true;
 }
 
-/* Whether the ends of a pair are still apart, have faces and are no hubs. */
+/* Whether the ends of a pair are still apart, have faces, and are neither hubs nor locked. */
 static bool is_pair(const fct_simplifier *s, uint32_t a, uint32_t b) {
     uint32_t most = point_at(s, a)->valence, least = point_at(s, b)->valence;
-    return least > 0 && most <= SIMPLIFY_HUB &&
+    return least > 0 && most <= SIMPLIFY_HUB && !point_is_locked(s, a) && !point_is_locked(s, b) &&
            fct_simplify_find_side(s, point_at(s, b)->first_corner, a) == FCT_NONE;
 }
 

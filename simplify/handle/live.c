@@ -4,7 +4,8 @@
 /* Larger coordinates in the unit cube are damage, because no contraction leads so far away. */
 #define MOST_COORDINATE 1e6
 /* Larger coefficients are damage. */
-#define MOST_NUMBER 1e60
+#define MOST_NUMBER  1e60
+#define MOST_CONTOUR 1e12 /* the largest weight of a contour */
 
 typedef struct live_head {
     uint32_t root_count, live_faces, edge_count, wedge_count; /* wedges in the lists of the roots */
@@ -400,7 +401,8 @@ static const char *read_wishes(reader *r) {
         uint32_t second = mark->points[1] == FCT_NONE ? 0 : mark->points[1];
         if (mark->points[0] >= r->s->point_count || second >= r->s->point_count)
             return "a constraint has no point";
-        if (!are_numbers(&mark->weight, 1, MOST_NUMBER) || !are_numbers(mark->at, 3, MOST_COORDINATE))
+        double most = mark->points[1] == FCT_NONE ? MOST_NUMBER : MOST_CONTOUR;
+        if (!(mark->weight > 0 && mark->weight <= most) || !are_numbers(mark->at, 3, MOST_COORDINATE))
             return "a constraint is no number";
     }
     const char *fault = read_paint(r);
@@ -454,7 +456,8 @@ static const char *find_head_fault(const reader *r) {
         (!(h->flags & HAS_PINS) && h->pin_count > 0))
         return "constraints out of range";
     if (h->mark_count > (size_t)(r->source->end - r->source->at) / sizeof(fct_mark)) return "truncated";
-    if (!(h->max_error2 >= 0) || !(h->last_error >= 0)) return "an error is no number";
+    if (!(h->max_error2 >= 0 && h->max_error2 <= MOST_NUMBER) || !(h->last_error >= 0))
+        return "an error is no number";
     return NULL;
 }
 

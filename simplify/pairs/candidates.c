@@ -168,11 +168,22 @@ static double find_box_distance2(const pair_node *n, const float at[3]) {
     return sum;
 }
 
-/* Whether the node may hold a point to add. */
-static bool is_wanted(const pair_finder *f, const pair_node *n, uint32_t own, const nearest_points *near,
+static uint32_t find_first_point(const pair_finder *f, uint32_t node) {
+    while (node < f->leaf_count) node *= 2;
+    return (node - f->leaf_count) * LEAF;
+}
+
+/* Whether a node may hold a point to add: `distance2` is that of its box. Of many points at one place, those
+ * with higher numbers are not looked at. */
+static bool is_wanted(const pair_finder *f, uint32_t node, uint32_t own, const nearest_points *near,
                       double distance2) {
-    double limit2 = near->count < PAIR_BODIES ? f->limit2 : near->distance2[find_farthest(near)];
-    if (n->body_count == 0 || distance2 > limit2) return false;
+    const pair_node *n = &f->nodes[node];
+    if (n->body_count == 0 || distance2 > f->limit2) return false;
+    if (near->count == PAIR_BODIES) {
+        uint32_t far = find_farthest(near);
+        if (!is_nearer(distance2, find_first_point(f, node), near->distance2[far], near->points[far]))
+            return false;
+    }
     if (n->body_count == MANY) return true;
     for (uint32_t i = 0; i < n->body_count; ++i) {
         bool known = n->bodies[i] == own;
@@ -202,7 +213,7 @@ static void search_tree(const pair_finder *f, uint32_t point, nearest_points *ne
     while (depth > 0) {
         uint32_t i = stack[--depth];
         const pair_node *n = &f->nodes[i];
-        if (!is_wanted(f, n, f->bodies[point], near, find_box_distance2(n, at))) continue;
+        if (!is_wanted(f, i, f->bodies[point], near, find_box_distance2(n, at))) continue;
         if (i >= f->leaf_count) {
             search_leaf(f, i - f->leaf_count, point, near);
             continue;

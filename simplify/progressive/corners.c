@@ -117,7 +117,9 @@ static uint32_t code_node(fct_splits *k, uint32_t node, uint32_t parent, uint32_
             !GROW(k, m->values, k->room.values, n * ((size_t)node + 1)))
             return 0;
         ++m->node_count;
-        m->parents[node] = parent, m->points[node] = point, m->handles[node] = FCT_NONE;
+        /* A node of the same step is a guess, but no parent. */
+        m->parents[node] = parent < m->step_nodes[k->step] ? parent : FCT_NONE;
+        m->points[node] = point, m->handles[node] = FCT_NONE;
         m->first_corners[node] = m->first_corners[node + 1] = m->corner_count;
         memcpy(m->positions + 3 * (size_t)node, k->points[point].at, 3 * sizeof *m->positions);
     }

@@ -260,9 +260,9 @@ fct_result fct_splits_step(fct_splits *k) {
                       !GROW(k, m->step_faces, k->room.step_faces, (size_t)step + 2) ||
                       !GROW(k, m->errors, k->room.errors, (size_t)step + 1)))
         return k->result;
+    if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
     code_split(k, step);
     uint32_t first = k->names ? m->step_faces[step] : m->face_count;
-    if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
     if (k->result == FCT_OK) count = fct_code_number(&k->coder, &k->models.faces, count);
     if (step > 0 && count == 0 && !is_pair_split(k)) fct_splits_fail(k);
     for (uint32_t i = 0; i < count && !fct_splits_stopped(k); ++i) code_face(k, first + i);
