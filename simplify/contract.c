@@ -138,6 +138,15 @@ static bool is_in_block(const fct_simplifier *s, const uint32_t *ring, uint32_t 
     return true;
 }
 
+/* The inner walls that the contraction of an edge closes, between faces at the two ends that stay. */
+static bool find_edge_walls(fct_simplifier *s, const fct_move *move, fct_walls *walls) {
+    fct_move rest = *move;
+    rest.count_a = 0;
+    while (rest.count_a < s->remaining_count && s->triangles[s->remaining[rest.count_a].corner] == move->a)
+        ++rest.count_a;
+    return fct_simplify_find_walls(s, &rest, walls);
+}
+
 /* Contracts the edge if the checks and the loss allow it. Gathers both rings, or only that of the smaller end
  * if the larger one is a hub. An edge of two hubs is dropped, and so is one without faces. */
 static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct_candidate *candidate) {
@@ -171,9 +180,17 @@ static bool try_contraction(fct_simplifier *s, uint32_t e, uint32_t ends[2], fct
         candidate->key += cost * paint_factor(s, a, b);
         if (!confirm_cost(s, e, ends, candidate)) return false;
     }
+    fct_walls walls;
+    walls.count = 0;
+    if (s->next_pairs && !body && !hub && !find_edge_walls(s, &move, &walls)) {
+        refuse_position(s, e, ends);
+        return false;
+    }
+    if (s->blocks && s->live_faces < s->least_faces + 4 + fct_simplify_count_walls(&walls)) return false;
     fct_simplify_drop_edge(s, e);
     fct_simplify_collapse(s, ends, candidate, keep, count_b);
     if (body) fct_simplify_remove_faces(s, a);
+    if (walls.count > 0) fct_simplify_remove_walls(s, &walls);
     if (cost > 0) fct_loss_add(&loss, point_at(s, a)->quadric);
     if (cost > 0 && s->steering) fct_loss_add(&loss, wedge_quadric(s, s->first_wedges[a]));
     requeue_rings(s, &move);

@@ -212,6 +212,10 @@ static inline fct_point *point_at(const fct_simplifier *s, uint32_t p) {
 static inline v3 point_position(const fct_simplifier *s, uint32_t p) {
     return point_at(s, p)->at;
 }
+/* The kind of body that the face of a corner belonged to in the input. Only with pair_distance. */
+static inline uint8_t find_solid(const fct_simplifier *s, uint32_t corner) {
+    return s->solids[s->point_of[s->mesh->triangles[corner]]];
+}
 /* Without attributes a wedge is its point. Not for meshes whose attributes do not steer. */
 static inline double *wedge_quadric(const fct_simplifier *s, uint32_t w) {
     return s->quadrics ? s->quadrics + (size_t)s->quadric_size * w : point_at(s, w)->quadric;

@@ -7,10 +7,6 @@
 #include "simplify/log.h"
 #include "simplify/pairs/release.h"
 
-static uint8_t find_solid(const fct_simplifier *s, uint32_t corner) {
-    return s->solids[s->point_of[s->mesh->triangles[corner]]];
-}
-
 /* Adds the equal faces i and j of the two ends. */
 static bool add_wall(const fct_simplifier *s, const fct_remaining *i, const fct_remaining *j,
                      fct_walls *out) {

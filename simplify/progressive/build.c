@@ -90,6 +90,7 @@ static void write_step(fct_builder *b, uint32_t i, uint32_t *face_places, uint32
         write_face(b, b->removed[face], m->face_count - 1);
     }
     uint32_t step = b->step_count - i;
+    m->walls[step] = b->steps[i].wall;
     m->errors[step] = i ? b->steps[i - 1].error : 0;
     m->step_nodes[step + 1] = m->node_count, m->step_faces[step + 1] = m->face_count;
 }
@@ -101,6 +102,7 @@ static fct_result allocate_progressive(fct_builder *b) {
     m->handle_count = b->handle_count;
     const fct_array arrays[] = {FCT_ARRAY(m->step_nodes, steps + 1),
                                 FCT_ARRAY(m->step_faces, steps + 1),
+                                FCT_ARRAY_ZERO(m->walls, steps),
                                 FCT_ARRAY_ZERO(m->errors, steps),
                                 FCT_ARRAY(m->parents, nodes),
                                 FCT_ARRAY(m->handles, nodes),

@@ -43,8 +43,8 @@ typedef struct fct_splits {
     uint32_t *next, *previous; /* per corner: in the list of its point */
     /* Room of the arrays that grow while reading. */
     struct {
-        size_t step_nodes, step_faces, errors, parents, handles, points, first_corners, positions, values,
-            corners, triangles, materials, face_colors, nodes, list, next, previous, ring;
+        size_t step_nodes, step_faces, walls, errors, parents, handles, points, first_corners, positions,
+            values, corners, triangles, materials, face_colors, nodes, list, next, previous, ring;
     } room;
 
     bool has_pairs; /* a split may have no faces */

@@ -49,10 +49,10 @@ void fct_progressive_destroy(fct_progressive *m) {
     if (!m) return;
     fct_hierarchy_destroy(m->env, m->hierarchy);
     fct_names_release(m->env, m->material_names, m->material_count);
-    void *arrays[] = {m->step_nodes,    m->step_faces,  m->errors,    m->parents,
-                      m->handles,       m->points,      m->corners,   m->positions,
-                      m->first_corners, m->values,      m->triangles, m->materials,
-                      m->nodes,         m->face_colors, m->vertices,  m->point_vertices};
+    void *arrays[] = {m->step_nodes, m->step_faces,    m->walls,     m->errors,    m->parents,
+                      m->handles,    m->points,        m->corners,   m->positions, m->first_corners,
+                      m->values,     m->triangles,     m->materials, m->nodes,     m->face_colors,
+                      m->vertices,   m->point_vertices};
     for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(m->env, arrays[i]);
     fct_release(m->env, m);
 }
@@ -80,6 +80,7 @@ static uint32_t find_level(const fct_progressive *m, uint32_t faces) {
 }
 
 static uint32_t go_to_level(fct_progressive *m, uint32_t level) {
+    while (level > 1 && m->walls[level - 1]) --level;
     while (m->level < level) fct_progressive_forward(m);
     while (m->level > level) fct_progressive_backward(m);
     return m->step_faces[level];

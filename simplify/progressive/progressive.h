@@ -38,6 +38,8 @@ struct fct_progressive {
 
     /* Per step; step_nodes and step_faces have one more entry. */
     uint32_t *step_nodes, *step_faces; /* the first node and face of each step */
+    bool *walls; /* the step adds an inner wall (pairs/join.h) without a new point. A caller does not get the
+                    level   after it, which has the wall but not what closed it */
     float *errors; /* of the level after the step: the largest of a contraction that it has */
     /* Per node; first_corners has one more entry. */
     uint32_t *parents; /* FCT_NONE: the point is new */

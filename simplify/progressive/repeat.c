@@ -235,26 +235,30 @@ static fct_result replace_nodes(fct_builder *b, const fct_record *r) {
     return FCT_OK;
 }
 
-static void end_step(fct_builder *b, float error) {
+static void end_step(fct_builder *b, float error, bool wall) {
     float before = b->step_count ? b->steps[b->step_count - 1].error : 0;
     b->steps[b->step_count++] =
-        (fct_ended_step){b->ended_count, b->removed_count, error > before ? error : before};
+        (fct_ended_step){b->ended_count, b->removed_count, error > before ? error : before, wall};
 }
 
 fct_result fct_builder_repeat_wall(fct_builder *b, const fct_record *r, bool continues) {
     static const fct_record apart = {.kept = FCT_NONE, .gone = FCT_NONE};
     uint32_t first_removed = b->removed_count;
+    bool wall = !continues || b->steps[b->step_count - 1].wall;
     b->ring_count = 0;
     for (int i = 0; i < 2; ++i) {
         uint32_t f = i ? r->gone : r->kept;
         if (f == FCT_NONE) continue;
         b->dead[f] = true;
         b->removed[b->removed_count++] = f;
-        for (uint32_t k = 3 * f; k < 3 * f + 3; ++k) --b->uses[b->handles[k]], --b->faces[b->points[k]];
+        for (uint32_t k = 3 * f; k < 3 * f + 3; ++k) {
+            --b->uses[b->handles[k]];
+            wall &= --b->faces[b->points[k]] > 0;
+        }
     }
     fct_result result = end_apexes(b, &apart, first_removed);
     if (continues) --b->step_count;
-    end_step(b, r->error);
+    end_step(b, r->error, wall);
     return result;
 }
 
@@ -270,6 +274,6 @@ fct_result fct_builder_repeat(fct_builder *b, const fct_record *r) {
     fct_result result = replace_nodes(b, r);
     if (result == FCT_OK) result = end_apexes(b, r, first_removed);
     join_rings(b, r);
-    end_step(b, r->error);
+    end_step(b, r->error, false);
     return result;
 }

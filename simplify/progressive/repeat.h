@@ -15,6 +15,7 @@ typedef struct fct_ended_node {
 typedef struct fct_ended_step {
     uint32_t nodes, faces; /* the number of ended nodes and faces after this contraction */
     float error;
+    bool wall; /* no contraction: an inner wall ends, and no point loses its last face */
 } fct_ended_step;
 
 typedef struct fct_builder {

@@ -258,9 +258,11 @@ fct_result fct_splits_step(fct_splits *k) {
     uint32_t step = k->step, count = k->names ? m->step_faces[step + 1] - m->step_faces[step] : 0;
     if (!k->names && (!GROW(k, m->step_nodes, k->room.step_nodes, (size_t)step + 2) ||
                       !GROW(k, m->step_faces, k->room.step_faces, (size_t)step + 2) ||
+                      !GROW(k, m->walls, k->room.walls, (size_t)step + 1) ||
                       !GROW(k, m->errors, k->room.errors, (size_t)step + 1)))
         return k->result;
     if (!k->names) m->step_nodes[0] = m->step_faces[0] = 0;
+    uint32_t points = k->point_count;
     code_split(k, step);
     uint32_t first = k->names ? m->step_faces[step] : m->face_count;
     if (k->result == FCT_OK) count = fct_code_number(&k->coder, &k->models.faces, count);
@@ -270,6 +272,7 @@ fct_result fct_splits_step(fct_splits *k) {
     if (fct_splits_stopped(k)) return k->result;
     ++k->step;
     if (k->names) return FCT_OK;
+    m->walls[step] = step > 0 && k->split == FCT_NONE && k->point_count == points;
     m->step_count = m->level = step + 1;
     m->step_nodes[step + 1] = m->node_count, m->step_faces[step + 1] = m->face_count;
     m->first_corners[m->node_count] = m->corner_count;

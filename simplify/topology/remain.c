@@ -11,6 +11,8 @@
  */
 #include "simplify/topology/remain.h"
 
+#include "simplify/cost/constraint.h"
+
 #include "simplify/topology/ring.h"
 
 /* Cosine of the largest angle by which the normal of a face may turn in one contraction: 84 degrees. */
@@ -157,10 +159,19 @@ static bool become_equal(const fct_simplifier *s, const fct_remaining *i, const 
            s->triangles[i->corner] != s->triangles[j->corner];
 }
 
+/* Whether equal faces become an inner wall that vanishes (pairs/join.h). Hubs have none. */
+static bool close_wall(const fct_simplifier *s, const fct_move *move, const fct_remaining *i,
+                       const fct_remaining *j) {
+    if (!s->next_pairs || move->b == FCT_NONE || move->count_a == 0 || i->x != j->y) return false;
+    uint8_t solid = find_solid(s, i->corner);
+    return solid != SOLID_NONE && solid == find_solid(s, j->corner) && !point_is_locked(s, i->x) &&
+           !point_is_locked(s, i->y) && !point_is_locked(s, move->a) && !point_is_locked(s, move->b);
+}
+
 /* Whether i and j may be the two faces of the edge from the moved point to x. */
 static bool may_share_edge(const fct_simplifier *s, const fct_move *move, uint32_t x, const fct_remaining *i,
                            const fct_remaining *j) {
-    if (become_equal(s, i, j)) return false;
+    if (become_equal(s, i, j)) return close_wall(s, move, i, j);
     if (!is_folded(i->normal, i->norm2, j->normal, j->norm2, (i->x == x) == (j->x == x))) return true;
     return is_edge_folded(s, move->a, x) || is_edge_folded(s, move->b, x);
 }
@@ -171,7 +182,7 @@ static bool may_crowd_edge(const fct_simplifier *s, const fct_move *move, uint32
     if (move->b == FCT_NONE) return true;
     if (count_faces(s, move->a, x) < 3 && count_faces(s, move->b, x) < 3) return false;
     for (const fct_remaining *j = s->remaining; j < i; ++j)
-        if (become_equal(s, i, j)) return false;
+        if (become_equal(s, i, j)) return close_wall(s, move, i, j);
     return true;
 }
 

@@ -603,6 +603,24 @@ static void every_thread_count_gives_the_same_bits(void **state) {
     }
 }
 
+/* Two boxes side by side, whose common side is cut along other diagonals: contractions of edges make its
+ * faces equal, and they vanish as an inner wall. */
+static void walls_of_other_diagonals_vanish(void **state) {
+    (void)state;
+    fct_mesh mesh = make_row(&env, 2, 0, 6, 0), out;
+    for (uint32_t v = mesh.vertex_count / 2; v < mesh.vertex_count; ++v)
+        mesh.positions[3 * v + 1] = 1 - mesh.positions[3 * v + 1];
+    for (uint32_t f = mesh.face_count / 2; f < mesh.face_count; ++f) {
+        uint32_t kept = mesh.triangles[3 * f];
+        mesh.triangles[3 * f] = mesh.triangles[3 * f + 1], mesh.triangles[3 * f + 1] = kept;
+    }
+    out = simplified(&env, &mesh, (fct_simplify_def[1]){with_pairs(1e-6, 12)}, NULL);
+    assert_int_equal(out.face_count, 12);
+    assert_int_equal(count_bodies(&out), 1);
+    fct_mesh_release(&env, &out);
+    fct_mesh_release(&env, &mesh);
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
@@ -622,6 +640,7 @@ int main(void) {
         cmocka_unit_test(locked_points_make_no_pairs),
         cmocka_unit_test(options_are_checked),
         cmocka_unit_test(a_hundred_cubes_become_a_box),
+        cmocka_unit_test(walls_of_other_diagonals_vanish),
         cmocka_unit_test(every_thread_count_gives_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

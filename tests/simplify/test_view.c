@@ -264,11 +264,41 @@ static void bad_views_are_refused(void **state) {
     env.message = NULL;
 }
 
+/* A body with seams that appears in one split, from a file: the view without tolerance has all of it. */
+static void files_keep_bodies_with_seams(void **state) {
+    (void)state;
+    static const float positions[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    static const uint32_t triangles[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, 4, 4, FCT_MESH_TEXCOORDS, &mesh), FCT_OK);
+    memcpy(mesh.positions, positions, sizeof positions);
+    memcpy(mesh.triangles, triangles, sizeof triangles);
+    for (uint32_t i = 0; i < 24; ++i) mesh.texcoords[i] = .04f * (float)i;
+    fct_progressive *made = progressive_of(&env, &mesh, fct_simplify_def_default(), 0), *read;
+    char *bytes = NULL;
+    size_t size;
+    FILE *stream = open_memstream(&bytes, &size);
+    assert_int_equal(fct_progressive_write(made, stream), FCT_OK);
+    fclose(stream);
+    assert_int_equal(fct_progressive_read(&env, "a file", (unsigned char *)bytes, size, &read), FCT_OK);
+    fct_view view = fct_view_default();
+    view.position[2] = 5, view.tolerance = view.silhouette_tolerance = 0;
+    fct_mesh seen = view_mesh(read, &view, NULL);
+    assert_int_equal(seen.face_count, 4);
+    fct_mesh_release(&env, &seen);
+    fct_mesh_release(&env, &mesh);
+    free(bytes);
+    fct_progressive_destroy(made);
+    fct_progressive_destroy(read);
+}
+
 int main(void) {
     env = fct_env_default();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cuts_are_legal_and_least), cmocka_unit_test(limits_are_the_ends),
-        cmocka_unit_test(views_do_not_depend_on_the_way), cmocka_unit_test(bodies_appear),
-        cmocka_unit_test(bad_views_are_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(files_keep_bodies_with_seams),
+                                       cmocka_unit_test(cuts_are_legal_and_least),
+                                       cmocka_unit_test(limits_are_the_ends),
+                                       cmocka_unit_test(views_do_not_depend_on_the_way),
+                                       cmocka_unit_test(bodies_appear),
+                                       cmocka_unit_test(bad_views_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
