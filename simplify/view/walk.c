@@ -56,7 +56,14 @@ static fct_result add_to_ring(fct_walk *w, uint32_t c) {
     return result;
 }
 
-/* All corners of a handle change if a node of the step takes it over, else those that move. */
+static bool is_same_node(const fct_progressive *m, size_t a, size_t b) {
+    size_t n = m->value_count;
+    return !memcmp(m->positions + 3 * a, m->positions + 3 * b, 3 * sizeof *m->positions) &&
+           (n == 0 || !memcmp(m->values + n * a, m->values + n * b, n * sizeof *m->values));
+}
+
+/* All corners of a handle change if another node of the step takes it over, else those that move. A hub,
+ * which does not move, keeps its node's values, so that its fan is not read for each of its neighbours. */
 fct_result fct_walk_find_ring(fct_walk *w) {
     const fct_progressive *m = w->m;
     fct_result result = FCT_OK;
@@ -66,7 +73,7 @@ fct_result fct_walk_find_ring(fct_walk *w) {
         uint32_t parent = m->parents[n];
         for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1] && result == FCT_OK; ++i)
             result = add_to_ring(w, m->corners[i]);
-        if (parent == FCT_NONE || m->handles[parent] != m->handles[n]) continue;
+        if (parent == FCT_NONE || m->handles[parent] != m->handles[n] || is_same_node(m, parent, n)) continue;
         for (uint32_t c = w->first[m->handles[n]]; c != FCT_NONE && result == FCT_OK; c = w->next[c])
             result = add_to_ring(w, c);
     }
