@@ -225,7 +225,8 @@ static void sheets_that_slide(void **state) {
             pose.translation[walk % 3] += i % 15 < 10 ? -step : step;
         }
     }
-    assert_true(met > 20 && apart > 20 && changes > 8);
+    assert_true(met > 8 && apart > 8 && changes > 2);
+    assert_true(SANITIZED || (met > 20 && apart > 20 && changes > 8));
     model_release(&env, &a);
     model_release(&env, &b);
 }
