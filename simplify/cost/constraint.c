@@ -107,9 +107,7 @@ static void add_planes(fct_simplifier *s, uint32_t f, const float *strength) {
         v3 side = v3_sub(p[(k + 1) % 3], p[k]), across = v3_unit(v3_cross(normal, side));
         double length = v3_norm(side);
         for (int end = 0; end < 2; ++end) {
-            uint32_t held_by = s->constraint_of[s->triangles[end ? next : c]];
-            if (held_by == FCT_NONE) continue; /* in a damaged state */
-            double *planes = s->constraints[held_by].planes;
+            double *planes = s->constraints[s->constraint_of[s->triangles[end ? next : c]]].planes;
             quadric_add_plane(planes, across, p[k], held * length);
             planes[10] += length;
         }

@@ -1,11 +1,12 @@
 /* simplify/handle/live.c: see live.h. Cost: linear in the points, wedges and corners of the input. */
 #include "simplify/handle/live.h"
 
+#include "simplify/handle/wish.h"
+
 /* Larger coordinates in the unit cube are damage, because no contraction leads so far away. */
 #define MOST_COORDINATE 1e6
 /* Larger coefficients are damage. */
-#define MOST_NUMBER  1e60
-#define MOST_CONTOUR 1e12 /* the largest weight of a contour */
+#define MOST_NUMBER 1e60
 
 typedef struct live_head {
     uint32_t root_count, live_faces, edge_count, wedge_count; /* wedges in the lists of the roots */
@@ -359,11 +360,6 @@ static const char *read_constraints(reader *r) {
                : "a line is far away";
 }
 
-/* A weight of the paint, as fct_simplifier_paint accepts it. */
-static bool is_paint(float weight) {
-    return weight >= 1e-6f && weight <= 1e6f;
-}
-
 static const char *read_paint(reader *r) {
     const fct_simplifier *s = r->s;
     float *paint = r->room.paint, *weights = r->room.weights;
@@ -401,12 +397,29 @@ static const char *read_wishes(reader *r) {
         uint32_t second = mark->points[1] == FCT_NONE ? 0 : mark->points[1];
         if (mark->points[0] >= r->s->point_count || second >= r->s->point_count)
             return "a constraint has no point";
-        double most = mark->points[1] == FCT_NONE ? MOST_NUMBER : MOST_CONTOUR;
+        double most = mark->points[1] == FCT_NONE ? MOST_NUMBER : WISH_MOST_WEIGHT;
         if (!(mark->weight > 0 && mark->weight <= most) || !are_numbers(mark->at, 3, MOST_COORDINATE))
             return "a constraint is no number";
     }
     const char *fault = read_paint(r);
     return fault ? fault : read_pins(r);
+}
+
+/* Before the first run nothing is contracted, and the edges of sides are those between their points: the
+ * constraints may be made again (mark.c). */
+static const char *check_beginning(const reader *r) {
+    const fct_simplifier *s = r->s;
+    if (r->head.flags & PRICED) return NULL;
+    if (r->head.root_count != s->point_count || r->head.live_faces != s->face_count)
+        return "contractions before the first run";
+    for (uint32_t c = 0; c < 3 * s->mesh->face_count; ++c) {
+        if (corner_dead(s, c)) continue;
+        const uint32_t *ends = s->edges[s->side_edges[c]].ends, a = s->triangles[c],
+                       b = s->triangles[corner_next(c)];
+        if (!(ends[0] == a && ends[1] == b) && !(ends[0] == b && ends[1] == a))
+            return "a side has the edge of another";
+    }
+    return NULL;
 }
 
 /* Exchanges the arrays of the room with those of the simplifier. */
@@ -441,6 +454,7 @@ static const char *read_all(reader *r) {
         if (is_root(s, p)) fault = read_point(r, p);
     if (!fault) fault = check_faces(r);
     if (!fault) fault = read_edges(r);
+    if (!fault) fault = check_beginning(r);
     if (!fault) fault = read_constraints(r);
     if (!fault) fault = read_wishes(r);
     if (!fault) exchange_arrays(r);

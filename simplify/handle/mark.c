@@ -9,8 +9,6 @@
 #include "simplify/handle/history.h"
 #include "simplify/handle/wish.h"
 
-#define MOST_WEIGHT 1e12
-
 /* The contours among some marks, sorted by their points. */
 typedef struct contours {
     const fct_mark *marks;
@@ -200,7 +198,7 @@ static fct_result check_def(const fct_simplifier *s, const fct_constrain_def *de
                         def->size, sizeof *def);
     const double weights[2] = {def->contour_weight, def->point_weight};
     for (int i = 0; i < 2; ++i)
-        if (!(weights[i] > 0 && weights[i] <= MOST_WEIGHT))
+        if (!(weights[i] > 0 && weights[i] <= WISH_MOST_WEIGHT))
             return fct_fail(s->env, FCT_ERROR_DATA, "%s is %g, expected above 0 and at most 1e12",
                             i ? "point_weight" : "contour_weight", weights[i]);
     if (def->contour_count > 0 && !(s->own.boundary_weight > 0))

@@ -9,9 +9,6 @@
 #include "simplify/handle/wish.h"
 #include "simplify/output.h"
 
-#define LEAST_WEIGHT 1e-6f
-#define MOST_WEIGHT  1e6f
-
 /* Finds the places in the queue again of the edges whose factor has changed. before: the weights so far, or
  * NULL. */
 static void price_edges(fct_simplifier *s, const float *before) {
@@ -59,7 +56,7 @@ fct_result fct_paint_points(fct_simplifier *s, const float *paint) {
 
 static fct_result check_weights(const fct_simplifier *s, const float *weights, uint32_t count) {
     for (uint32_t v = 0; v < count; ++v)
-        if (!(weights[v] >= LEAST_WEIGHT && weights[v] <= MOST_WEIGHT))
+        if (!is_paint(weights[v]))
             return fct_fail(s->env, FCT_ERROR_DATA, "the weight of vertex %u is %g, expected 1e-6 to 1e6", v,
                             (double)weights[v]);
     return FCT_OK;

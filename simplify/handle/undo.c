@@ -4,8 +4,8 @@
  * 2. Restore the last snapshot before it, and repeat the runs up to it.
  * 3. Repeat this run, but only to the wanted number.
  * 4. Paint and constrain as the caller did since the snapshot.
- * Runs depend on nothing but the state, so each repetition gives the same bits. Cost: at most that of a
- * simplification from twice the wanted number of faces, or from where paint or constraints changed.
+ * Runs depend on nothing but the state, so each repetition gives the same bits. Cost: that of the runs since
+ * the snapshot.
  */
 #include "simplify/handle/handle.h"
 #include "simplify/handle/history.h"

@@ -6,7 +6,8 @@
  * the finest one with all vertices at their ancestors in the cut, so a closed mesh stays closed and seams do
  * not crack;
  * - strictly, also the last steps before it that changed a face that it changes. If all strict needs of a
- * step are done, and theirs, its faces are faces of some level. A cut does this where a face would fold over.
+ * step are done, and theirs, its faces are faces of some level. A cut does this where a face would fold over,
+ * but not for all faces at a hub (walk.h).
  * (Garland 1999, section 7.3; Xia and Varshney, "Dynamic View-Dependent Simplification for Polygonal Models",
  * Visualization 1996, have strict needs everywhere, which refines far more.)
  */

@@ -1,7 +1,6 @@
-/* simplify/view/nearest.h: the face of a ring that is nearest to a point.
- */
-#ifndef FCT_SIMPLIFY_NEAREST_H
-#define FCT_SIMPLIFY_NEAREST_H
+/* simplify/view/nearest.h: the face of a ring that is nearest to a point. */
+#ifndef FCT_SIMPLIFY_VIEW_NEAREST_H
+#define FCT_SIMPLIFY_VIEW_NEAREST_H
 
 #include <stdint.h>
 

@@ -62,19 +62,41 @@ static bool is_same_node(const fct_progressive *m, size_t a, size_t b) {
            (n == 0 || !memcmp(m->values + n * a, m->values + n * b, n * sizeof *m->values));
 }
 
-/* All corners of a handle change if another node of the step takes it over, else those that move. A hub,
- * which does not move, keeps its node's values, so that its fan is not read for each of its neighbours. */
+static bool is_hub(const fct_walk *w, uint32_t handle) {
+    uint32_t count = 0;
+    for (uint32_t c = w->first[handle]; c != FCT_NONE && count <= WALK_HUB; c = w->next[c]) ++count;
+    return count > WALK_HUB;
+}
+
+/* The faces at a hub beside those that the step adds. */
+static fct_result add_hub_faces(fct_walk *w, uint32_t hub) {
+    const fct_progressive *m = w->m;
+    fct_result result = FCT_OK;
+    for (size_t c = 3 * (size_t)m->step_faces[w->step]; c < 3 * (size_t)m->step_faces[w->step + 1]; ++c) {
+        if (w->triangles[c] == hub) continue;
+        for (uint32_t x = w->first[w->triangles[c]]; x != FCT_NONE && result == FCT_OK; x = w->next[x])
+            for (uint32_t k = x - x % 3; k < x - x % 3 + 3 && result == FCT_OK; ++k)
+                if (w->triangles[k] == hub) result = add_to_ring(w, k);
+    }
+    return result;
+}
+
+/* All corners of a handle change if another node of the step takes it over, else those that move. */
 fct_result fct_walk_find_ring(fct_walk *w) {
     const fct_progressive *m = w->m;
     fct_result result = FCT_OK;
     w->ring_count = 0;
     ++w->ring_number;
     for (uint32_t n = m->step_nodes[w->step]; n < m->step_nodes[w->step + 1] && result == FCT_OK; ++n) {
-        uint32_t parent = m->parents[n];
+        uint32_t parent = m->parents[n], handle = m->handles[n];
         for (uint32_t i = m->first_corners[n]; i < m->first_corners[n + 1] && result == FCT_OK; ++i)
             result = add_to_ring(w, m->corners[i]);
-        if (parent == FCT_NONE || m->handles[parent] != m->handles[n] || is_same_node(m, parent, n)) continue;
-        for (uint32_t c = w->first[m->handles[n]]; c != FCT_NONE && result == FCT_OK; c = w->next[c])
+        if (result != FCT_OK || parent == FCT_NONE || m->handles[parent] != handle) continue;
+        if (is_same_node(m, parent, n) && is_hub(w, handle)) {
+            result = add_hub_faces(w, handle);
+            continue;
+        }
+        for (uint32_t c = w->first[handle]; c != FCT_NONE && result == FCT_OK; c = w->next[c])
             result = add_to_ring(w, c);
     }
     return result;

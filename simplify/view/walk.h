@@ -1,12 +1,15 @@
 /* simplify/view/walk.h: walks over the levels of a progressive mesh with the corners at each handle listed.
  */
-#ifndef FCT_SIMPLIFY_WALK_H
-#define FCT_SIMPLIFY_WALK_H
+#ifndef FCT_SIMPLIFY_VIEW_WALK_H
+#define FCT_SIMPLIFY_VIEW_WALK_H
 
 #include "simplify/progressive/progressive.h"
 
+enum { WALK_HUB = 512 /* a point with more corners of a handle is a hub */ };
+
 /* A ring of a step: the corners at the nodes that the step replaces. Each face around the point that splits
- * has one of them. They are the same before and after the split. */
+ * has one of them. They are the same before and after the split. Of a hub that does not change, only the
+ * faces beside those of the step count, so that a fan is not read once per face. */
 typedef struct fct_walk {
     const fct_progressive *m;
     uint32_t step;               /* the steps below are done */

@@ -248,6 +248,47 @@ static void bounds_hold_what_is_below(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* The tip of a cone has all faces, and stays while it is a hub. The largest bound is at least the distance of
+ * the rim from the base mesh. Few steps lose what is below them, so that their error is a diameter. */
+static void errors_at_hubs_are_distances(void **state) {
+    (void)state;
+    enum { RIM = 700 }; /* more than SIMPLIFY_HUB */
+    fct_mesh mesh;
+    assert_int_equal(fct_mesh_create(&env, RIM + 1, RIM, 0, &mesh), FCT_OK);
+    for (uint32_t v = 0; v < RIM; ++v) {
+        double angle = 2 * 3.14159265358979 * v / RIM;
+        v3_store(mesh.positions + 3 * v, (v3){cos(angle), sin(angle), 0});
+        const uint32_t t[3] = {RIM, v, (v + 1) % RIM};
+        memcpy(mesh.triangles + 3 * v, t, sizeof t);
+    }
+    v3_store(mesh.positions + (size_t)3 * RIM, (v3){0, 0, 1});
+    fct_simplify_def def = fct_simplify_def_default();
+    def.boundary_weight = def.regularization = 0;
+    fct_progressive *m = progressive_of(&env, &mesh, def, 10);
+    fct_view view = fct_view_default();
+    fct_mesh out = view_mesh(m, &view, NULL), base = level_mesh(m, 0);
+    double bound = 0, distance = 0;
+    uint32_t lost = 0;
+    for (uint32_t s = 1; s < m->step_count; ++s) {
+        const fct_bound *b = &m->hierarchy->bounds[s];
+        bound = fmax(bound, (double)b->error);
+        lost += b->error > 1.9f * b->radius;
+    }
+    for (uint32_t v = 0; v < RIM; ++v) {
+        double least = INFINITY;
+        for (uint32_t f = 0; f < base.face_count; ++f) {
+            v3 t[3];
+            for (int k = 0; k < 3; ++k) t[k] = vertex(&base, base.triangles[3 * f + (uint32_t)k]);
+            least = fmin(least, search_face(vertex(&mesh, v), t));
+        }
+        distance = fmax(distance, least);
+    }
+    assert_true(bound > .99 * distance && bound < 1.5 && lost < 4);
+    fct_mesh *meshes[] = {&out, &base, &mesh};
+    for (int k = 0; k < 3; ++k) fct_mesh_release(&env, meshes[k]);
+    fct_progressive_destroy(m);
+}
+
 /* Where a sheet ends, its edge is a silhouette from everywhere. */
 static void open_boundaries_have_all_normals(void **state) {
     (void)state;
@@ -350,6 +391,7 @@ int main(void) {
                                        cmocka_unit_test(sides_are_those_of_all_normals),
                                        cmocka_unit_test(errors_are_those_of_repeated_contractions),
                                        cmocka_unit_test(bounds_hold_what_is_below),
+                                       cmocka_unit_test(errors_at_hubs_are_distances),
                                        cmocka_unit_test(open_boundaries_have_all_normals),
                                        cmocka_unit_test(the_screen_shows_at_most_the_tolerance),
                                        cmocka_unit_test(colours_are_refined)};

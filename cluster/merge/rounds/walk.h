@@ -3,8 +3,8 @@
  * A walk only puts the entries that it selects into a queue, without branches on their contents, because
  * those branches are unpredictable. The work on the entries follows when the queue is full.
  */
-#ifndef FCT_CLUSTER_WALK_H
-#define FCT_CLUSTER_WALK_H
+#ifndef FCT_CLUSTER_ROUNDS_WALK_H
+#define FCT_CLUSTER_ROUNDS_WALK_H
 
 #include "base/math/simd.h"
 #include "cluster/merge/rounds/round.h"
