@@ -104,7 +104,7 @@ void fct_log_end(fct_simplifier *s, double error) {
     ++log->count;
 }
 
-/* The points of the faces get the key, because a later contraction there changes what is left of them. */
+/* The points of the faces get the key, so that later contractions of these points come after the wall. */
 void fct_log_wall(fct_simplifier *s, uint32_t first, uint32_t second) {
     fct_log *log = s->log;
     const fct_record *last = &log->records[log->count - 1];

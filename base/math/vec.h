@@ -3,6 +3,7 @@
 #define FCT_BASE_VEC_H
 
 #include <math.h>
+#include <stdbool.h>
 
 /* The lesser and the greater number; b if either is NaN. Unlike fmin and fmax, each is one instruction. */
 static inline double fct_min(double a, double b) {
@@ -70,6 +71,17 @@ static inline double sym3_form(const double m[6], v3 x, v3 y) {
 static inline v3 sym3_apply(const double m[6], v3 x) {
     return (v3){m[0] * x.x + m[1] * x.y + m[2] * x.z, m[1] * x.x + m[3] * x.y + m[4] * x.z,
                 m[2] * x.x + m[4] * x.y + m[5] * x.z};
+}
+/* x with (M + ridge I) x = v, by Cramer's rule; false unless the determinant is above 0. */
+static inline bool sym3_solve(const double m[6], double ridge, v3 v, v3 *x) {
+    double xx = m[0] + ridge, yy = m[3] + ridge, zz = m[5] + ridge, xy = m[1], xz = m[2], yz = m[4];
+    double a = yy * zz - yz * yz, b = xz * yz - xy * zz, c = xy * yz - xz * yy;
+    double d = xx * zz - xz * xz, e = xy * xz - xx * yz, f = xx * yy - xy * xy;
+    double determinant = xx * a + xy * b + xz * c;
+    if (!(determinant > 0)) return false;
+    *x = (v3){(a * v.x + b * v.y + c * v.z) / determinant, (b * v.x + d * v.y + e * v.z) / determinant,
+              (c * v.x + e * v.y + f * v.z) / determinant};
+    return true;
 }
 /* m += s x x^T */
 static inline void sym3_add_outer(double m[6], double s, v3 x) {

@@ -400,7 +400,7 @@ static void measure_rays(subject *s) {
     measure_row(s, "all hits", BENCH_ALL_HITS, count / 8, rays);
     bench_except *except = bench_allocate(count, sizeof *except);
     bench_incoherent_rays(s->bvh, count, rays);
-    for (size_t i = 0; i < count; ++i) { /* what lies behind the face that is hit */
+    for (size_t i = 0; i < count; ++i) { /* the face that each ray hits first */
         fct_hit hit;
         except[i] = (bench_except){rays[i], FCT_NONE};
         if (fct_bvh_closest_hit(s->bvh, rays + i, &hit, NULL)) except[i].face = hit.face;

@@ -14,24 +14,11 @@
  * the other pairs of the same wall, are contracted. */
 enum { WAIT = 16 };
 
-/* (A + ridge I)^-1 v by Cramer's rule; false if the matrix is 0. */
-static bool solve(const double *q, double ridge, v3 v, v3 *out) {
-    double xx = q[0] + ridge, yy = q[3] + ridge, zz = q[5] + ridge, xy = q[1], xz = q[2], yz = q[4];
-    double a = yy * zz - yz * yz, b = xz * yz - xy * zz, c = xy * yz - xz * yy;
-    double d = xx * zz - xz * xz, e = xy * xz - xx * yz, f = xx * yy - xy * xy;
-    double determinant = xx * a + xy * b + xz * c;
-    if (!(determinant > 0)) return false;
-    *out =
-        v3_scale((v3){a * v.x + b * v.y + c * v.z, b * v.x + d * v.y + e * v.z, c * v.x + e * v.y + f * v.z},
-                 1 / determinant);
-    return true;
-}
-
 void fct_simplify_release_plane(double *q, const double *whole, v3 n, double weight) {
     double ridge = RIDGE * quadric_trace(whole);
     v3 away, minimum;
-    if (!solve(whole, ridge, n, &away) ||
-        !solve(whole, ridge, (v3){-whole[6], -whole[7], -whole[8]}, &minimum))
+    if (!sym3_solve(whole, ridge, n, &away) ||
+        !sym3_solve(whole, ridge, (v3){-whole[6], -whole[7], -whole[8]}, &minimum))
         return;
     double most = 1 / v3_dot(n, away) - ridge;
     weight = fct_min(weight, most);

@@ -8,9 +8,10 @@
 
 #include "simplify/state.h"
 
-/* Takes weight times the squared distance from a plane with the unit normal n out of the quadric q of a
- * position, or less: what is left is nowhere negative. The plane goes through the minimum of q, so that the
- * minimum stays. `whole`: as q, or, if q is part of one with attributes, q with the attributes eliminated. */
+/* Subtracts weight times the squared distance from a plane with the unit normal n from the quadric q of a
+ * position. It subtracts less where the rest would become negative somewhere. The plane goes through the
+ * minimum of q, so that the minimum stays. `whole`: as q, or, if q is part of one with attributes, q with the
+ * attributes eliminated. */
 void fct_simplify_release_plane(double *q, const double *whole, v3 n, double weight);
 /* Takes the planes of a face that is about to vanish out of the quadrics of its corners. */
 void fct_simplify_release_face(fct_simplifier *s, uint32_t f);

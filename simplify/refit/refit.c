@@ -121,17 +121,12 @@ static void add_sample(fct_refit *r, size_t sample) {
     if (at->attributes) add_attribute_residual(r, sample, b);
 }
 
-/* Solves (A + DAMPING trace(A) I) d = g by Cramer's rule. The damping keeps the determinant away from 0. */
+/* Solves (A + DAMPING trace(A) I) d = g. The damping keeps the determinant away from 0. */
 static v3 solve_damped(const fct_system *system) {
     const double *q = system->matrix, *g = system->side;
-    double ridge = DAMPING * (q[0] + q[3] + q[5]);
-    double xx = q[0] + ridge, yy = q[3] + ridge, zz = q[5] + ridge, xy = q[1], xz = q[2], yz = q[4];
-    double a = yy * zz - yz * yz, b = xz * yz - xy * zz, c = xy * yz - xz * yy;
-    double det = xx * a + xy * b + xz * c;
-    if (!(det > 0)) return (v3){0, 0, 0};
-    double d = xx * zz - xz * xz, e = xy * xz - xx * yz, f = xx * yy - xy * xy;
-    return (v3){(a * g[0] + b * g[1] + c * g[2]) / det, (b * g[0] + d * g[1] + e * g[2]) / det,
-                (c * g[0] + e * g[1] + f * g[2]) / det};
+    v3 step = {0, 0, 0};
+    sym3_solve(q, DAMPING * (q[0] + q[3] + q[5]), (v3){g[0], g[1], g[2]}, &step);
+    return step;
 }
 
 /* Adds the planes that hold a point. */

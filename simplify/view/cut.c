@@ -1,7 +1,7 @@
 /* simplify/view/cut.c: see cut.h.
  *
- * 1. From the root of the tree on, mark the children that the view wants. What is below an unwanted step is
- *    inside its bound, so it is not wanted.
+ * 1. From the root of the tree down, mark the steps that the view wants. If it does not want a step, it wants
+ *    none below it, because their bounds are inside.
  * 2. Mark what marked steps need.
  * 3. Split and contract. Mark what faces need that fold over, and repeat until none does.
  */

@@ -329,7 +329,7 @@ static void the_screen_shows_at_most_the_tolerance(void **state) {
         fct_mesh out = view_mesh(m, &view, &stats);
         screen seen = measure_screen(&env, &finest, &out, &view);
         assert_true(seen.front <= 1.01 && seen.silhouette <= 1.01 &&
-                    seen.distance <= 1.01 * stats.error + 1e-6);
+                    seen.distance <= 1.03 * stats.error + 1e-6);
         assert_true(stats.pixels <= view.tolerance);
         most = fmax(most, seen.front);
         fct_mesh_release(&env, &out);
