@@ -56,6 +56,13 @@ fct_result fct_simplify_check(const fct_env *env, const fct_mesh *mesh, const fc
         return fct_fail(env, FCT_ERROR_DATA,
                         "pair_distance is %g with keep_topology, expected one of them: pairs join bodies",
                         def->pair_distance);
+    if ((unsigned)def->primitive > FCT_PRIMITIVE_FACE)
+        return fct_fail(env, FCT_ERROR_DATA, "primitive is %d, expected a fct_primitive",
+                        (int)def->primitive);
+    if (def->pair_distance > 0 && def->primitive == FCT_PRIMITIVE_FACE)
+        return fct_fail(env, FCT_ERROR_DATA,
+                        "pair_distance is %g with contractions of faces, expected one of them",
+                        def->pair_distance);
     if ((unsigned)def->placement > FCT_PLACE_SUBSET)
         return fct_fail(env, FCT_ERROR_DATA, "placement is %d, expected a fct_placement",
                         (int)def->placement);

@@ -46,7 +46,8 @@ enum {
     KEY_SAVE_STATE,
     KEY_CONTOUR,
     KEY_PAINT,
-    KEY_PAIRS
+    KEY_PAIRS,
+    KEY_PRIMITIVE
 };
 
 static const struct argp_option simplify_options_table[] = {
@@ -69,6 +70,10 @@ static const struct argp_option simplify_options_table[] = {
      "Also contract pairs of points of different bodies that are at most TAU apart, so that near bodies "
      "join; in the mesh's unit (default 0: edges only). Not with --keep-topology, --save-state, --resume, "
      "--contour or --paint",
+     0},
+    {"primitive", KEY_PRIMITIVE, "WHAT", 0,
+     "Contract edges (edge, default) or faces (face: all three corners become one vertex; half as many "
+     "steps, larger errors). face not with --pairs",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "
@@ -154,8 +159,8 @@ static error_t parse_levels(simplify_options *o, char *list, struct argp_state *
 
 /* Notes options that a state has of its own. */
 static void note_shaping(simplify_options *o, int key) {
-    static const int keys[] = {KEY_ATTRIBUTES, KEY_PLACEMENT,   KEY_WEIGHTS,  KEY_BOUNDARY, KEY_FEATURE,
-                               KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT};
+    static const int keys[] = {KEY_ATTRIBUTES, KEY_PRIMITIVE,  KEY_PLACEMENT,   KEY_WEIGHTS,  KEY_BOUNDARY,
+                               KEY_FEATURE,    KEY_REGULARIZE, KEY_LOCK_BORDER, KEY_TOPOLOGY, KEY_REFIT};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i)
         for (const struct argp_option *option = simplify_options_table; keys[i] == key && option->name;
              ++option)
@@ -170,6 +175,8 @@ static error_t check_options(const simplify_options *o, struct argp_state *state
     if (o->progressive && (o->resume || o->save_state || o->contour || o->paint))
         return tool_usage(state,
                           "--progressive: expected neither --resume, --save-state, --contour nor --paint");
+    if (o->def.pair_distance > 0 && o->def.primitive == FCT_PRIMITIVE_FACE)
+        return tool_usage(state, "expected either --pairs or --primitive face, found both");
     if (o->def.pair_distance > 0 && o->def.keep_topology)
         return tool_usage(state, "expected either --pairs or --keep-topology, found both");
     if (o->def.pair_distance > 0 && (o->resume || o->save_state || o->contour || o->paint))
@@ -180,6 +187,7 @@ static error_t check_options(const simplify_options *o, struct argp_state *state
 
 static error_t parse_simplify(int key, char *text, struct argp_state *state) {
     static const char *const placements[] = {"optimal", "segment", "ends", "subset", NULL};
+    static const char *const primitives[] = {"edge", "face", NULL};             /* in the order of the enum */
     static const char *const weightings[] = {"area", "angle", "uniform", NULL}; /* in the order of the enum */
     static const fct_placement values[] = {FCT_PLACE_OPTIMAL, FCT_PLACE_SEGMENT, FCT_PLACE_ENDS,
                                            FCT_PLACE_SUBSET};
@@ -198,6 +206,10 @@ static error_t parse_simplify(int key, char *text, struct argp_state *state) {
         return tool_parse_real(state, "--max-error", text, 0, INFINITY, &o->def.max_error);
     case KEY_ATTRIBUTES:
         return parse_attributes(o, text, state);
+    case KEY_PRIMITIVE:
+        error = tool_parse_choice(state, "--primitive", text, primitives, &index);
+        o->def.primitive = (fct_primitive)index;
+        return error;
     case KEY_PLACEMENT:
         error = tool_parse_choice(state, "--placement", text, placements, &index);
         o->def.placement = values[index];

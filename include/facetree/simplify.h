@@ -21,6 +21,17 @@ typedef enum fct_placement {
     FCT_PLACE_SUBSET   /* the better of both ends, with its attributes */
 } fct_placement;
 
+/* What one step of the simplifier contracts to a point. */
+typedef enum fct_primitive {
+    FCT_PRIMITIVE_EDGE, /* the ends of an edge */
+    /* The corners of a face (Garland 1999, section 3.8): the cheapest edge of the face that can be
+     * contracted, and then the edge to the third corner, at the best position for all three. If the second
+     * edge cannot be contracted, or costs more than four times what the face seemed to cost, the first
+     * contraction stays. When no face is left that can be contracted, edges are. Steps are half as many, and
+     * errors larger: it is here for comparison. Not together with pair_distance. */
+    FCT_PRIMITIVE_FACE
+} fct_primitive;
+
 /* How much a face weighs in the quadric of a corner (Garland 1999, section 3.4.1). ANGLE and UNIFORM are
  * scaled so that all weights add up to the area. They depend on the tessellation, AREA does not. */
 typedef enum fct_weighting {
@@ -63,6 +74,7 @@ typedef struct fct_simplify_def {
      * two closed bodies that stand on each other, an inner wall, vanish, and of two equal faces that look the
      * same way one does. Not together with keep_topology. */
     double pair_distance;
+    fct_primitive primitive; /* default EDGE */
     fct_placement placement; /* default OPTIMAL */
     fct_weighting weighting; /* default AREA */
     double color_weight;     /* default FCT_WEIGHT_AUTO */

@@ -81,7 +81,7 @@ static double weigh_lost(const fct_candidate *candidate, fct_loss *loss) {
         double distance2 = loss->distance2[k];
         v3 away = v3_sub(loss->lost[k], loss->nearest[k]);
         bool noise = distance2 <= LOSS_NOISE * LOSS_NOISE;
-        double resistance = noise ? INFINITY : sym3_form(candidate->resistance, away, away) / distance2;
+        double resistance = noise ? INFINITY : sym3_form(candidate->quadric, away, away) / distance2;
         loss->weights[k] *= resistance < candidate->area ? 1 - resistance / candidate->area : 0;
         cost += loss->weights[k] * distance2;
     }

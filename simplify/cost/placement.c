@@ -11,9 +11,6 @@
 
 #include "simplify/cost/constraint.h"
 
-/* The largest distance of a minimiser from the edge's midpoint, in lengths of the edge. */
-#define MAX_REACH 2.0
-
 /* The smallest ridge of the attributes, relative to trace plus area: it only keeps the pivots above 0. */
 #define LEAST_RIDGE 1e-12
 
@@ -43,19 +40,6 @@ void fct_place_attributes(const fct_simplifier *s, const fct_groups *groups, uin
     fct_quadric_attributes(&e, s->steering, candidate->at, attributes);
     for (uint32_t k = 0; k < s->steering; ++k)
         attributes[k] = fct_min(fct_max(attributes[k], s->channels[k].lower), s->channels[k].upper);
-}
-
-/* delta = -(A + ridge I)^-1 g by an L D L^T decomposition; false if a pivot is not positive. */
-static inline bool solve_position(const double *r, double ridge, v3 g, v3 *delta) {
-    double d0 = r[0] + ridge, i0 = 1 / d0;
-    double l1 = r[1] * i0, l2 = r[2] * i0;
-    double d1 = r[3] + ridge - l1 * r[1], i1 = 1 / d1, k = r[4] - l1 * r[2];
-    double l3 = k * i1, d2 = r[5] + ridge - l2 * r[2] - l3 * k;
-    if (!(d0 > 0 && d1 > 0 && d2 > 0)) return false;
-    double y = g.y - l1 * g.x, z = (g.z - l2 * g.x - l3 * y) / d2;
-    y = y * i1 - l3 * z;
-    *delta = (v3){-(g.x * i0 - l1 * y - l2 * z), -y, -z};
-    return true;
 }
 
 static void try_point(const double *r, v3 at, uint32_t end, fct_candidate *best) {
@@ -92,8 +76,8 @@ static void place_by_policy(const fct_simplifier *s, const double *r, v3 a, v3 b
     if (policy == FCT_PLACE_OPTIMAL) {
         v3 middle = v3_scale(v3_add(a, b), .5), delta;
         v3 g = quadric_gradient(r, middle);
-        if (solve_position(r, ridge, g, &delta) &&
-            v3_norm2(delta) <= MAX_REACH * MAX_REACH * v3_norm2(v3_sub(b, a))) {
+        if (quadric_solve(r, ridge, g, &delta) &&
+            v3_norm2(delta) <= PLACE_REACH * PLACE_REACH * v3_norm2(v3_sub(b, a))) {
             *out = (fct_candidate){.at = v3_add(middle, delta), .end = 2};
             out->error = quadric_at(r, out->at);
             return;
@@ -112,7 +96,7 @@ static void place_on_line(const fct_simplifier *s, const double *r, const fct_jo
     double curvature = sym3_form(r, d, d) + s->def->regularization * quadric_trace(r);
     double t = curvature > 0 ? -v3_dot(d, quadric_gradient(r, from)) / curvature : 0;
     v3 at = v3_mad(from, t, d);
-    bool near = v3_norm2(v3_sub(at, middle)) <= MAX_REACH * MAX_REACH * v3_norm2(v3_sub(b, a));
+    bool near = v3_norm2(v3_sub(at, middle)) <= PLACE_REACH * PLACE_REACH * v3_norm2(v3_sub(b, a));
     if (s->def->placement == FCT_PLACE_OPTIMAL && !ends_only && near)
         *out = (fct_candidate){.at = at, .end = 2, .error = quadric_at(r, at)};
     else if (!joint->ends[1] || (joint->ends[0] && quadric_at(r, a) <= quadric_at(r, b)))
@@ -182,13 +166,13 @@ static bool sum_position_quadric(fct_simplifier *s, uint32_t a, uint32_t b, doub
  * of 3.5 fails. */
 static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_point *b,
                          fct_candidate *out) {
-    double r[POSITION_QUADRIC];
+    double *r = out->quadric;
     for (int k = 0; k < POSITION_QUADRIC; ++k) r[k] = a->quadric[k] + b->quadric[k];
     v3 middle = v3_scale(v3_add(a->at, b->at), .5), g = quadric_gradient(r, middle), delta;
     double ridge = s->def->regularization * quadric_trace(r), length2 = v3_norm2(v3_sub(b->at, a->at));
-    if (!solve_position(r, ridge, g, &delta)) return false;
+    if (!quadric_solve(r, ridge, g, &delta)) return false;
     double reach2 = v3_norm2(delta);
-    if (!(reach2 <= MAX_REACH * MAX_REACH * length2)) return false;
+    if (!(reach2 <= PLACE_REACH * PLACE_REACH * length2)) return false;
     double error = v3_dot(middle, g) + r[6] * middle.x + r[7] * middle.y + r[8] * middle.z + r[9] +
                    v3_dot(g, delta) - ridge * reach2;
     out->at = v3_add(middle, delta);
@@ -197,7 +181,6 @@ static bool place_freely(const fct_simplifier *s, const fct_point *a, const fct_
     out->error = error > 0 ? error : 0;
     out->distance2 = out->error;
     out->area = r[10];
-    memcpy(out->resistance, r, sizeof out->resistance);
     out->key = out->error + ridge * (reach2 + .25 * length2);
     return true;
 }
@@ -250,7 +233,7 @@ bool fct_place(fct_simplifier *s, uint32_t a, uint32_t b, bool ends_only, fct_ca
         out->distance2 += weight / s->def->boundary_weight * quadric_at(joint.held.planes, out->at);
     if (!(out->distance2 > 0)) out->distance2 = 0;
     out->area = r[10];
-    memcpy(out->resistance, r, sizeof out->resistance);
+    memcpy(out->quadric, r, sizeof out->quadric);
     double reach2 = v3_norm2(v3_sub(out->at, pa)) + v3_norm2(v3_sub(out->at, pb));
     out->key = out->error + .5 * s->def->regularization * quadric_trace(r) * reach2;
     return true;

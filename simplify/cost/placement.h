@@ -4,6 +4,9 @@
 
 #include "simplify/cost/groups.h"
 
+/* The largest distance of a minimiser from the edge's midpoint, in lengths of the edge. */
+#define PLACE_REACH 2.0
+
 typedef struct fct_candidate {
     v3 at;
     uint32_t end;     /* 0 or 1 if `at` is that end of the edge, else 2 */
@@ -11,8 +14,8 @@ typedef struct fct_candidate {
     bool locked;      /* the end is locked: its attributes stay */
     double distance2; /* squared distance from the faces and held curves, times `area`, without attributes */
     double area;      /* of the faces that the quadric sums */
-    double resistance[6]; /* A of the position's quadric: xx xy xz yy yz zz */
-    double key;           /* error plus the energy of the regularisation; orders the queue */
+    double quadric[POSITION_QUADRIC]; /* of the position, with the best attributes */
+    double key;                       /* error plus the energy of the regularisation; orders the queue */
 } fct_candidate;
 
 /* The error of the contraction in the unit cube, as fct_simplify_def.max_error measures it. */

@@ -15,6 +15,7 @@
 #ifndef FCT_SIMPLIFY_QUADRIC_H
 #define FCT_SIMPLIFY_QUADRIC_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/math/vec.h"
@@ -43,6 +44,20 @@ static inline v3 quadric_gradient(const double *q, v3 p) {
 static inline double quadric_at(const double *q, v3 p) {
     v3 g = quadric_gradient(q, p);
     return v3_dot(p, g) + q[6] * p.x + q[7] * p.y + q[8] * p.z + q[9];
+}
+
+/* delta = -(A + ridge I)^-1 g for a quadric r, by an L D L^T decomposition; false if a pivot is not positive.
+ */
+static inline bool quadric_solve(const double *r, double ridge, v3 g, v3 *delta) {
+    double d0 = r[0] + ridge, i0 = 1 / d0;
+    double l1 = r[1] * i0, l2 = r[2] * i0;
+    double d1 = r[3] + ridge - l1 * r[1], i1 = 1 / d1, k = r[4] - l1 * r[2];
+    double l3 = k * i1, d2 = r[5] + ridge - l2 * r[2] - l3 * k;
+    if (!(d0 > 0 && d1 > 0 && d2 > 0)) return false;
+    double y = g.y - l1 * g.x, z = (g.z - l2 * g.x - l3 * y) / d2;
+    y = y * i1 - l3 * z;
+    *delta = (v3){-(g.x * i0 - l1 * y - l2 * z), -y, -z};
+    return true;
 }
 
 /* q += weight times the quadric (3.10) of the plane through p with the unit normal n. */

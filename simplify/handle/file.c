@@ -29,7 +29,7 @@ enum {
     HAS_LOCKS = 128,
 };
 
-enum { LOCK_BORDER = 1, KEEP_TOPOLOGY = 2, CHECK_FOLDOVER = 4 };
+enum { LOCK_BORDER = 1, KEEP_TOPOLOGY = 2, CHECK_FOLDOVER = 4, CONTRACT_FACES = 8 };
 
 typedef struct file_head {
     unsigned char magic[8];
@@ -41,7 +41,7 @@ typedef struct file_head {
     double origin[3];
 } file_head;
 _Static_assert(sizeof(file_head) == 144, "no gaps");
-_Static_assert(sizeof(fct_simplify_def) == 104, "the head holds all options but pair_distance, which is 0");
+_Static_assert(sizeof(fct_simplify_def) == 112, "the head holds all options but pair_distance, which is 0");
 
 static const unsigned char magic[8] = {0x89, 'F', 'S', 'T', '\r', '\n', 0x1a, '\n'};
 
@@ -71,7 +71,8 @@ static void fill_options(const fct_simplify_def *def, file_head *head) {
     head->placement = (uint32_t)def->placement, head->weighting = (uint32_t)def->weighting;
     head->refit_passes = def->refit_passes;
     head->switches = (def->lock_border ? LOCK_BORDER : 0) | (def->keep_topology ? KEEP_TOPOLOGY : 0) |
-                     (def->check_foldover ? CHECK_FOLDOVER : 0);
+                     (def->check_foldover ? CHECK_FOLDOVER : 0) |
+                     (def->primitive == FCT_PRIMITIVE_FACE ? CONTRACT_FACES : 0);
     head->max_error = def->max_error;
     head->color_weight = def->color_weight, head->texcoord_weight = def->texcoord_weight;
     head->normal_weight = def->normal_weight, head->boundary_weight = def->boundary_weight;
@@ -153,7 +154,7 @@ static fct_result read_head(reader *r, const unsigned char *data, size_t size) {
         return fail_read(r, "truncated or damaged: wrong checksum");
     r->source = (fct_source){data + sizeof r->head, data + size - sizeof checksum};
     const file_head *h = &r->head;
-    if (h->flags >= 2 * HAS_LOCKS || h->switches > (LOCK_BORDER | KEEP_TOPOLOGY | CHECK_FOLDOVER) ||
+    if (h->flags >= 2 * HAS_LOCKS || h->switches >= 2 * CONTRACT_FACES ||
         h->face_count >= INT32_MAX || h->vertex_count >= INT32_MAX || h->material_count >= INT32_MAX)
         return fail_read(r, "counts or flags out of range");
     bool named = h->flags & HAS_NAMES;
@@ -177,6 +178,7 @@ static fct_simplify_def find_options(const file_head *head) {
     def.refit_passes = head->refit_passes;
     def.lock_border = head->switches & LOCK_BORDER, def.keep_topology = head->switches & KEEP_TOPOLOGY;
     def.check_foldover = head->switches & CHECK_FOLDOVER;
+    def.primitive = head->switches & CONTRACT_FACES ? FCT_PRIMITIVE_FACE : FCT_PRIMITIVE_EDGE;
     return def;
 }
 

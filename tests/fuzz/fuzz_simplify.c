@@ -262,12 +262,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     uint32_t pairs = fuzz_byte(&b);
     if (pairs & 1) def.pair_distance = pairs == 255 ? (double)fuzz_real(&b) : pairs / 16.;
+    def.primitive = pairs >> 1 & 1;
     bool valid = fuzz_check_mesh(&env, &mesh) && def.max_error >= 0 &&
                  (is_weight(def.color_weight) || def.color_weight == FCT_WEIGHT_AUTO) &&
                  is_weight(def.texcoord_weight) && is_weight(def.normal_weight) &&
                  is_weight(def.boundary_weight) && is_weight(def.regularization) &&
                  def.placement <= FCT_PLACE_SUBSET && def.pair_distance >= 0 &&
-                 !(def.pair_distance > 0 && def.keep_topology) && def.feature_threshold >= 0;
+                 !(def.pair_distance > 0 && (def.keep_topology || def.primitive == FCT_PRIMITIVE_FACE)) &&
+                 def.feature_threshold >= 0;
     fct_result result = fct_simplify(&env, &mesh, &def, &out, &stats);
     fuzz_require(result == (valid ? FCT_OK : FCT_ERROR_DATA), "valid input is simplified, and no other");
     fuzz_require(result == FCT_OK || (!out.positions && !out.triangles), "a failure leaves nothing behind");

@@ -62,7 +62,7 @@ static void options_are_kept(void **state) {
     fct_mesh torus = make_torus(&env, 10, true, true), grid = make_grid(&env, 14);
     uint8_t *locks = calloc(torus.vertex_count + grid.vertex_count, 1);
     for (uint32_t v = 0; v < torus.vertex_count; v += 7) locks[v] = 1;
-    for (int option = 0; option < 12; ++option) {
+    for (int option = 0; option < 13; ++option) {
         fct_simplify_def def = fct_simplify_def_default();
         if (option < 3) def.placement = (fct_placement)(1 + option);
         if (option == 3) def.weighting = FCT_WEIGHT_ANGLE;
@@ -74,6 +74,7 @@ static void options_are_kept(void **state) {
         if (option == 9) def.lock_border = true;
         if (option == 10) def.keep_topology = true, def.refit_passes = 1;
         if (option == 11) def.check_foldover = false, def.regularization = 1e-4;
+        if (option == 12) def.primitive = FCT_PRIMITIVE_FACE;
         check_stops(&torus, def);
         check_stops(&grid, def);
     }

@@ -94,7 +94,7 @@ static double lost_cost(const fct_simplifier *s, uint32_t a, uint32_t b, const f
     double distance2 = remaining_distance2(s, a, b, c->at, lost, &nearest);
     if (distance2 <= 1e-14) return 0;
     v3 n = v3_scale(v3_sub(lost, nearest), 1 / sqrt(distance2));
-    const double *r = c->resistance;
+    const double *r = c->quadric;
     double held = r[0] * n.x * n.x + r[3] * n.y * n.y + r[5] * n.z * n.z +
                   2 * (r[1] * n.x * n.y + r[2] * n.x * n.z + r[4] * n.y * n.z);
     double weight = area * fmax(0, 1 - held / c->area), height = v3_dot(n, v3_sub(probe, lost));

@@ -293,7 +293,7 @@ static void check_edge(fct_simplifier *s, uint32_t e, bool ends_only) {
     assert_close(got.key, got.error + .5 * ridge * reach, 1e-9);
     static const int axes[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
     for (int k = 0; k < 6; ++k)
-        assert_close(got.resistance[k], curvature(&p, (v3){0, 0, 0}, axes[k][0], axes[k][1]), 1e-7);
+        assert_close(got.quadric[k], curvature(&p, (v3){0, 0, 0}, axes[k][0], axes[k][1]), 1e-7);
     if (!s->corner_wedges) return;
     fct_groups groups;
     assert_true(fct_groups_find(s, ends[0], ends[1], &groups));
