@@ -21,9 +21,9 @@
 enum {
     FACE_CHUNK = 4096,      /* faces per parallel task */
     PROGRESS_PERIOD = 4096, /* faces between two calls of the progress hook */
-    /* The second contraction may cost up to four times as much as the face seemed to: the cost of a face is a
+    /* The second contraction may cost up to twice as much as the face seemed to: the cost of a face is a
      * lower bound. */
-    MOST_GROWTH = 16,
+    MOST_GROWTH = 8,
 };
 
 typedef struct faces {

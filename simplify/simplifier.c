@@ -70,6 +70,7 @@ void fct_simplifier_destroy(fct_simplifier *s) {
                       s->sorted.places,
                       s->sorted.vertex_places,
                       s->sorted.locks,
+                      s->sorted.copies,
                       s->first_pairs,
                       s->last_pairs,
                       s->next_pairs,

@@ -26,7 +26,7 @@ typedef enum fct_primitive {
     FCT_PRIMITIVE_EDGE, /* the ends of an edge */
     /* The corners of a face (Garland 1999, section 3.8): the cheapest edge of the face that can be
      * contracted, and then the edge to the third corner, at the best position for all three. If the second
-     * edge cannot be contracted, or costs more than four times what the face seemed to cost, the first
+     * edge cannot be contracted, or costs more than twice what the face seemed to cost, the first
      * contraction stays. When no face is left that can be contracted, edges are. Steps are half as many, and
      * errors larger: it is here for comparison. Not together with pair_distance. */
     FCT_PRIMITIVE_FACE

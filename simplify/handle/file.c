@@ -35,7 +35,7 @@ typedef struct file_head {
     unsigned char magic[8];
     uint32_t version, order_mark;
     uint32_t vertex_count, face_count, flags, material_count, source_count, names_size;
-    uint32_t target_faces, placement, weighting, refit_passes, switches, unused;
+    uint32_t target_faces, placement, weighting, refit_passes, switches, copy_count;
     double max_error, color_weight, texcoord_weight, normal_weight, boundary_weight, feature_threshold,
         regularization;
     double origin[3];
@@ -51,16 +51,18 @@ typedef struct file_array {
     size_t count, size;
 } file_array;
 
-enum { ARRAYS = 11 };
+enum { ARRAYS = 12 };
 
 /* All arrays in their order; those that are absent have the pointer NULL. */
 static void list_arrays(const fct_sorted *sorted, file_array out[ARRAYS]) {
     const fct_mesh *m = &sorted->mesh;
-    size_t v = m->vertex_count, f = m->face_count;
-    const file_array all[ARRAYS] = {
-        {sorted->places, f, 4}, {sorted->vertex_places, v, 4}, {m->triangles, f, 12}, {m->positions, v, 12},
-        {m->colors, v, 12},     {m->normals, v, 12},           {m->texcoords, f, 24}, {m->face_colors, f, 12},
-        {m->materials, f, 4},   {m->source_faces, f, 4},       {sorted->locks, v, 1}};
+    size_t v = m->vertex_count, f = m->face_count, inputs = sorted_inputs(sorted);
+    const file_array all[ARRAYS] = {{sorted->places, f, 4}, {sorted->vertex_places, inputs, 4},
+                                    {m->triangles, f, 12},  {m->positions, v, 12},
+                                    {m->colors, v, 12},     {m->normals, v, 12},
+                                    {m->texcoords, f, 24},  {m->face_colors, f, 12},
+                                    {m->materials, f, 4},   {m->source_faces, f, 4},
+                                    {sorted->locks, v, 1},  {sorted->copies, sorted->copy_count, 4}};
     memcpy(out, all, sizeof all);
 }
 
@@ -84,6 +86,7 @@ static fct_result write_head(const fct_simplifier *s, fct_sink *sink) {
     file_head head = {.version = VERSION,
                       .order_mark = ORDER_MARK,
                       .vertex_count = m->vertex_count,
+                      .copy_count = s->sorted.copy_count,
                       .face_count = m->face_count,
                       .material_count = m->material_count,
                       .source_count = m->source_count};
@@ -154,8 +157,8 @@ static fct_result read_head(reader *r, const unsigned char *data, size_t size) {
         return fail_read(r, "truncated or damaged: wrong checksum");
     r->source = (fct_source){data + sizeof r->head, data + size - sizeof checksum};
     const file_head *h = &r->head;
-    if (h->flags >= 2 * HAS_LOCKS || h->switches >= 2 * CONTRACT_FACES ||
-        h->face_count >= INT32_MAX || h->vertex_count >= INT32_MAX || h->material_count >= INT32_MAX)
+    if (h->flags >= 2 * HAS_LOCKS || h->switches >= 2 * CONTRACT_FACES || h->face_count >= INT32_MAX ||
+        h->vertex_count >= INT32_MAX || h->material_count >= INT32_MAX || h->copy_count > h->vertex_count)
         return fail_read(r, "counts or flags out of range");
     bool named = h->flags & HAS_NAMES;
     if (h->names_size > (size_t)(r->source.end - r->source.at) ||
@@ -223,6 +226,22 @@ static fct_result check_places(reader *r, const uint32_t *places, uint32_t count
     return good ? FCT_OK : fail_read(r, "two faces or vertices have one place");
 }
 
+/* Whether each copy lies at an earlier vertex of the input, and has a face. */
+static fct_result check_copies(reader *r, const fct_sorted *sorted) {
+    const fct_mesh *mesh = &sorted->mesh;
+    uint32_t inputs = sorted_inputs(sorted);
+    bool *met = fct_allocate_zero(r->env, mesh->vertex_count, sizeof *met), good = true;
+    if (!met) return fct_fail_memory(r->env, "split vertices");
+    for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c)
+        if (mesh->triangles[c] < mesh->vertex_count) met[mesh->triangles[c]] = true;
+    for (uint32_t i = 0; i < sorted->copy_count && good; ++i) {
+        uint32_t from = sorted->copies[i];
+        good = from < inputs && (i == 0 || sorted->copies[i - 1] <= from) && met[from] && met[inputs + i];
+    }
+    fct_release(r->env, met);
+    return good ? FCT_OK : fail_read(r, "a vertex was split from none");
+}
+
 static fct_result read_input(reader *r, fct_simplifier *s) {
     const file_head *h = &r->head;
     fct_mesh *mesh = &s->sorted.mesh;
@@ -235,10 +254,12 @@ static fct_result read_input(reader *r, fct_simplifier *s) {
                      (h->flags & HAS_SOURCES ? FCT_MESH_SOURCE_FACES : 0);
     fct_result result = fct_mesh_create(s->env, h->vertex_count, h->face_count, kinds, mesh);
     const fct_array own[] = {FCT_ARRAY(s->sorted.places, h->face_count),
-                             FCT_ARRAY(s->sorted.vertex_places, h->vertex_count),
-                             FCT_ARRAY_IF(h->flags & HAS_LOCKS, s->sorted.locks, h->vertex_count)};
+                             FCT_ARRAY(s->sorted.vertex_places, h->vertex_count - h->copy_count),
+                             FCT_ARRAY_IF(h->flags & HAS_LOCKS, s->sorted.locks, h->vertex_count),
+                             FCT_ARRAY_IF(h->copy_count > 0, s->sorted.copies, h->copy_count)};
     if (result == FCT_OK) result = fct_allocate_all(s->env, own, FCT_LENGTH(own), "a state");
     if (result != FCT_OK) return result;
+    s->sorted.copy_count = h->copy_count;
     memcpy(mesh->origin, h->origin, sizeof mesh->origin);
     mesh->source_count = h->source_count;
     result = read_names(r, mesh);
@@ -249,7 +270,8 @@ static fct_result read_input(reader *r, fct_simplifier *s) {
         if (list[i].data && !fct_source_take(&r->source, list[i].data, list[i].count, list[i].size))
             return fail_read(r, "truncated in the input");
     result = check_places(r, s->sorted.places, h->face_count);
-    return result == FCT_OK ? check_places(r, s->sorted.vertex_places, h->vertex_count) : result;
+    if (result == FCT_OK) result = check_places(r, s->sorted.vertex_places, sorted_inputs(&s->sorted));
+    return result == FCT_OK ? check_copies(r, &s->sorted) : result;
 }
 
 static fct_result read_state(reader *r, fct_simplifier *s) {

@@ -7,6 +7,7 @@
 #include "simplify/levels.h"
 #include "simplify/options.h"
 #include "simplify/simplifier.h"
+#include "simplify/topology/pinch.h"
 
 fct_result fct_handle_open(const fct_env *env, const fct_simplify_def *def, fct_simplifier **out) {
     fct_simplifier *s = fct_allocate_zero(env, 1, sizeof *s);
@@ -28,9 +29,11 @@ fct_result fct_handle_open(const fct_env *env, const fct_simplify_def *def, fct_
 static fct_result copy_sorted(fct_simplifier *s, const fct_mesh *mesh) {
     fct_result result = fct_simplify_sort(s->env, mesh, s->given.locks, &s->sorted);
     if (result != FCT_OK) return result;
+    s->sorted.mesh.material_names = NULL;
+    if (!s->given.keep_topology) result = fct_simplify_split_pinches(s->env, &s->sorted);
+    if (result != FCT_OK) return result;
     s->own.locks = s->sorted.locks;
     s->given.locks = NULL;
-    s->sorted.mesh.material_names = NULL;
     return fct_names_copy(s->env, mesh->material_names, mesh->material_count, &s->sorted.mesh.material_names);
 }
 

@@ -8,6 +8,7 @@
 #include "simplify/cost/constraint.h"
 #include "simplify/handle/history.h"
 #include "simplify/handle/wish.h"
+#include "simplify/topology/pinch.h"
 
 /* The contours among some marks, sorted by their points. */
 typedef struct contours {
@@ -138,6 +139,11 @@ static void add_pins(fct_simplifier *s, const fct_mark *marks, size_t count) {
     }
 }
 
+static void release_contours(const fct_env *env, contours *k) {
+    void *arrays[] = {k->keys, k->order, k->met};
+    for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(env, arrays[i]);
+}
+
 static fct_result list_contours(const fct_simplifier *s, const fct_mark *marks, size_t count, contours *k) {
     *k = (contours){.marks = marks};
     const fct_array arrays[] = {FCT_ARRAY(k->keys, count), FCT_ARRAY(k->order, count),
@@ -180,8 +186,7 @@ fct_result fct_mark_add(fct_simplifier *s, const fct_mark *marks, size_t count) 
         if (!s->pins) result = fct_fail_memory(s->env, "point constraints");
     }
     if (result == FCT_OK) result = apply_marks(s, &k, marks, count);
-    void *arrays[] = {k.keys, k.order, k.met};
-    for (size_t i = 0; i < FCT_LENGTH(arrays); ++i) fct_release(s->env, arrays[i]);
+    release_contours(s->env, &k);
     return result;
 }
 
@@ -209,9 +214,9 @@ static fct_result check_def(const fct_simplifier *s, const fct_constrain_def *de
 /* The point of a vertex of the input. */
 static fct_result find_point(const fct_simplifier *s, const char *what, uint32_t i, uint32_t vertex,
                              uint32_t *point) {
-    if (vertex >= s->mesh->vertex_count)
+    if (vertex >= sorted_inputs(&s->sorted))
         return fct_fail(s->env, FCT_ERROR_DATA, "%s %u: vertex %u, expected below %u", what, i, vertex,
-                        s->mesh->vertex_count);
+                        sorted_inputs(&s->sorted));
     *point = s->point_of[s->sorted.vertex_places[vertex]];
     if (*point != FCT_NONE) return FCT_OK;
     return fct_fail(s->env, FCT_ERROR_DATA, "%s %u: no face has vertex %u", what, i, vertex);
@@ -240,13 +245,54 @@ static fct_result fill_marks(const fct_simplifier *s, const fct_constrain_def *d
     return result;
 }
 
+/* An edge of the input at a split vertex belongs to one of the fans there (topology/pinch.h). */
+static fct_result choose_fans(const fct_simplifier *s, fct_mark *marks, size_t count) {
+    const fct_sorted *sorted = &s->sorted;
+    uint32_t inputs = sorted_inputs(sorted);
+    if (sorted->copy_count == 0 || count == 0) return FCT_OK;
+    contours k;
+    fct_result result = list_contours(s, marks, count, &k);
+    for (uint32_t c = 0; c < 3 * s->mesh->face_count && result == FCT_OK; ++c) {
+        const uint32_t v[2] = {s->mesh->triangles[c], s->mesh->triangles[corner_next(c)]};
+        uint32_t from[2];
+        if (v[0] < inputs && v[1] < inputs) continue;
+        for (int i = 0; i < 2; ++i)
+            from[i] = s->point_of[v[i] < inputs ? v[i] : sorted->copies[v[i] - inputs]];
+        uint64_t key = pair_key(from[0], from[1]);
+        for (size_t i = find_key(&k, key); i < k.count && k.keys[i] == key; ++i)
+            for (int end = 0; end < 2; ++end) marks[k.order[i]].points[end] = s->point_of[v[end]];
+    }
+    release_contours(s->env, &k);
+    return result;
+}
+
+/* A point constraint of a split vertex holds all its fans: counts the further ones, or adds their marks. */
+static size_t hold_fans(const fct_simplifier *s, const fct_constrain_def *def, const fct_mark *of_points,
+                        fct_mark *more) {
+    const fct_sorted *sorted = &s->sorted;
+    size_t count = 0;
+    for (uint32_t i = 0; i < def->point_count && sorted->copy_count > 0; ++i) {
+        if (def->points[i] >= sorted_inputs(sorted)) continue;
+        uint32_t first, end = fct_simplify_find_copies(sorted, sorted->vertex_places[def->points[i]], &first);
+        for (; first < end; ++first, ++count)
+            if (more) {
+                more[count] = of_points[i];
+                more[count].points[0] = s->point_of[sorted_inputs(sorted) + first];
+            }
+    }
+    return count;
+}
+
 fct_result fct_simplifier_constrain(fct_simplifier *s, const fct_constrain_def *def) {
     fct_result result = check_def(s, def);
     if (result != FCT_OK) return result;
-    size_t count = (size_t)def->contour_count + def->point_count;
+    size_t given = (size_t)def->contour_count + def->point_count,
+           count = given + hold_fans(s, def, NULL, NULL);
     fct_mark *marks = fct_allocate(s->env, count, sizeof *marks);
     if (!marks) return fct_fail_memory(s->env, "constraints");
     result = fill_marks(s, def, marks);
+    if (result == FCT_OK) result = choose_fans(s, marks, def->contour_count);
+    if (result == FCT_OK) hold_fans(s, def, marks + def->contour_count, marks + given);
     if (result == FCT_OK) result = fct_mark_add(s, marks, count);
     if (result == FCT_OK && s->history) s->history->broken = true;
     fct_release(s->env, marks);

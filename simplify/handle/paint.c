@@ -64,14 +64,17 @@ static fct_result check_weights(const fct_simplifier *s, const float *weights, u
 
 /* Vertices at one point: the largest weight counts. */
 static fct_result spread_input(const fct_simplifier *s, const float *weights, uint32_t count, float *paint) {
-    if (count != s->mesh->vertex_count)
+    const fct_sorted *sorted = &s->sorted;
+    if (count != sorted_inputs(sorted))
         return fct_fail(s->env, FCT_ERROR_DATA, "%u weights, expected %u, one per vertex of the input", count,
-                        s->mesh->vertex_count);
+                        sorted_inputs(sorted));
     memset(paint, 0, s->point_count * sizeof *paint);
     for (uint32_t v = 0; v < count; ++v) {
-        uint32_t p = s->point_of[s->sorted.vertex_places[v]];
+        uint32_t p = s->point_of[sorted->vertex_places[v]];
         if (p != FCT_NONE && weights[v] > paint[p]) paint[p] = weights[v];
     }
+    for (uint32_t i = 0; i < sorted->copy_count; ++i)
+        paint[s->point_of[count + i]] = paint[s->point_of[sorted->copies[i]]];
     return FCT_OK;
 }
 

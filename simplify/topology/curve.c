@@ -122,4 +122,5 @@ void fct_simplify_release_sorted(const fct_env *env, fct_sorted *sorted) {
     fct_release(env, sorted->places);
     fct_release(env, sorted->vertex_places);
     fct_release(env, sorted->locks);
+    fct_release(env, sorted->copies);
 }

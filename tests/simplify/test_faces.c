@@ -15,12 +15,16 @@ static fct_simplify_def faces_def(void) {
 }
 
 /* A closed surface without symmetry. */
-static fct_mesh make_lumps(uint32_t n) {
+static fct_mesh make_rough(uint32_t n, double noise) {
     fct_mesh mesh = make_sphere(&env, n);
     uint64_t seed = 11;
     for (uint32_t i = 0; i < 3 * mesh.vertex_count; ++i)
-        mesh.positions[i] += (float)between(&seed, -.2, .2) / (float)n;
+        mesh.positions[i] += (float)between(&seed, -noise, noise) / (float)n;
     return mesh;
+}
+
+static fct_mesh make_lumps(uint32_t n) {
+    return make_rough(n, .2);
 }
 
 /* The sum that a contraction of three vertices minimises, as a dense system A p = b with the constant c: a
@@ -195,7 +199,8 @@ static void the_cheapest_face_becomes_its_minimum(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
-/* Nearly all contractions come in twos: the second one begins at the point of the first. */
+/* Nearly all contractions come in twos: the second one begins at the point of the first. On the rough mesh
+ * this is so because refused faces return. */
 static void faces_are_contracted_as_a_whole(void **state) {
     (void)state;
     fct_mesh lumps = make_lumps(30), other = make_lumps(30),
@@ -206,10 +211,10 @@ static void faces_are_contracted_as_a_whole(void **state) {
             colored.colors[3 * v + (uint32_t)k] =
                 (float)(.5 + .4 * sin(3 * (double)colored.positions[3 * v + (uint32_t)k]) +
                         .1 * uniform(&seed));
-    fct_mesh *meshes[] = {&lumps, &colored};
-    for (int i = 0; i < 2; ++i) {
+    fct_mesh rough = make_rough(30, .9), *meshes[] = {&lumps, &colored, &rough};
+    for (int i = 0; i < 3; ++i) {
         fct_simplify_def def = faces_def();
-        def.target_faces = meshes[i]->face_count / 10;
+        def.target_faces = meshes[i]->face_count / (i < 2 ? 10 : 87);
         fct_simplifier *s = open_simplifier(&env, meshes[i], &def);
         assert_int_equal(fct_log_create(s), FCT_OK);
         fct_stop stop;
@@ -222,11 +227,10 @@ static void faces_are_contracted_as_a_whole(void **state) {
             if (second->kept != first->kept && second->gone != first->kept) continue;
             ++whole, ++r;
         }
-        assert_true(2 * whole > .98 * count);
+        assert_true(2 * whole > (i < 2 ? .98 : .96) * count);
         fct_simplifier_destroy(s);
     }
-    fct_mesh_release(&env, &colored);
-    fct_mesh_release(&env, &lumps);
+    for (int i = 0; i < 3; ++i) fct_mesh_release(&env, meshes[i]);
 }
 
 /* Errors: larger than those of edges, but of the same order; max_error is obeyed. */

@@ -210,6 +210,9 @@ expect 0 simplify sphere.off --faces 100 -o small.ply --json
 keys faces_before faces_after stopped_because pairs_found pairs_joined max_cost seconds init contract total peak_bytes
 holds "$(value faces_before) == 960 && $(value faces_after) <= 100 && $(value faces_after) >= 98"
 check "it says why it stopped" test "$(value stopped_because)" = faces
+expect 0 simplify sphere.off --faces 100 -o faces.ply --primitive face --json
+holds "$(value faces_after) <= 100 && $(value faces_after) >= 97"
+check "faces and edges give different meshes" sh -c '! cmp -s small.ply faces.ply'
 expect 0 simplify sphere.fct --ratio .25 -o quarter.off --placement subset --refit 0 --keep-topology
 expect 0 info quarter.off --json
 holds "$(value faces) <= 240 && $(value faces) >= 238 && $(value boundary_edges) == 0"

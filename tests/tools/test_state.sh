@@ -76,6 +76,8 @@ expect 64 simplify --faces 10 -o x.ply
 says "expected either IN or --resume STATE, found none"
 expect 64 simplify hill.ply --resume one.fst --faces 10 -o x.ply
 expect 64 simplify --resume one.fst -o x.ply
+expect 64 simplify --resume one.fst --faces 10 --primitive face -o x.ply
+says "the state has its own --primitive"
 expect 64 simplify --resume one.fst --faces 10 --placement ends -o x.ply
 says "the state has its own --placement"
 expect 64 simplify --resume one.fst --faces 10 --flip-inward -o x.ply

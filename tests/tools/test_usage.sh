@@ -134,10 +134,10 @@ expect 64 simplify cube.off -o x.ply --faces 4 --placement best
 expect 64 simplify cube.off -o x.ply --faces 4 --weights heavy
 says "expected area, angle or uniform, found 'heavy'"
 expect 64 simplify cube.off -o x.doc --faces 4
-for later in --primitive=face; do
-    expect 64 simplify cube.off -o x.ply --faces 4 "$later"
-    says "unknown option"
-done
+expect 64 simplify cube.off -o x.ply --faces 4 --primitive vertex
+says "expected edge or face, found 'vertex'"
+expect 64 simplify cube.off -o x.ply --faces 4 --primitive face --pairs .1
+says "either --pairs or --primitive face"
 expect 64 bake cube.off
 says "expected -o OUT or --probe FILE"
 expect 64 bake cube.off -o x.stl
