@@ -15,7 +15,7 @@
 static void report_fit(const fct_simplifier *s, const fct_fit *fit, fct_simplify_stats *stats) {
     stats->distance_rms = sqrt(fit->distance2) * s->extent;
     stats->distance_max = sqrt(fit->farthest2) * s->extent;
-    double sums[3] = {0};
+    double sums[CHANNEL_SOURCES] = {0};
     for (uint32_t i = 0; i < s->channel_count; ++i)
         sums[s->channels[i].source] += fit->channels2[i] / (s->channels[i].factor * s->channels[i].factor);
     stats->color_rms = sqrt(sums[CHANNEL_COLOR] / 3);

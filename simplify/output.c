@@ -16,12 +16,12 @@ static void write_attributes(fct_simplifier *s, fct_mesh *out, uint32_t corner, 
     for (uint32_t i = 0; i < s->channel_count; ++i) {
         const fct_channel *channel = &s->channels[i];
         float value = (float)(a[i] / channel->factor);
-        if (channel->source == CHANNEL_COLOR)
-            out->colors[3 * (size_t)v + channel->component] = value;
-        else if (channel->source == CHANNEL_NORMAL)
-            out->normals[3 * (size_t)v + channel->component] = value;
-        else
+        if (channel->source == CHANNEL_TEXCOORD)
             out->texcoords[2 * (size_t)corner + channel->component] = value;
+        else
+            (*stream_slot(out,
+                          channel->stream))[stream_width(channel->stream) * (size_t)v + channel->component] =
+                value;
     }
 }
 
@@ -76,10 +76,10 @@ fct_result fct_simplify_output(fct_simplifier *s, const uint32_t *places, fct_me
     uint32_t *numbers = fct_allocate(s->env, key_count, sizeof *numbers);
     if (!numbers) return fct_fail_memory(s->env, "output vertices");
     uint32_t vertices = number_vertices(s, places, numbers, key_count);
-    unsigned arrays =
-        (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
-        (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
-        (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
+    unsigned arrays = stream_kinds(mesh) | (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) |
+                      (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
+                      (mesh->materials ? FCT_MESH_MATERIALS : 0) |
+                      (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     fct_result result = fct_mesh_create(s->env, vertices, s->live_faces, arrays, out);
     if (result == FCT_OK) memcpy(out->origin, mesh->origin, sizeof out->origin);
     if (result == FCT_OK) out->material_count = mesh->material_count;

@@ -22,10 +22,11 @@
 #include "facetree/simplifier.h"
 #include "simplify/cost/quadric.h"
 #include "simplify/queue.h"
+#include "simplify/streams.h"
 #include "simplify/topology/curve.h"
 
 enum {
-    SIMPLIFY_MAX_CHANNELS = QUADRIC_MAX_ATTRIBUTES,
+    SIMPLIFY_MAX_CHANNELS = STREAM_FLOATS + 2, /* with u and v */
     SIMPLIFY_MAX_WEDGES = 64, /* at both ends of an edge together; edges with more are not contracted */
     SIMPLIFY_HUB = 512,       /* a point with more faces is a hub: it does not move */
 };
@@ -37,7 +38,8 @@ enum { SOLID_NONE, SOLID, SOLID_INSIDE_OUT };
 
 /* One float of an attribute. value * factor is its coordinate in the space of the quadrics. */
 typedef struct fct_channel {
-    enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD } source;
+    enum { CHANNEL_COLOR, CHANNEL_NORMAL, CHANNEL_TEXCOORD, CHANNEL_LIGHT, CHANNEL_SOURCES } source;
+    uint32_t stream; /* of streams.h; unused if it is a texture coordinate */
     uint32_t component;
     double factor;
     double unit;         /* the difference of value * factor that a whole range makes */

@@ -26,7 +26,8 @@ typedef struct fct_progressive fct_progressive;
  * A level has the positions and attributes that the contractions gave, before the refit. The finest level is
  * what the simplifier makes of the input before its first contraction: the same faces with the same
  * positions; equal vertices are one; normals have unit length, except those of locked points. Faces are in
- * the order in which the splits add them, and the arrays source_faces and source_uv are left out. Every
+ * the order in which the splits add them. The arrays source_faces, source_uv, irradiance, direct, indirect
+ * and error are left out; for the last four a warning says so. Every
  * thread count gives the same bits. env must outlive *progressive. Errors: those of fct_simplify, with
  * *progressive = NULL. */
 FCT_API fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh,

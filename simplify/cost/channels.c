@@ -19,18 +19,17 @@
 /* The array that holds a channel, its number of items, and the floats from one item to the next. */
 static const float *find_channel_values(const fct_mesh *mesh, const fct_channel *channel, size_t *count,
                                         uint32_t *stride) {
-    *stride = channel->source == CHANNEL_TEXCOORD ? 2 : 3;
-    *count = channel->source == CHANNEL_TEXCOORD ? 3 * (size_t)mesh->face_count : mesh->vertex_count;
-    return channel->source == CHANNEL_COLOR    ? mesh->colors
-           : channel->source == CHANNEL_NORMAL ? mesh->normals
-                                               : mesh->texcoords;
+    bool texcoord = channel->source == CHANNEL_TEXCOORD;
+    *stride = texcoord ? 2 : stream_width(channel->stream);
+    *count = texcoord ? 3 * (size_t)mesh->face_count : mesh->vertex_count;
+    return texcoord ? mesh->texcoords : stream_values(mesh, channel->stream);
 }
 
-static void add_channels(fct_simplifier *s, int source, uint32_t components, double factor) {
-    for (uint32_t i = 0; i < components; ++i) {
+static void add_channels(fct_simplifier *s, int source, uint32_t stream, double factor) {
+    for (uint32_t i = 0; i < (source == CHANNEL_TEXCOORD ? 2 : stream_width(stream)); ++i) {
         fct_channel *channel = &s->channels[s->channel_count++];
         *channel = (fct_channel){.component = i, .factor = factor, .lower = INFINITY, .upper = -INFINITY};
-        channel->source = source;
+        channel->source = source, channel->stream = stream;
         size_t count;
         uint32_t stride;
         const float *values = find_channel_values(s->mesh, channel, &count, &stride);
@@ -39,7 +38,8 @@ static void add_channels(fct_simplifier *s, int source, uint32_t components, dou
             channel->lower = fct_min(channel->lower, value), channel->upper = fct_max(channel->upper, value);
         }
         if (count == 0) channel->lower = channel->upper = 0;
-        channel->unit = source == CHANNEL_COLOR ? 1 : channel->upper - channel->lower;
+        channel->unit =
+            source == CHANNEL_COLOR || source == CHANNEL_LIGHT ? 1 : channel->upper - channel->lower;
     }
 }
 
@@ -81,23 +81,31 @@ static double find_texcoord_range(const float *values, size_t corners) {
     return range;
 }
 
+/* The factor of colours or light without a weight. */
+static double find_color_factor(const fct_mesh *mesh, uint32_t stream) {
+    double range =
+        find_color_range(stream_values(mesh, stream), (size_t)stream_width(stream) * mesh->vertex_count);
+    return 1 / (range > 0 ? range : 1);
+}
+
 void fct_simplify_channels(fct_simplifier *s) {
     const fct_mesh *mesh = s->mesh;
     const fct_simplify_def *def = s->def;
     for (int steering = 1; steering >= 0; --steering) {
-        if (mesh->colors && (def->color_weight != 0) == steering) {
-            double range = find_color_range(mesh->colors, 3 * (size_t)mesh->vertex_count);
-            add_channels(s, CHANNEL_COLOR, 3, 1 / (range > 0 ? range : 1));
-        }
+        if (mesh->colors && (def->color_weight != 0) == steering)
+            add_channels(s, CHANNEL_COLOR, STREAM_COLORS, find_color_factor(mesh, STREAM_COLORS));
         if (mesh->texcoords && (def->texcoord_weight > 0) == steering) {
             double range = find_texcoord_range(mesh->texcoords, 3 * (size_t)mesh->face_count);
-            add_channels(s, CHANNEL_TEXCOORD, 2,
+            add_channels(s, CHANNEL_TEXCOORD, STREAM_COUNT,
                          (steering ? def->texcoord_weight : 1) / (range > 0 ? range : 1));
         }
         if (mesh->normals && (def->normal_weight > 0) == steering)
-            add_channels(s, CHANNEL_NORMAL, 3, NORMAL_FACTOR * (steering ? def->normal_weight : 1));
+            add_channels(s, CHANNEL_NORMAL, STREAM_NORMALS,
+                         NORMAL_FACTOR * (steering ? def->normal_weight : 1));
         if (steering) s->steering = s->channel_count;
     }
+    for (uint32_t i = STREAM_IRRADIANCE; i < STREAM_COUNT; ++i)
+        if (stream_values(mesh, i)) add_channels(s, CHANNEL_LIGHT, i, find_color_factor(mesh, i));
 }
 
 /* The weight of colours. max_error allows about extent / max_error faces. */

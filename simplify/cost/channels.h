@@ -1,4 +1,4 @@
-/* simplify/cost/channels.h: vertex colours, texture coordinates and normals as coordinates beside the
+/* simplify/cost/channels.h: vertex colours, texture coordinates, normals and light as coordinates beside the
  * position (Garland 1999, section 5.2).
  *
  * A channel is one float of an attribute. Its factor scales the attribute to about unit range and then

@@ -24,7 +24,7 @@ static void add_plane(fct_simplifier *s, uint32_t f, v3 p, v3 normal, const doub
 
 static void add_plane_of_attributes(fct_simplifier *s, uint32_t f, const double weights[3]) {
     uint32_t m = s->steering;
-    double q[MAX_QUADRIC], x[3][3 + SIMPLIFY_MAX_CHANNELS];
+    double q[MAX_QUADRIC], x[3][3 + QUADRIC_MAX_ATTRIBUTES];
     for (uint32_t k = 0; k < 3; ++k) {
         v3 p = point_position(s, s->triangles[3 * f + k]);
         x[k][0] = p.x, x[k][1] = p.y, x[k][2] = p.z;

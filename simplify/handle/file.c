@@ -27,6 +27,10 @@ enum {
     HAS_SOURCES = 32,
     HAS_NAMES = 64,
     HAS_LOCKS = 128,
+    HAS_IRRADIANCE = 256,
+    HAS_DIRECT = 512,
+    HAS_INDIRECT = 1024,
+    HAS_ERROR = 2048,
 };
 
 enum { LOCK_BORDER = 1, KEEP_TOPOLOGY = 2, CHECK_FOLDOVER = 4, CONTRACT_FACES = 8 };
@@ -51,7 +55,7 @@ typedef struct file_array {
     size_t count, size;
 } file_array;
 
-enum { ARRAYS = 12 };
+enum { ARRAYS = 16 };
 
 /* All arrays in their order; those that are absent have the pointer NULL. */
 static void list_arrays(const fct_sorted *sorted, file_array out[ARRAYS]) {
@@ -62,7 +66,9 @@ static void list_arrays(const fct_sorted *sorted, file_array out[ARRAYS]) {
                                     {m->colors, v, 12},     {m->normals, v, 12},
                                     {m->texcoords, f, 24},  {m->face_colors, f, 12},
                                     {m->materials, f, 4},   {m->source_faces, f, 4},
-                                    {sorted->locks, v, 1},  {sorted->copies, sorted->copy_count, 4}};
+                                    {sorted->locks, v, 1},  {sorted->copies, sorted->copy_count, 4},
+                                    {m->irradiance, v, 12}, {m->direct, v, 12},
+                                    {m->indirect, v, 12},   {m->error, v, 4}};
     memcpy(out, all, sizeof all);
 }
 
@@ -96,7 +102,9 @@ static fct_result write_head(const fct_simplifier *s, fct_sink *sink) {
     head.flags = (m->colors ? HAS_COLORS : 0) | (m->normals ? HAS_NORMALS : 0) |
                  (m->texcoords ? HAS_TEXCOORDS : 0) | (m->face_colors ? HAS_FACE_COLORS : 0) |
                  (m->materials ? HAS_MATERIALS : 0) | (m->source_faces ? HAS_SOURCES : 0) |
-                 (m->material_names ? HAS_NAMES : 0) | (s->sorted.locks ? HAS_LOCKS : 0);
+                 (m->material_names ? HAS_NAMES : 0) | (s->sorted.locks ? HAS_LOCKS : 0) |
+                 (m->irradiance ? HAS_IRRADIANCE : 0) | (m->direct ? HAS_DIRECT : 0) |
+                 (m->indirect ? HAS_INDIRECT : 0) | (m->error ? HAS_ERROR : 0);
     size_t size = 0;
     for (uint32_t i = 0; m->material_names && i < m->material_count; ++i)
         size += strlen(m->material_names[i]) + 1;
@@ -157,7 +165,7 @@ static fct_result read_head(reader *r, const unsigned char *data, size_t size) {
         return fail_read(r, "truncated or damaged: wrong checksum");
     r->source = (fct_source){data + sizeof r->head, data + size - sizeof checksum};
     const file_head *h = &r->head;
-    if (h->flags >= 2 * HAS_LOCKS || h->switches >= 2 * CONTRACT_FACES || h->face_count >= INT32_MAX ||
+    if (h->flags >= 2 * HAS_ERROR || h->switches >= 2 * CONTRACT_FACES || h->face_count >= INT32_MAX ||
         h->vertex_count >= INT32_MAX || h->material_count >= INT32_MAX || h->copy_count > h->vertex_count)
         return fail_read(r, "counts or flags out of range");
     bool named = h->flags & HAS_NAMES;
@@ -208,6 +216,8 @@ static bool has_arrays(const reader *r) {
     const file_head *h = &r->head;
     uint64_t face = 16, vertex = 16;
     vertex += h->flags & HAS_COLORS ? 12 : 0, vertex += h->flags & HAS_NORMALS ? 12 : 0;
+    for (uint32_t light = HAS_IRRADIANCE; light <= HAS_ERROR; light *= 2)
+        vertex += !(h->flags & light) ? 0 : light == HAS_ERROR ? 4 : 12;
     vertex += h->flags & HAS_LOCKS ? 1 : 0, face += h->flags & HAS_TEXCOORDS ? 24 : 0;
     face += h->flags & HAS_FACE_COLORS ? 12 : 0, face += h->flags & HAS_MATERIALS ? 4 : 0;
     face += h->flags & HAS_SOURCES ? 4 : 0;
@@ -246,12 +256,15 @@ static fct_result read_input(reader *r, fct_simplifier *s) {
     const file_head *h = &r->head;
     fct_mesh *mesh = &s->sorted.mesh;
     if (!has_arrays(r)) return fail_read(r, "truncated in the input");
-    unsigned kinds = (h->flags & HAS_COLORS ? FCT_MESH_COLORS : 0) |
-                     (h->flags & HAS_NORMALS ? FCT_MESH_NORMALS : 0) |
-                     (h->flags & HAS_TEXCOORDS ? FCT_MESH_TEXCOORDS : 0) |
-                     (h->flags & HAS_FACE_COLORS ? FCT_MESH_FACE_COLORS : 0) |
-                     (h->flags & HAS_MATERIALS ? FCT_MESH_MATERIALS : 0) |
-                     (h->flags & HAS_SOURCES ? FCT_MESH_SOURCE_FACES : 0);
+    unsigned kinds =
+        (h->flags & HAS_COLORS ? FCT_MESH_COLORS : 0) | (h->flags & HAS_NORMALS ? FCT_MESH_NORMALS : 0) |
+        (h->flags & HAS_TEXCOORDS ? FCT_MESH_TEXCOORDS : 0) |
+        (h->flags & HAS_FACE_COLORS ? FCT_MESH_FACE_COLORS : 0) |
+        (h->flags & HAS_MATERIALS ? FCT_MESH_MATERIALS : 0) |
+        (h->flags & HAS_SOURCES ? FCT_MESH_SOURCE_FACES : 0) |
+        (h->flags & HAS_IRRADIANCE ? FCT_MESH_IRRADIANCE : 0) |
+        (h->flags & HAS_DIRECT ? FCT_MESH_DIRECT : 0) | (h->flags & HAS_INDIRECT ? FCT_MESH_INDIRECT : 0) |
+        (h->flags & HAS_ERROR ? FCT_MESH_ERROR : 0);
     fct_result result = fct_mesh_create(s->env, h->vertex_count, h->face_count, kinds, mesh);
     const fct_array own[] = {FCT_ARRAY(s->sorted.places, h->face_count),
                              FCT_ARRAY(s->sorted.vertex_places, h->vertex_count - h->copy_count),

@@ -52,7 +52,7 @@ uint32_t fct_simplify_count_walls(const fct_walls *walls) {
 }
 
 void fct_simplify_join_classes(fct_simplifier *s, uint32_t point) {
-    if (!s->wedge_classes || s->mesh->colors || s->mesh->normals) return;
+    if (!s->wedge_classes || stream_kinds(s->mesh)) return;
     uint32_t first = s->first_wedges[point];
     for (uint32_t w = s->next_wedges[first]; w != FCT_NONE; w = s->next_wedges[w])
         s->wedge_classes[w] = s->wedge_classes[first];

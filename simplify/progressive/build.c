@@ -197,6 +197,10 @@ fct_result fct_progressive_build(const fct_simplifier *s, fct_progressive **out)
         if (s->mesh->colors) m->color = m->value_count, m->value_count += 3;
         if (s->mesh->normals) m->normal = m->value_count, m->value_count += 3;
         if (s->mesh->texcoords) m->texcoord = m->value_count, m->value_count += 2;
+        if (stream_kinds(s->mesh) & ~(unsigned)(FCT_MESH_COLORS | FCT_MESH_NORMALS))
+            fct_note(s->env, FCT_MESSAGE_WARNING,
+                     "the progressive mesh keeps the light of the vertex colours alone: irradiance, direct, "
+                     "indirect and error are left out");
         memcpy(m->origin, s->mesh->origin, sizeof m->origin);
         b->s = s, b->log = s->log, b->m = m;
         b->handle_count = s->corner_wedges ? s->wedge_count : s->point_count;

@@ -26,6 +26,7 @@ static void read_logged(const fct_builder *b, size_t entry, uint32_t point, floa
     const float *from = b->log->values + s->channel_count * entry;
     for (uint32_t i = 0; i < s->channel_count; ++i) {
         const fct_channel *channel = &s->channels[i];
+        if (channel->source == CHANNEL_LIGHT) continue;
         uint32_t first = channel->source == CHANNEL_COLOR    ? b->m->color
                          : channel->source == CHANNEL_NORMAL ? b->m->normal
                                                              : b->m->texcoord;

@@ -90,9 +90,9 @@ static inline uint32_t find_sample_corners(const fct_refit *r, size_t sample, ui
 static inline double find_input_value(const fct_simplifier *s, const fct_channel *channel, uint32_t corner) {
     const fct_mesh *mesh = s->mesh;
     size_t v = mesh->triangles[corner], i = channel->component;
-    double value = channel->source == CHANNEL_COLOR    ? mesh->colors[3 * v + i]
-                   : channel->source == CHANNEL_NORMAL ? mesh->normals[3 * v + i]
-                                                       : mesh->texcoords[2 * (size_t)corner + i];
+    double value = channel->source == CHANNEL_TEXCOORD
+                       ? mesh->texcoords[2 * (size_t)corner + i]
+                       : stream_values(mesh, channel->stream)[stream_width(channel->stream) * v + i];
     return value * channel->factor;
 }
 

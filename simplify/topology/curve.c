@@ -11,6 +11,7 @@
 
 #include "base/math/vec.h"
 #include "base/sort.h"
+#include "simplify/streams.h"
 
 enum { CELL_BITS = 10 };
 
@@ -71,8 +72,9 @@ static void place_numbers(const uint32_t *from, uint32_t *to, const uint32_t *pl
 static void fill_sorted(const fct_mesh *mesh, const uint32_t *vertex_places, const uint32_t *places,
                         fct_mesh *out) {
     place_rows(mesh->positions, out->positions, vertex_places, mesh->vertex_count, 3);
-    place_rows(mesh->colors, out->colors, vertex_places, mesh->vertex_count, 3);
-    place_rows(mesh->normals, out->normals, vertex_places, mesh->vertex_count, 3);
+    for (uint32_t i = 0; i < STREAM_COUNT; ++i)
+        place_rows(stream_values(mesh, i), *stream_slot(out, i), vertex_places, mesh->vertex_count,
+                   stream_width(i));
     place_rows(mesh->texcoords, out->texcoords, places, mesh->face_count, 6);
     place_rows(mesh->face_colors, out->face_colors, places, mesh->face_count, 3);
     place_numbers(mesh->materials, out->materials, places, mesh->face_count);
@@ -90,10 +92,10 @@ fct_result fct_simplify_sort(const fct_env *env, const fct_mesh *mesh, const uin
                              fct_sorted *out) {
     uint32_t vertices = mesh->vertex_count, *starts;
     uint64_t *items;
-    unsigned kinds =
-        (mesh->colors ? FCT_MESH_COLORS : 0) | (mesh->normals ? FCT_MESH_NORMALS : 0) |
-        (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) | (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
-        (mesh->materials ? FCT_MESH_MATERIALS : 0) | (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
+    unsigned kinds = stream_kinds(mesh) | (mesh->texcoords ? FCT_MESH_TEXCOORDS : 0) |
+                     (mesh->face_colors ? FCT_MESH_FACE_COLORS : 0) |
+                     (mesh->materials ? FCT_MESH_MATERIALS : 0) |
+                     (mesh->source_faces ? FCT_MESH_SOURCE_FACES : 0);
     const fct_array scratch[] = {FCT_ARRAY(items, vertices), FCT_ARRAY(starts, (size_t)vertices + 1)};
     *out = (fct_sorted){0};
     const fct_array results[] = {FCT_ARRAY(out->places, mesh->face_count),

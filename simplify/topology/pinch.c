@@ -9,6 +9,8 @@
 
 #include <string.h>
 
+#include "simplify/streams.h"
+
 typedef struct pinches {
     const fct_env *env;
     const fct_mesh *mesh;
@@ -85,39 +87,52 @@ static fct_result split_vertex(pinches *k, uint32_t v) {
     return FCT_OK;
 }
 
-static void copy_rows(const pinches *k, float *to, const float *from) {
-    if (!from) return;
+static void exchange(float **a, float **b) {
+    float *swap = *a;
+    *a = *b, *b = swap;
+}
+
+/* Exchanges the vertices of two meshes with the same arrays. */
+static void exchange_arrays(fct_mesh *a, fct_mesh *b) {
+    uint32_t count = a->vertex_count;
+    a->vertex_count = b->vertex_count, b->vertex_count = count;
+    exchange(&a->positions, &b->positions);
+    for (uint32_t i = 0; i < STREAM_COUNT; ++i) exchange(stream_slot(a, i), stream_slot(b, i));
+}
+
+static void copy_rows(const pinches *k, float *to, const float *from, size_t width) {
     size_t count = k->mesh->vertex_count;
-    memcpy(to, from, 3 * count * sizeof *to);
+    memcpy(to, from, width * count * sizeof *to);
     for (size_t i = 0; i < k->copy_count; ++i)
-        memcpy(to + 3 * (count + i), from + 3 * (size_t)k->copies[i], 3 * sizeof *to);
+        memcpy(to + width * (count + i), from + width * k->copies[i], width * sizeof *to);
 }
 
 /* Appends the new vertices to the arrays of the mesh, and gives them their corners. */
 static fct_result append_copies(const pinches *k, fct_sorted *sorted) {
-    fct_mesh *mesh = &sorted->mesh;
+    fct_mesh *mesh = &sorted->mesh, longer;
     size_t before = mesh->vertex_count, count = before + k->copy_count;
-    float *positions, *colors, *normals;
     uint8_t *locks;
     uint32_t *copies;
-    if (count > INT32_MAX) return fct_fail(k->env, FCT_ERROR_MEMORY, "more than 2^31 vertices");
-    const fct_array arrays[] = {FCT_ARRAY(positions, 3 * count),
-                                FCT_ARRAY_IF(mesh->colors, colors, 3 * count),
-                                FCT_ARRAY_IF(mesh->normals, normals, 3 * count),
-                                FCT_ARRAY_IF(sorted->locks, locks, count), FCT_ARRAY(copies, k->copy_count)};
+    if (count >= INT32_MAX) return fct_fail(k->env, FCT_ERROR_MEMORY, "more than 2^31 vertices");
+    const fct_array arrays[] = {FCT_ARRAY_IF(sorted->locks, locks, count), FCT_ARRAY(copies, k->copy_count)};
     fct_result result = fct_allocate_all(k->env, arrays, FCT_LENGTH(arrays), "split vertices");
     if (result != FCT_OK) return result;
-    copy_rows(k, positions, mesh->positions);
-    copy_rows(k, colors, mesh->colors);
-    copy_rows(k, normals, mesh->normals);
+    result = fct_mesh_create(k->env, (uint32_t)count, 0, stream_kinds(mesh), &longer);
+    if (result != FCT_OK) {
+        fct_release_all(k->env, arrays, FCT_LENGTH(arrays));
+        return result;
+    }
+    copy_rows(k, longer.positions, mesh->positions, 3);
+    for (uint32_t i = 0; i < STREAM_COUNT; ++i)
+        if (stream_values(mesh, i))
+            copy_rows(k, *stream_slot(&longer, i), stream_values(mesh, i), stream_width(i));
     memcpy(copies, k->copies, k->copy_count * sizeof *copies);
     for (size_t v = 0; v < count && sorted->locks; ++v)
         locks[v] = sorted->locks[v < before ? v : copies[v - before]];
     for (size_t i = 0; i < k->moved_count; i += 2) mesh->triangles[k->moved[i]] = k->moved[i + 1];
-    void *old[] = {mesh->positions, mesh->colors, mesh->normals, sorted->locks};
-    for (size_t i = 0; i < FCT_LENGTH(old); ++i) fct_release(k->env, old[i]);
-    mesh->positions = positions, mesh->colors = colors, mesh->normals = normals;
-    mesh->vertex_count = (uint32_t)count;
+    exchange_arrays(mesh, &longer);
+    fct_mesh_release(k->env, &longer);
+    fct_release(k->env, sorted->locks);
     sorted->locks = locks, sorted->copies = copies, sorted->copy_count = (uint32_t)k->copy_count;
     return FCT_OK;
 }

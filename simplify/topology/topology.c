@@ -18,10 +18,9 @@
  * so a face with four times this height keeps more than half of it. */
 #define LEAST_HEIGHT 4
 
-enum { KEY_WORDS = 7 };
+enum { KEY_WORDS = 1 + STREAM_FLOATS };
 
-/* Writes the words that distinguish item i from others; unused words stay 0. -0 counts as 0, because
- * -0 + 0 is 0. */
+/* Writes the words that distinguish item i from others. -0 counts as 0, because -0 + 0 is 0. */
 typedef void key_of(const fct_simplifier *s, const uint32_t *base, uint32_t i, uint32_t key[KEY_WORDS]);
 
 static void write_position_key(const fct_simplifier *s, const uint32_t *base, uint32_t v,
@@ -33,9 +32,11 @@ static void write_position_key(const fct_simplifier *s, const uint32_t *base, ui
 static void write_vertex_key(const fct_simplifier *s, const uint32_t *base, uint32_t v,
                              uint32_t key[KEY_WORDS]) {
     key[0] = base[v];
-    for (int k = 0; k < 3; ++k) {
-        if (s->mesh->colors) key[1 + k] = fct_float_bits(s->mesh->colors[3 * (size_t)v + k] + 0.0f);
-        if (s->mesh->normals) key[4 + k] = fct_float_bits(s->mesh->normals[3 * (size_t)v + k] + 0.0f);
+    for (uint32_t i = 0, word = 1; i < STREAM_COUNT; ++i) {
+        const float *values = stream_values(s->mesh, i);
+        uint32_t width = stream_width(i);
+        for (uint32_t k = 0; k < width && values; ++k)
+            key[word++] = fct_float_bits(values[width * (size_t)v + k] + 0.0f);
     }
 }
 
@@ -45,19 +46,19 @@ static void write_corner_key(const fct_simplifier *s, const uint32_t *base, uint
     for (int k = 0; k < 2; ++k) key[1 + k] = fct_float_bits(s->mesh->texcoords[2 * (size_t)c + k] + 0.0f);
 }
 
-static uint64_t hash_key(const uint32_t key[KEY_WORDS]) {
+static uint64_t hash_key(const uint32_t *key, uint32_t words) {
     uint64_t h = 0x9e3779b97f4a7c15u;
-    for (int k = 0; k < KEY_WORDS; ++k) {
+    for (uint32_t k = 0; k < words; ++k) {
         h = (h ^ key[k]) * 0xbf58476d1ce4e5b9u;
         h ^= h >> 29;
     }
     return h ^ h >> 32;
 }
 
-/* Numbers the items [0, count) by distinct key, in the order of first appearance: ids[i] receives the number.
- * Items with ids[i] == FCT_NONE on entry are skipped. */
-static fct_result number_keys(const fct_simplifier *s, key_of *key, const uint32_t *base, uint32_t count,
-                              uint32_t *ids, uint32_t *distinct) {
+/* Numbers the items [0, count) by distinct key of `words` words, in the order of first appearance: ids[i]
+ * receives the number. Items with ids[i] == FCT_NONE on entry are skipped. */
+static fct_result number_keys(const fct_simplifier *s, key_of *key, uint32_t words, const uint32_t *base,
+                              uint32_t count, uint32_t *ids, uint32_t *distinct) {
     size_t size = 64;
     while (size < 2 * (size_t)count) size *= 2;
     uint32_t *table = fct_allocate(s->env, size, sizeof *table); /* per slot: the first item with its key */
@@ -68,10 +69,10 @@ static fct_result number_keys(const fct_simplifier *s, key_of *key, const uint32
     for (uint32_t i = 0; i < count; ++i) {
         if (ids[i] == FCT_NONE) continue;
         key(s, base, i, mine);
-        size_t slot = hash_key(mine) & (size - 1);
+        size_t slot = hash_key(mine, words) & (size - 1);
         for (; table[slot] != FCT_NONE; slot = (slot + 1) & (size - 1)) {
             key(s, base, table[slot], other);
-            if (!memcmp(mine, other, sizeof mine)) break;
+            if (!memcmp(mine, other, words * sizeof *mine)) break;
         }
         if (table[slot] == FCT_NONE) {
             table[slot] = i;
@@ -110,7 +111,7 @@ static fct_result make_points(fct_simplifier *s) {
     memset(s->point_of, 0xff, mesh->vertex_count * sizeof *s->point_of);
     for (size_t c = 0; c < 3 * (size_t)mesh->face_count; ++c) s->point_of[mesh->triangles[c]] = 0;
     fct_result result =
-        number_keys(s, write_position_key, NULL, mesh->vertex_count, s->point_of, &s->point_count);
+        number_keys(s, write_position_key, 3, NULL, mesh->vertex_count, s->point_of, &s->point_count);
     if (result == FCT_OK) result = fct_simplify_weld(s);
     if (result != FCT_OK) return result;
 
@@ -163,7 +164,7 @@ static fct_result make_rings(fct_simplifier *s) {
     return FCT_OK;
 }
 
-/* Classes are distinct (point, colour, normal), wedges are distinct (class, texture coordinates). */
+/* Classes are distinct (point, colour, normal, light), wedges are distinct (class, texture coordinates). */
 static fct_result make_wedges(fct_simplifier *s) {
     const fct_mesh *mesh = s->mesh;
     s->wedge_count = s->point_count;
@@ -175,13 +176,16 @@ static fct_result make_wedges(fct_simplifier *s) {
     fct_result result = s->corner_wedges && class_of ? FCT_OK : fct_fail_memory(s->env, "wedges");
     if (result != FCT_OK) goto done;
     memcpy(class_of, s->point_of, mesh->vertex_count * sizeof *class_of);
-    if (mesh->colors || mesh->normals)
-        result = number_keys(s, write_vertex_key, s->point_of, mesh->vertex_count, class_of, &class_count);
+    uint32_t words = 1;
+    for (uint32_t i = 0; i < STREAM_COUNT; ++i) words += stream_values(mesh, i) ? stream_width(i) : 0;
+    if (words > 1)
+        result =
+            number_keys(s, write_vertex_key, words, s->point_of, mesh->vertex_count, class_of, &class_count);
     if (result != FCT_OK) goto done;
     s->wedge_count = class_count;
     if (mesh->texcoords)
-        result =
-            number_keys(s, write_corner_key, class_of, (uint32_t)corners, s->corner_wedges, &s->wedge_count);
+        result = number_keys(s, write_corner_key, 3, class_of, (uint32_t)corners, s->corner_wedges,
+                             &s->wedge_count);
     else
         for (size_t c = 0; c < corners; ++c) s->corner_wedges[c] = class_of[mesh->triangles[c]];
     if (result != FCT_OK) goto done;

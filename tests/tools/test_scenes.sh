@@ -127,6 +127,8 @@ expect 0 info some.glb
 expect 0 bake furnace.json -o some.ply --light radiosity,error --json
 check "the error is listed" grep -q '"error"' out
 check "its property" grep -qa '^property float error$' some.ply
+expect 0 simplify some.ply --ratio .5 -o fewer.ply
+check "simplify keeps it" grep -qa '^property float error$' fewer.ply
 check "lit.ply has none" test "$(grep -ca 'property float error' lit.ply)" = 0
 expect 0 bake furnace.json -o some.glb --light radiosity,error
 check "its attribute" grep -qa _ERROR some.glb
