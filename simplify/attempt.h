@@ -1,4 +1,4 @@
-/* simplify/attempt.h: one contraction of an edge or a pair, if the checks allow it. */
+/* simplify/attempt.h: tries one contraction of an edge or a pair: the checks, the loss, the contraction. */
 #ifndef FCT_SIMPLIFY_ATTEMPT_H
 #define FCT_SIMPLIFY_ATTEMPT_H
 
@@ -7,7 +7,8 @@
 
 typedef enum fct_outcome {
     OUTCOME_CONTRACTED,
-    OUTCOME_GONE,       /* there is no such edge or pair any more, or both ends are hubs */
+    OUTCOME_GONE, /* there is no such edge or pair any more; both ends are hubs; an end of the pair is a hub
+                     or locked */
     OUTCOME_ELSEWHERE,  /* not inside the block of the sweep, or the block has no faces left to take */
     OUTCOME_BAD_PLACE,  /* a check refused the position; another one may be good */
     OUTCOME_REFUSED,    /* no position is good until the surroundings change */

@@ -6,7 +6,7 @@
  *    bound: an edge whose cost has grown returns to the queue.
  * 3. Refuse edges that fail a check or cost more than max_error. They return when a contraction changes their
  *    surroundings.
- * 4. Contract, and merge edges that became twins (attempt.c).
+ * 4. Contract (attempt.c), and merge edges that became twins (collapse.c).
  * Source: Garland 1999, section 3.9, with lazy re-evaluation.
  */
 #include "simplify/contract.h"

@@ -21,9 +21,11 @@
 enum {
     FACE_CHUNK = 4096,      /* faces per parallel task */
     PROGRESS_PERIOD = 4096, /* faces between two calls of the progress hook */
-    /* The second contraction may cost up to twice as much as the face seemed to: the cost of a face is a
-     * lower bound. */
+    /* The second contraction may cost up to twice as much as the bucket of its face, because the cost of a
+     * face leaves lost points out (cost/loss.h). */
     MOST_GROWTH = 8,
+    /* Of a neighbour with more faces, only those around the new point return to the queue. */
+    MOST_RETURNS = 64,
 };
 
 typedef struct faces {
@@ -50,10 +52,10 @@ static void find_first_buckets(void *user, size_t begin, size_t end, size_t chun
     }
 }
 
-/* Returns the refused faces at a point to the queue. */
-static void requeue_point(faces *k, uint32_t point) {
+/* Returns the refused faces at a point to the queue, if the point has at most `most` faces. */
+static void requeue_point(faces *k, uint32_t point, uint32_t most) {
     fct_simplifier *s = k->s;
-    if (point_at(s, point)->valence > SIMPLIFY_HUB) return;
+    if (point_at(s, point)->valence > most) return;
     for (uint32_t c = point_at(s, point)->first_corner; c != FCT_NONE; c = s->next_corners[c]) {
         fct_edge *item = &k->items[c / 3];
         if (item->state != EDGE_REFUSED || corner_dead(s, c)) continue;
@@ -62,12 +64,12 @@ static void requeue_point(faces *k, uint32_t point) {
     }
 }
 
-/* The same around the point that replaced an edge: at it, and at its neighbours. */
+/* The same at the neighbours of the point that replaced an edge. */
 static void requeue_ring(faces *k, const uint32_t *ring, uint32_t count) {
     for (uint32_t i = 0; i < count; ++i) {
         if (corner_dead(k->s, ring[i])) continue;
-        requeue_point(k, k->s->triangles[corner_next(ring[i])]);
-        requeue_point(k, k->s->triangles[corner_previous(ring[i])]);
+        requeue_point(k, k->s->triangles[corner_next(ring[i])], MOST_RETURNS);
+        requeue_point(k, k->s->triangles[corner_previous(ring[i])], MOST_RETURNS);
     }
 }
 
@@ -86,21 +88,21 @@ static fct_outcome try_edge(faces *k, const uint32_t ends[2], fct_attempt *attem
     if (outcome != OUTCOME_CONTRACTED) return outcome;
     requeue_ring(k, s->ring_a, attempt->move.count_a);
     requeue_ring(k, s->ring_b, attempt->move.count_b);
-    requeue_point(k, attempt->move.a);
+    requeue_point(k, attempt->move.a, SIMPLIFY_HUB);
     return outcome;
 }
 
-/* The first contraction of the face that the queue gave. False if there is none now: the face has a new
- * place in the queue, or is refused. */
-static bool begin_face(faces *k, uint32_t f) {
+/* The first contraction of the face that the queue gave. If none is possible now, the face gets a new place
+ * in the queue, or is refused. */
+static void begin_face(faces *k, uint32_t f) {
     fct_simplifier *s = k->s;
     fct_edge *item = &k->items[f];
-    if (item->state != EDGE_QUEUED || is_dead(s, f)) return false;
+    if (item->state != EDGE_QUEUED || is_dead(s, f)) return;
     uint32_t points[3];
     memcpy(points, s->triangles + 3 * (size_t)f, sizeof points);
     fct_face_price price;
     item->state = EDGE_REFUSED;
-    if (!fct_price_face(s, points, &price)) return false;
+    if (!fct_price_face(s, points, &price)) return;
     uint32_t bucket = queue_bucket(price.key), least = QUEUE_BUCKETS;
     if (bucket > s->queue->current) least = bucket;
     for (uint32_t i = 0; i < 3 && bucket <= s->queue->current; ++i) {
@@ -112,15 +114,14 @@ static bool begin_face(faces *k, uint32_t f) {
             item->state = EDGE_DEAD;
             k->kept = attempt.move.a, k->third = points[(side + 2) % 3];
             k->highest = s->queue->current + MOST_GROWTH;
-            return true;
+            return;
         }
         uint32_t grown = queue_bucket(attempt.candidate.key);
         if (outcome == OUTCOME_GREW && grown < least) least = grown;
     }
-    if (least == QUEUE_BUCKETS) return false;
+    if (least == QUEUE_BUCKETS) return;
     item->state = EDGE_QUEUED;
     queue_push(s->queue, f, least);
-    return false;
 }
 
 static void end_face(faces *k) {
@@ -143,19 +144,35 @@ static fct_result contract_all(faces *k) {
         }
         uint32_t f = queue_pop(s->queue);
         if (f == FCT_NONE) return FCT_OK;
-        if (!begin_face(k, f) || ++count % PROGRESS_PERIOD) continue;
-        result = fct_progress(s->env, "contract", (double)(before - s->live_faces) / (before - target));
+        begin_face(k, f);
+        if (++count % PROGRESS_PERIOD) continue;
+        result = fct_progress(s->env, "contract faces", (double)(before - s->live_faces) / (before - target));
         if (result != FCT_OK) return result;
     }
     return FCT_OK;
 }
 
+/* What refused an edge may have changed. */
+static void return_edges(fct_simplifier *s) {
+    for (uint32_t e = 0; e < s->edge_count; ++e) {
+        fct_edge *edge = &s->edges[e];
+        if (edge->state != EDGE_REFUSED && edge->state != EDGE_OVER_BOUND) continue;
+        edge->state = EDGE_QUEUED;
+        edge->ends_only = false;
+    }
+}
+
 fct_result fct_simplify_contract_faces(fct_simplifier *s) {
-    uint32_t count = s->mesh->face_count;
+    uint32_t count = s->mesh->face_count, before = s->live_faces;
     faces k = {.s = s, .kept = FCT_NONE};
     k.items = fct_allocate_zero(s->env, count, sizeof *k.items);
     if (!k.items) return fct_fail_memory(s->env, "a queue of faces");
-    fct_result result = fct_parallel_for_progress(s->env, "costs", count, FACE_CHUNK, find_first_buckets, &k);
+    fct_result result = FCT_OK;
+    /* After contractions, the search for the wedge of a corner shortens paths, which threads must not. */
+    if (s->live_faces == s->face_count)
+        result = fct_parallel_for_progress(s->env, "costs", count, FACE_CHUNK, find_first_buckets, &k);
+    else
+        find_first_buckets(&k, 0, count, 0, 0);
     if (result == FCT_OK) {
         queue_clear(s->queue, k.items, QUEUE_BUCKETS - 1);
         for (uint32_t f = count; f-- > 0;)
@@ -163,5 +180,6 @@ fct_result fct_simplify_contract_faces(fct_simplifier *s) {
         result = contract_all(&k);
     }
     fct_release(s->env, k.items);
+    if (s->live_faces < before) return_edges(s);
     return result;
 }

@@ -5,6 +5,8 @@
 
 #include "base/env.h"
 
+enum { MOST_PASSES = 100 };
+
 fct_simplify_def fct_simplify_def_default(void) {
     return (fct_simplify_def){
         .size = sizeof(fct_simplify_def),
@@ -72,6 +74,9 @@ fct_result fct_simplify_check(const fct_env *env, const fct_mesh *mesh, const fc
     if (!(def->feature_threshold >= 0))
         return fct_fail(env, FCT_ERROR_DATA, "feature_threshold is %g, expected at least 0",
                         def->feature_threshold);
+    if (def->refit_passes > MOST_PASSES)
+        return fct_fail(env, FCT_ERROR_DATA, "refit_passes is %u, expected at most %d", def->refit_passes,
+                        MOST_PASSES);
     if (mesh->face_count > UINT32_MAX / 3)
         return fct_fail(env, FCT_ERROR_MEMORY, "%u faces, expected at most %u", mesh->face_count,
                         UINT32_MAX / 3);

@@ -73,7 +73,7 @@ static const struct argp_option simplify_options_table[] = {
      0},
     {"primitive", KEY_PRIMITIVE, "WHAT", 0,
      "Contract edges (edge, default) or faces (face: all three corners become one vertex; half as many "
-     "steps, larger errors). face not with --pairs",
+     "steps, larger errors). face excludes --pairs",
      0},
     {"placement", KEY_PLACEMENT, "WHERE", 0,
      "Position of the new vertex: optimal (default), segment (on the edge), ends (either end or the "

@@ -26,7 +26,7 @@ typedef struct fct_simplifier fct_simplifier;
 
 /* Copies the mesh and the options, so both may be released. env must outlive *out. def->target_faces and
  * def->max_error are used only for the automatic weight of colours (FCT_WEIGHT_AUTO). Errors: those of
- * fct_simplify, and DATA if def->pair_distance is above 0: only edges are contracted. *out is then NULL. */
+ * fct_simplify, and DATA if def->pair_distance is above 0: a state holds no pairs. *out is then NULL. */
 FCT_API fct_result fct_simplifier_create(const fct_env *env, const fct_mesh *mesh,
                                          const fct_simplify_def *def, fct_simplifier **out);
 /* NULL is allowed. */
@@ -40,8 +40,9 @@ FCT_API uint32_t fct_simplifier_input_faces(const fct_simplifier *s);
 /* Contracts until at most target_faces are left, or until every contraction has an error above max_error
  * (INFINITY: no limit). Does nothing if there are no more faces than that.
  *
- * What the sequence of targets changes: a run sorts the edges into a queue and cuts the mesh into blocks
- * anew, so each stop can change the order of contractions of about equal cost. So the runs A, B and the run B
+ * What the sequence of targets changes: a run sorts the edges or faces into a queue and cuts the mesh into
+ * blocks anew, and with contractions of faces it may stop between the two contractions of a face. So each
+ * stop can change the order of contractions of about equal cost. So the runs A, B and the run B
  * alone give other meshes, with about the same error. But equal calls give equal bytes: run(A), run(B) with
  * or without a stop in a file between them; fct_simplify_levels with the targets A, B and a def with
  * target_faces = A; and run(A) alone as fct_simplify. The number of threads changes nothing.

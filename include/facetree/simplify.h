@@ -27,8 +27,8 @@ typedef enum fct_primitive {
     /* The corners of a face (Garland 1999, section 3.8): the cheapest edge of the face that can be
      * contracted, and then the edge to the third corner, at the best position for all three. If the second
      * edge cannot be contracted, or costs more than twice what the face seemed to cost, the first
-     * contraction stays. When no face is left that can be contracted, edges are. Steps are half as many, and
-     * errors larger: it is here for comparison. Not together with pair_distance. */
+     * contraction stays. When no face is left that can be contracted, edges are. It takes half as many
+     * steps, and the errors are larger. It is here for comparison. Not together with pair_distance. */
     FCT_PRIMITIVE_FACE
 } fct_primitive;
 
@@ -68,11 +68,12 @@ typedef struct fct_simplify_def {
     /* Points of different bodies that are at most this far apart may be contracted, too, and join the bodies
      * (Garland 1999, 3.2.1 and 6.4); in the mesh's unit, and up to the rounding of its coordinates; default
      * 0: only edges are contracted. A body is a set of faces that common points join, so points of one body
-     * are no pair: a thin sheet does not collapse onto its other side. Each point has a pair with the nearest
-     * point of each of the 8 nearest other bodies in reach, so there are at most 8 pairs per point at any
-     * distance (infinity is allowed). Locked points and points of more than 512 faces have none. Such a pair
-     * costs what both quadrics measure at the best position, and no face of it vanishes. Then equal faces of
-     * two closed bodies that stand on each other, an inner wall, vanish, and of two equal faces that look the
+     * are no pair (closed fans that share a vertex are bodies of their own, if nothing else joins them): a
+     * thin sheet does not collapse onto its other side. Each point has a pair with the nearest point of each
+     * of the 8 nearest other bodies in reach, so there are at most 8 pairs per point at any distance
+     * (infinity is allowed). Locked points and points of more than 512 faces have none. Such a pair costs
+     * what both quadrics measure at the best position, and no face of it vanishes. Then equal faces of two
+     * closed bodies that stand on each other, an inner wall, vanish, and of two equal faces that look the
      * same way one does. Not together with keep_topology. */
     double pair_distance;
     fct_primitive primitive; /* default EDGE */
@@ -92,8 +93,8 @@ typedef struct fct_simplify_def {
     /* Gamma: the weight of the squared distance to the edge's midpoint, relative to the trace of the quadric;
      * default 1e-9. */
     double regularization;
-    uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions; default 2.
-                              None are made with SUBSET, whose vertices are those of the input */
+    uint32_t refit_passes; /* passes that fit the vertices to the input after the contractions, at most 100;
+                              default 2. None are made with SUBSET, whose vertices are those of the input */
     /* vertex_count bytes, or NULL. A vertex whose byte is not 0 keeps its position and attributes exactly and
      * is not contracted away. Other vertices at its place that are joined with it are locked too. */
     const uint8_t *locks;
@@ -131,12 +132,13 @@ typedef struct fct_simplify_stats {
  *
  * Vertices: if open sides of faces coincide, their vertices move together, also with different attributes. So
  * doubled creases and texture seams do not crack. Doubled vertices with equal attributes become one vertex.
- * Bodies that only touch stay apart. A point of more than 512 faces does not move. Faces: with
- * check_foldover, the result has no duplicate face, no face whose area is 0 in the written floats, no two
- * faces folded onto each other (less than 26 degrees between them, before their corners become floats;
- * several turns of less than 4 degrees each may lead there) and no edge of more than two faces, unless the
- * input has such there; faces lower than 1e-15 of the longest side of the bounds count as faces without area.
- * If no other contraction is left, more than target_faces remain. Attributes
+ * Bodies that only touch stay apart. A vertex whose faces form several closed fans becomes one vertex per
+ * fan, unless keep_topology is on, so the result can have more vertices than the input. A point of more than
+ * 512 faces does not move. Faces: with check_foldover, the result has no duplicate face, no face whose area
+ * is 0 in the written floats, no two faces folded onto each other (less than 26 degrees between them, before
+ * their corners become floats; several turns of less than 4 degrees each may lead there) and no edge of more
+ * than two faces, unless the input has such there; faces lower than 1e-15 of the longest side of the bounds
+ * count as faces without area. If no other contraction is left, more than target_faces remain. Attributes
  * stay within the range of each component in the input; normals then get unit length. Dropped:
  * vertices that no face uses, and faces with two corners at one point. Every run and every thread count give
  * the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is negative or NaN), MEMORY,

@@ -10,9 +10,10 @@ typedef struct fct_face_price {
 } fct_face_price;
 
 /* The cost of contracting three points to one, at the best position that the policy def->placement allows.
- * With Q_ab the quadric of the edge a-b, its attributes eliminated, with what holds its ends, it is the
- * larger of min over p of (Q_ab + Q_bc + Q_ca)(p) / 2 and the largest cost of the three edges. Without
- * attributes and constraints the sum is Qa + Qb + Qc, and its minimum the exact cost; else it is an estimate.
+ * Let Q_ab be the quadric of the edge a-b, with its attributes eliminated and with the planes that hold its
+ * ends. The cost is the minimum of (Q_ab + Q_bc + Q_ca) / 2, or that of the most expensive edge if it is
+ * more. Without attributes and constraints the sum is Qa + Qb + Qc, and its minimum is exact; else it is an
+ * estimate.
  * The energy of the regularisation is that of an edge: gamma trace(Q) / 2 times the sum of the squared
  * distances from the corners. False if an edge has no place.
  */

@@ -16,7 +16,7 @@
 
 #define ORDER_MARK 0x01020304u
 
-enum { VERSION = 1 };
+enum { VERSION = 2 };
 
 enum {
     HAS_COLORS = 1,
@@ -246,7 +246,9 @@ static fct_result check_copies(reader *r, const fct_sorted *sorted) {
         if (mesh->triangles[c] < mesh->vertex_count) met[mesh->triangles[c]] = true;
     for (uint32_t i = 0; i < sorted->copy_count && good; ++i) {
         uint32_t from = sorted->copies[i];
-        good = from < inputs && (i == 0 || sorted->copies[i - 1] <= from) && met[from] && met[inputs + i];
+        good = from < inputs && (i == 0 || sorted->copies[i - 1] <= from) && met[from] && met[inputs + i] &&
+               !memcmp(mesh->positions + 3 * (size_t)from, mesh->positions + 3 * (size_t)(inputs + i),
+                       3 * sizeof(float));
     }
     fct_release(r->env, met);
     return good ? FCT_OK : fail_read(r, "a vertex was split from none");

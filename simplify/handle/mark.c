@@ -245,13 +245,15 @@ static fct_result fill_marks(const fct_simplifier *s, const fct_constrain_def *d
     return result;
 }
 
-/* An edge of the input at a split vertex belongs to one of the fans there (topology/pinch.h). */
-static fct_result choose_fans(const fct_simplifier *s, fct_mark *marks, size_t count) {
+/* An edge of the input at a split vertex belongs to one of the fans there (topology/pinch.h). If it is none
+ * of the first fan, the mark gets the points of its own. */
+static fct_result choose_fans(fct_simplifier *s, fct_mark *marks, size_t count) {
     const fct_sorted *sorted = &s->sorted;
     uint32_t inputs = sorted_inputs(sorted);
     if (sorted->copy_count == 0 || count == 0) return FCT_OK;
     contours k;
     fct_result result = list_contours(s, marks, count, &k);
+    if (result == FCT_OK) visit_sides(s, &k, false);
     for (uint32_t c = 0; c < 3 * s->mesh->face_count && result == FCT_OK; ++c) {
         const uint32_t v[2] = {s->mesh->triangles[c], s->mesh->triangles[corner_next(c)]};
         uint32_t from[2];
@@ -259,7 +261,7 @@ static fct_result choose_fans(const fct_simplifier *s, fct_mark *marks, size_t c
         for (int i = 0; i < 2; ++i)
             from[i] = s->point_of[v[i] < inputs ? v[i] : sorted->copies[v[i] - inputs]];
         uint64_t key = pair_key(from[0], from[1]);
-        for (size_t i = find_key(&k, key); i < k.count && k.keys[i] == key; ++i)
+        for (size_t i = find_key(&k, key); i < k.count && k.keys[i] == key && !k.met[i]; ++i)
             for (int end = 0; end < 2; ++end) marks[k.order[i]].points[end] = s->point_of[v[end]];
     }
     release_contours(s->env, &k);
@@ -274,11 +276,13 @@ static size_t hold_fans(const fct_simplifier *s, const fct_constrain_def *def, c
     for (uint32_t i = 0; i < def->point_count && sorted->copy_count > 0; ++i) {
         if (def->points[i] >= sorted_inputs(sorted)) continue;
         uint32_t first, end = fct_simplify_find_copies(sorted, sorted->vertex_places[def->points[i]], &first);
-        for (; first < end; ++first, ++count)
-            if (more) {
-                more[count] = of_points[i];
-                more[count].points[0] = s->point_of[sorted_inputs(sorted) + first];
-            }
+        uint32_t held = s->point_of[sorted->vertex_places[def->points[i]]];
+        for (; first < end; ++first) {
+            uint32_t point = s->point_of[sorted_inputs(sorted) + first];
+            if (point == held) continue; /* doubled vertices have joined the fans */
+            if (more) more[count] = of_points[i], more[count].points[0] = point;
+            ++count;
+        }
     }
     return count;
 }

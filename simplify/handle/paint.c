@@ -8,6 +8,7 @@
 #include "simplify/handle/history.h"
 #include "simplify/handle/wish.h"
 #include "simplify/output.h"
+#include "simplify/topology/pinch.h"
 
 /* Finds the places in the queue again of the edges whose factor has changed. before: the weights so far, or
  * NULL. */
@@ -70,11 +71,14 @@ static fct_result spread_input(const fct_simplifier *s, const float *weights, ui
                         sorted_inputs(sorted));
     memset(paint, 0, s->point_count * sizeof *paint);
     for (uint32_t v = 0; v < count; ++v) {
-        uint32_t p = s->point_of[sorted->vertex_places[v]];
+        uint32_t place = sorted->vertex_places[v], p = s->point_of[place], first,
+                 end = fct_simplify_find_copies(sorted, place, &first);
         if (p != FCT_NONE && weights[v] > paint[p]) paint[p] = weights[v];
+        for (; first < end; ++first) {
+            p = s->point_of[count + first];
+            if (weights[v] > paint[p]) paint[p] = weights[v];
+        }
     }
-    for (uint32_t i = 0; i < sorted->copy_count; ++i)
-        paint[s->point_of[count + i]] = paint[s->point_of[sorted->copies[i]]];
     return FCT_OK;
 }
 

@@ -301,6 +301,24 @@ static void rules_hold_for_faces(void **state) {
     }
 }
 
+/* Later levels price faces whose wedges were joined before; threads change nothing there, either. */
+static void levels_are_the_same_for_all_threads(void **state) {
+    (void)state;
+    fct_mesh mesh = make_torus(&env, SANITIZED ? 40 : 60, true, true), outs[2][2];
+    const uint32_t targets[2] = {mesh.face_count / 2, mesh.face_count / 20};
+    for (uint32_t threads = 0; threads < 2; ++threads) {
+        fct_env own = env;
+        own.thread_count = 1 + 3 * threads;
+        fct_simplify_def def = faces_def();
+        assert_int_equal(fct_simplify_levels(&own, &mesh, &def, targets, 2, outs[threads], NULL), FCT_OK);
+    }
+    for (int i = 0; i < 2; ++i) {
+        assert_true(same_mesh(&outs[0][i], &outs[1][i]));
+        for (int k = 0; k < 2; ++k) fct_mesh_release(&env, &outs[k][i]);
+    }
+    fct_mesh_release(&env, &mesh);
+}
+
 /* A flat sheet loses no area while contractions without an error are left. */
 static void flat_sheets_keep_their_area(void **state) {
     (void)state;
@@ -340,7 +358,9 @@ static void wrong_options_are_refused(void **state) {
     fct_simplify_def def = faces_def();
     def.pair_distance = 1;
     assert_int_equal(fct_simplify(&env, &mesh, &def, &out, NULL), FCT_ERROR_DATA);
-    def.pair_distance = 0, def.primitive = (fct_primitive)2;
+    def.pair_distance = 0, def.refit_passes = 101;
+    assert_int_equal(fct_simplify(&env, &mesh, &def, &out, NULL), FCT_ERROR_DATA);
+    def.refit_passes = 100, def.primitive = (fct_primitive)2;
     assert_int_equal(fct_simplify(&env, &mesh, &def, &out, NULL), FCT_ERROR_DATA);
     fct_mesh_release(&env, &mesh);
 }
@@ -354,6 +374,7 @@ int main(void) {
         cmocka_unit_test(faces_are_contracted_as_a_whole),
         cmocka_unit_test(errors_are_near_those_of_edges),
         cmocka_unit_test(rules_hold_for_faces),
+        cmocka_unit_test(levels_are_the_same_for_all_threads),
         cmocka_unit_test(flat_sheets_keep_their_area),
         cmocka_unit_test(edges_follow_when_no_face_is_left),
         cmocka_unit_test(wrong_options_are_refused),

@@ -252,6 +252,48 @@ static void wishes_hold_for_all_fans(void **state) {
     fct_mesh_release(&env, &mesh);
 }
 
+/* A fan has the largest weight of its vertices, whichever of them was split: a second vertex lies at the
+ * pole, in a face of one of the beads. */
+static void doubled_vertices_pass_their_weight(void **state) {
+    (void)state;
+    for (int upper = 0; upper < 2; ++upper) {
+        fct_mesh beads = make_beads(6), mesh;
+        uint32_t pole = 0, twin = beads.vertex_count, faces = beads.face_count, f = 0;
+        while (count_fans(&beads, pole) != 2) ++pole;
+        assert_int_equal(fct_mesh_create(&env, twin + 1, faces + 2, 0, &mesh), FCT_OK);
+        memcpy(mesh.positions, beads.positions, 12 * (size_t)twin);
+        memcpy(mesh.positions + 3 * (size_t)twin, beads.positions + 3 * (size_t)pole, 12);
+        memcpy(mesh.triangles, beads.triangles, 12 * (size_t)faces);
+        for (;; ++f) {
+            const uint32_t *t = beads.triangles + 3 * (size_t)f;
+            bool above = beads.positions[3 * t[0] + 2] + beads.positions[3 * t[1] + 2] +
+                             beads.positions[3 * t[2] + 2] >
+                         3;
+            if (above == upper && (t[0] == pole || t[1] == pole || t[2] == pole)) break;
+        }
+        uint32_t *t = mesh.triangles + 3 * (size_t)f, k = t[0] == pole ? 0 : t[1] == pole ? 1 : 2;
+        uint32_t x = t[(k + 1) % 3], y = t[(k + 2) % 3];
+        const uint32_t added[6] = {pole, x, twin, pole, twin, y};
+        t[k] = twin;
+        memcpy(mesh.triangles + 3 * (size_t)faces, added, sizeof added);
+        assert_int_equal(count_fans(&mesh, pole), 2);
+        fct_simplify_def def = fct_simplify_def_default();
+        fct_simplifier *s = made(&env, &mesh, &def);
+        assert_int_equal(s->sorted.copy_count, 1);
+        float *paint = malloc((twin + 1) * sizeof *paint);
+        for (uint32_t v = 0; v <= twin; ++v) paint[v] = v == twin ? 100 : 1;
+        assert_int_equal(fct_simplifier_paint(s, FCT_PAINT_INPUT, paint, twin + 1), FCT_OK);
+        uint32_t with_twin = s->point_of[s->sorted.vertex_places[twin]], heavy = 0;
+        assert_true(s->weights[with_twin] == 100);
+        for (uint32_t p = 0; p < s->point_count; ++p) heavy += s->weights[p] == 100;
+        assert_int_equal(heavy, 1);
+        free(paint);
+        fct_simplifier_destroy(s);
+        fct_mesh_release(&env, &beads);
+        fct_mesh_release(&env, &mesh);
+    }
+}
+
 int main(void) {
     env = fct_env_default();
     const struct CMUnitTest tests[] = {
@@ -259,6 +301,7 @@ int main(void) {
         cmocka_unit_test(pinched_surfaces_reach_every_target),
         cmocka_unit_test(open_fans_stay_together),
         cmocka_unit_test(wishes_hold_for_all_fans),
+        cmocka_unit_test(doubled_vertices_pass_their_weight),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
