@@ -27,9 +27,8 @@ typedef struct fct_progressive fct_progressive;
  * what the simplifier makes of the input before its first contraction: the same faces with the same
  * positions; equal vertices are one; normals have unit length, except those of locked points. Faces are in
  * the order in which the splits add them. The arrays source_faces, source_uv, irradiance, direct, indirect
- * and error are left out; for the last four a warning says so. Every
- * thread count gives the same bits. env must outlive *progressive. Errors: those of fct_simplify, with
- * *progressive = NULL. */
+ * and error are left out; for the last four a warning says so. Every thread count gives the same bits. env
+ * must outlive *progressive. Errors: those of fct_simplify, with *progressive = NULL. */
 FCT_API fct_result fct_simplify_progressive(const fct_env *env, const fct_mesh *mesh,
                                             const fct_simplify_def *def, fct_mesh *out,
                                             fct_simplify_stats *stats, fct_progressive **progressive);

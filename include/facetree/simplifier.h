@@ -41,11 +41,11 @@ FCT_API uint32_t fct_simplifier_input_faces(const fct_simplifier *s);
  * (INFINITY: no limit). Does nothing if there are no more faces than that.
  *
  * What the sequence of targets changes: a run sorts the edges or faces into a queue and cuts the mesh into
- * blocks anew, and with contractions of faces it may stop between the two contractions of a face. So each
- * stop can change the order of contractions of about equal cost. So the runs A, B and the run B
- * alone give other meshes, with about the same error. But equal calls give equal bytes: run(A), run(B) with
- * or without a stop in a file between them; fct_simplify_levels with the targets A, B and a def with
- * target_faces = A; and run(A) alone as fct_simplify. The number of threads changes nothing.
+ * blocks anew. With contractions of faces it may stop between the two contractions of a face. So each stop
+ * can change the order of contractions of about equal cost, and the runs A, B and the run B alone give other
+ * meshes, with about the same error. But equal calls give equal bytes: run(A), run(B) with or without a stop
+ * in a file between them; fct_simplify_levels with the targets A, B and a def with target_faces = A; and
+ * run(A) alone as fct_simplify. The number of threads changes nothing.
  *
  * stats may be NULL; the errors of the result (distance_rms to normal_rms) and seconds_refit are left to
  * fct_simplifier_mesh. After an error the simplifier is as before the call; after fct_simplifier_forget it

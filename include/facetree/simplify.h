@@ -52,12 +52,12 @@ typedef enum fct_stop {
 #define FCT_WEIGHT_AUTO (-1.)
 
 /* Attributes. The simplifier knows three attributes, each with a weight: vertex colours, texture coordinates
- * and vertex normals. The arrays irradiance, direct, indirect and error are treated as attributes of weight
- * 0. Positions are scaled so that the longest side of the bounds is 1. An attribute is
+ * and vertex normals. Positions are scaled so that the longest side of the bounds is 1. An attribute is
  * scaled so that its range is about 1, and then multiplied by its weight. For colours this is the range from
  * the 2nd to the 98th percentile, but at least 1/20 of the full range. A weight above 0 makes the attribute a
  * part of the error. With weight 0 it does not count in the error and is interpolated, but its seams are
- * still held in place. A weight has no effect if the mesh does not have the attribute. */
+ * still held in place. So it is with the arrays irradiance, direct, indirect and error, which have no weight.
+ * A weight has no effect if the mesh does not have the attribute. */
 typedef struct fct_simplify_def {
     uint32_t size;
     uint32_t target_faces; /* stop at this count or below; default 0 */
@@ -139,10 +139,9 @@ typedef struct fct_simplify_stats {
  * their corners become floats; several turns of less than 4 degrees each may lead there) and no edge of more
  * than two faces, unless the input has such there; faces lower than 1e-15 of the longest side of the bounds
  * count as faces without area. If no other contraction is left, more than target_faces remain. Attributes
- * stay within the range of each component in the input; normals then get unit length. Dropped:
- * vertices that no face uses, and faces with two corners at one point. Every run and every thread count give
- * the same bits. stats may be NULL. Errors: DATA (invalid mesh; an option that is negative or NaN), MEMORY,
- * CANCELLED. */
+ * stay within the range of each component in the input; normals then get unit length. Dropped: vertices that
+ * no face uses, and faces with two corners at one point. Every run and every thread count give the same bits.
+ * stats may be NULL. Errors: DATA (invalid mesh; an option out of its range), MEMORY, CANCELLED. */
 FCT_API fct_result fct_simplify(const fct_env *env, const fct_mesh *mesh, const fct_simplify_def *def,
                                 fct_mesh *out, fct_simplify_stats *stats);
 

@@ -29,9 +29,8 @@ fct_result fct_live_reserve(const fct_simplifier *s, fct_live_room *room);
 void fct_live_release(const fct_env *env, fct_live_room *room);
 
 /* Replaces the state of a filled simplifier of the same input and options. room: of the state that is read,
- * or NULL. *fault receives NULL, or what is wrong with the bytes. After a fault only
- * fct_simplifier_destroy may follow. Errors: MEMORY, without a change, never with a room; DATA with a fault.
- */
+ * or NULL. *fault says what is wrong with the bytes; it is NULL if they are right. A faulty state may only be
+ * destroyed. Errors: MEMORY, without a change, never with a room; DATA with a fault. */
 fct_result fct_live_read(fct_simplifier *s, fct_source *source, fct_live_room *room, const char **fault);
 
 #endif

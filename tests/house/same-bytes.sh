@@ -54,9 +54,10 @@ write_outputs() {
             "$@" collide "$in/mesh.ply" "$in/mesh.ply" --poses "$in/poses.txt" --$measure -o "$out/$measure.txt" --quiet
         done
         # shellcheck disable=SC2086 # a list of words
-        "$@" bake "$in/cornell/scene.json" $light -o "$out/lit.ply" --also "$out/lit.glb" --quiet
+        "$@" bake "$in/cornell/scene.json" $light --light radiosity,direct,error -o "$out/lit.ply" --also "$out/lit.glb" --quiet
         "$@" simplify "$in/mesh.ply" --ratio .2 -o "$out/fewer.ply" --progressive "$out/fewer.fpm" --quiet
         "$@" simplify "$out/lit.ply" --ratio .3 -o "$out/fewer-lit.glb" --save-state "$out/fewer-lit.fst" --quiet
+        "$@" simplify "$out/lit.ply" --primitive face --ratio .1 -o "$out/fewer-faces.ply" --quiet
         "$@" compare "$in/mesh.ply" "$out/fewer.ply" --samples 2 | grep -vE 'seconds|bytes' >"$out/compare.txt"
     } 2>"$out.err"
 }
@@ -74,7 +75,7 @@ fine="--error 1e-3" coarse="--error 1e-2 --max-edge .5" # an emulated processor 
 make_inputs inputs 12000
 make_inputs small 1500
 FACETREE_SIMD=baseline write_outputs inputs first "$fine" "$program"
-[ "$(find first -type f -size +0 | wc -l)" = 25 ] || { echo "expected 25 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
+[ "$(find first -type f -size +0 | wc -l)" = 26 ] || { echo "expected 26 files of the first run, found:"; ls -l first; cat first.err; exit 1; }
 variants=baseline
 FACETREE_SIMD=avx2 "$program" --version >/dev/null 2>&1 && variants="baseline avx2"
 threads() { "$@" --threads "$count"; }

@@ -27,8 +27,10 @@ static fct_mesh make_lumps(uint32_t n) {
     return make_rough(n, .2);
 }
 
-/* The sum that a contraction of three vertices minimises, as a dense system A p = b with the constant c: a
- * third of each face's area times the squared distance from its plane, for each corner (3.10). */
+/* What the contraction of three vertices minimises, as a dense system A p = b with the constant c. Each of
+ * the vertices adds its faces. A face adds the squared distance from its plane (3.10), times a third of its
+ * area.
+ */
 typedef struct dense {
     double a[9], b[3], c;
 } dense;
@@ -76,42 +78,86 @@ static double dense_minimum(const dense *d, double gamma, const v3 corners[3], d
     return dense_value(d, at) + energy;
 }
 
+/* The least value, with its energy, at the corners and, if `middles`, at the middles of the sides and of the
+ * face. */
+static double least_of_places(const dense *d, const v3 corners[3], bool middles, double gamma) {
+    double least = INFINITY, cost = 0, ridge = gamma * (d->a[0] + d->a[4] + d->a[8]);
+    for (int i = 0; i < 27; ++i) { /* weights of the corners, in sixths; the first place is the middle */
+        const int w[3] = {i == 0 ? 2 : i % 3 * 3, i == 0 ? 2 : i / 3 % 3 * 3, i == 0 ? 2 : i / 9 * 3};
+        if (w[0] + w[1] + w[2] != 6 || (!middles && w[0] != 6 && w[1] != 6 && w[2] != 6)) continue;
+        v3 p = {0, 0, 0};
+        double energy = 0;
+        for (int k = 0; k < 3; ++k) p = v3_mad(p, w[k] / 6., corners[k]);
+        for (int k = 0; k < 3; ++k) energy += .5 * ridge * v3_norm2(v3_sub(p, corners[k]));
+        double value = dense_value(d, (double[3]){p.x, p.y, p.z});
+        if (value < least) least = value, cost = value + energy;
+    }
+    return cost;
+}
+
+static double cost_of_side(fct_simplifier *s, uint32_t f, uint32_t side) {
+    const uint32_t *t = s->triangles + 3 * (size_t)f;
+    fct_candidate edge;
+    assert_true(fct_place(s, t[side], t[(side + 1) % 3], false, &edge));
+    return edge.key;
+}
+
+/* A rough part of a cone. Its planes nearly meet in the apex, which is far from most faces. */
+static fct_mesh make_cone(void) {
+    fct_mesh mesh = make_grid(&env, 14);
+    uint64_t seed = 5;
+    for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
+        float *p = mesh.positions + 3 * v;
+        double turn = 1.5 * (double)p[0], height = .1 + (double)p[1] + between(&seed, 0, .0005);
+        p[0] = (float)(height * cos(turn)), p[1] = (float)(height * sin(turn));
+        p[2] = (float)(height + between(&seed, 0, .0005));
+    }
+    return mesh;
+}
+
 /* Without attributes the price is the minimum over all faces at the three corners, and more than that of each
- * edge. The sides are in the order of their costs. */
+ * edge. If it is more than two sides away, the best of seven places counts. The sides are in the order of
+ * their costs. */
 static void prices_are_minima_of_three_quadrics(void **state) {
     (void)state;
-    fct_mesh mesh = make_lumps(9);
-    for (int kind = 0; kind < 2; ++kind) {
+    uint32_t near = 0, beyond = 0, far = 0;
+    for (int kind = 0; kind < 3; ++kind) {
+        fct_mesh mesh = kind < 2 ? make_lumps(9) : make_cone();
         fct_simplify_def def = faces_def();
-        if (kind) def.regularization = .01;
+        def.boundary_weight = 0;
+        if (kind == 1) def.regularization = .01;
         fct_simplifier *s = open_simplifier(&env, &mesh, &def);
         uint32_t exact = 0;
         for (uint32_t f = 0; f < mesh.face_count; ++f) {
             const uint32_t *t = s->mesh->triangles + 3 * f;
             v3 corners[3];
-            double at[3], most = 0, last = 0;
+            double at[3], most = 0, last = 0, longest = 0;
             for (int k = 0; k < 3; ++k) corners[k] = scaled_vertex(s->mesh, t[k]);
+            for (int k = 0; k < 3; ++k)
+                longest = fmax(longest, v3_norm(v3_sub(corners[k], corners[(k + 1) % 3])));
             dense d = add_faces(s->mesh, t);
             double want = dense_minimum(&d, def.regularization, corners, at);
+            v3 middle = v3_scale(v3_add(v3_add(corners[0], corners[1]), corners[2]), 1. / 3);
+            double reach = v3_norm(v3_sub((v3){at[0], at[1], at[2]}, middle)) / longest;
+            ++*(reach < 1 ? &near : reach < 2 ? &beyond : &far);
+            if (reach > 2) want = least_of_places(&d, corners, true, def.regularization);
             fct_face_price price;
             assert_true(fct_price_face(s, s->triangles + 3 * f, &price));
             uint32_t seen = 0;
             for (int k = 0; k < 3; ++k) {
-                uint32_t side = price.order[k];
-                fct_candidate edge;
-                assert_true(fct_place(s, s->triangles[3 * f + side], s->triangles[3 * f + (side + 1) % 3],
-                                      false, &edge));
-                assert_true(edge.key >= last);
-                last = edge.key, most = fmax(most, edge.key), seen |= 1u << side;
+                double key = cost_of_side(s, f, price.order[k]);
+                assert_true(key >= last);
+                last = key, most = fmax(most, key), seen |= 1u << price.order[k];
             }
             assert_int_equal(seen, 7);
-            assert_ratio(price.key, fmax(want, most), 1e-6);
-            exact += want >= most;
+            assert_ratio(price.key, fmax(want, most), kind < 2 ? 1e-6 : 1e-4);
+            exact += want > most;
         }
-        assert_true(exact > .9 * mesh.face_count);
+        assert_true(exact > .6 * mesh.face_count);
         fct_simplifier_destroy(s);
+        fct_mesh_release(&env, &mesh);
     }
-    fct_mesh_release(&env, &mesh);
+    assert_true(near > 100 && beyond > 10 && far > 10);
 }
 
 /* By the other policies the price is the least value at their places. */
@@ -126,24 +172,10 @@ static void prices_follow_the_placement(void **state) {
         for (uint32_t f = 0; f < mesh.face_count; ++f) {
             const uint32_t *t = s->mesh->triangles + 3 * f;
             dense d = add_faces(s->mesh, t);
-            double least = INFINITY, most = 0;
-            for (int i = 0; i < 27; ++i) { /* weights of the corners, in sixths */
-                const int w[3] = {i % 3 * 3, i / 3 % 3 * 3, i / 9 * 3};
-                bool middle = i == 0;
-                if (!middle && w[0] + w[1] + w[2] != 6) continue;
-                if (policy == FCT_PLACE_SUBSET && w[0] != 6 && w[1] != 6 && w[2] != 6) continue;
-                v3 p = {0, 0, 0};
-                for (int k = 0; k < 3; ++k)
-                    p = v3_mad(p, (middle ? 2 : w[k]) / 6., scaled_vertex(s->mesh, t[k]));
-                const double at[3] = {p.x, p.y, p.z};
-                least = fmin(least, dense_value(&d, at));
-            }
-            for (uint32_t k = 0; k < 3; ++k) {
-                fct_candidate edge;
-                assert_true(
-                    fct_place(s, s->triangles[3 * f + k], s->triangles[3 * f + (k + 1) % 3], false, &edge));
-                most = fmax(most, edge.key);
-            }
+            v3 corners[3];
+            for (int k = 0; k < 3; ++k) corners[k] = scaled_vertex(s->mesh, t[k]);
+            double least = least_of_places(&d, corners, policy != FCT_PLACE_SUBSET, 0), most = 0;
+            for (uint32_t k = 0; k < 3; ++k) most = fmax(most, cost_of_side(s, f, k));
             fct_face_price price;
             assert_true(fct_price_face(s, s->triangles + 3 * f, &price));
             assert_ratio(price.key, fmax(least, most), 1e-5);

@@ -31,8 +31,10 @@ static fct_mesh make_lit(uint32_t n) {
     return mesh;
 }
 
-/* What is linear in the position stays so; equal light stays equal, sums stay sums; nothing of it changes the
- * contractions. */
+/* The contractions are those of the mesh without the light. Light that is linear in the position stays
+ * linear. `direct` stays twice the colours, and `irradiance` stays the sum of its parts. All light stays in
+ * its range.
+ */
 static void light_follows(void **state) {
     (void)state;
     fct_mesh mesh = make_lit(40), plain = mesh;
@@ -59,6 +61,7 @@ static void light_follows(void **state) {
                 sum = fmax(sum, fabs((double)(out.irradiance[i] - out.direct[i] - out.indirect[i])));
             }
             worst = fmax(worst, 10 * fabs((double)out.error[v] - .1 - .03 * x + .02 * y));
+            assert_true(out.error[v] >= .0799f && out.error[v] <= .1301f);
         }
         assert_true(color < 1e-5 && worst < (kind == 2 ? 1e-6 : .05) && sum < (kind == 2 ? 1e-6 : .05));
         if (kind == 1) assert_true(worst < .03);
@@ -97,6 +100,15 @@ static void seams_of_light_stay(void **state) {
             if (x > 1.01f) assert_true(value == 2);
         }
         assert_ratio(mesh_area(&out), 2, 1e-6);
+        /* One vertex with far more light does not hide the seam. */
+        (*stream_slot(&twice, stream))[width * 3] = 6;
+        fct_simplifier *s = open_simplifier(&env, &twice, &def);
+        for (uint32_t v = 0; v < twice.vertex_count; ++v) {
+            if (twice.positions[3 * v] != 1) continue;
+            const fct_constraint *held = constraint_at(s, s->point_of[v]);
+            assert_true(held && held->hold >= HOLD_LINE);
+        }
+        fct_simplifier_destroy(s);
         fct_mesh *all[] = {&out, &twice, &parts[0], &parts[1], &mesh};
         for (size_t i = 0; i < FCT_LENGTH(all); ++i) fct_mesh_release(&env, all[i]);
     }

@@ -249,7 +249,8 @@ static void bounds_hold_what_is_below(void **state) {
 }
 
 /* The tip of a cone has all faces, and stays while it is a hub. The largest bound is at least the distance of
- * the rim from the base mesh. Few steps lose what is below them, so that their error is a diameter. */
+ * the rim from the base mesh. If the walk loses a vertex, the error of the step is the diameter of its
+ * sphere. That happens in few steps. */
 static void errors_at_hubs_are_distances(void **state) {
     (void)state;
     enum { RIM = 700 }; /* more than SIMPLIFY_HUB */
